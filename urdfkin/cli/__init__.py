@@ -1,0 +1,53 @@
+"""The command line: one file a command, loaded only when it is called.
+
+`urdfkin --help` imports neither numpy nor Pinocchio: the summaries stand here, the commands in their files.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from typing import cast
+
+import click
+
+from urdfkin.errors import UrdfkinError
+
+#: Command name -> (module that holds `command`, one-line summary), in the order of the help page.
+COMMANDS: dict[str, tuple[str, str]] = {}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in the order of the table, which is the order of the work."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import one command's file."""
+        if cmd_name not in COMMANDS:
+            return None
+        return cast("click.Command", importlib.import_module(COMMANDS[cmd_name][0]).command)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The table of commands, from the summaries alone."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
+
+
+@click.group(
+    cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
+@click.version_option(package_name="urdfkin")
+def cli() -> None:
+    """Textbook kinematics from any URDF, every number checked against Pinocchio."""
+
+
+def main() -> None:
+    """Entry point of the `urdfkin` command: exit 0 verified, 1 disagreement, 2 bad input or usage."""
+    try:
+        cli(standalone_mode=True)
+    except UrdfkinError as error:
+        click.echo(f"urdfkin: error: {error}", err=True)
+        sys.exit(2)

@@ -1,0 +1,80 @@
+"""One family of exceptions, each with the facts a person needs to act on it.
+
+Every message says what is wrong, where, what was found and what to do about it; the same facts are
+attributes, so that a program need not read the sentence.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable
+from typing import Any, Self, TypeVar
+
+_E = TypeVar("_E", bound="UrdfkinError")
+
+
+class UrdfkinError(Exception):
+    """Root of everything urdfkin raises on purpose.
+
+    Attributes:
+        what: The claim in one clause, without a full stop.
+        where: File, line, frame, sample: whatever locates it; None when there is no place.
+        found: The offending value, as the user wrote it.
+        remedy: What to do.
+    """
+
+    def __init__(
+        self, what: str, *, where: str | None = None, found: str | None = None, remedy: str | None = None
+    ) -> None:
+        super().__init__(what)
+        self.what = what
+        self.where = where
+        self.found = found
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        place = f"{self.where}: " if self.where else ""
+        found = f": found {self.found}" if self.found else ""
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return f"{place}{self.what}{found}{remedy}"
+
+    def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
+        # Errors cross process borders in `validate --jobs`; the default would lose the keyword fields.
+        return _rebuild, (type(self), self.__dict__)
+
+
+def _rebuild(cls: type[_E], state: dict[str, Any]) -> _E:
+    error = cls.__new__(cls, state["what"])
+    error.args = (state["what"],)
+    error.__dict__.update(state)
+    return error
+
+
+class InputError(UrdfkinError, ValueError):
+    """A value handed to urdfkin cannot be used: wrong length, not finite, not a rotation, ..."""
+
+
+class UnknownNameError(UrdfkinError, LookupError):
+    """A name that does not exist; the message offers the nearest ones that do.
+
+    Attributes:
+        name: The name that was asked for.
+        nearest: Up to three existing names that look like it.
+    """
+
+    def __init__(self, kind: str, name: str, known: Iterable[str], *, where: str | None = None) -> None:
+        names = sorted(set(known))
+        nearest = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+        if nearest:
+            remedy = f"did you mean {', '.join(nearest)}?"
+        elif names:
+            remedy = f"there are {len(names)}: {', '.join(names[:6])}{', ...' if len(names) > 6 else ''}"
+        else:
+            remedy = "there are none"
+        super().__init__(f"unknown {kind} {name!r}", where=where, remedy=remedy)
+        self.name = name
+        self.nearest = tuple(nearest)
+
+
+class SourceError(UrdfkinError, OSError):
+    """A file that cannot be read or written."""
