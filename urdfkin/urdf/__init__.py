@@ -1,0 +1,1 @@
+"""URDF text to `KinematicTree` and back."""

@@ -1,0 +1,125 @@
+"""URDF text to `KinematicTree`, through yourdfpy; the only module that imports it.
+
+yourdfpy reads the XML; what the URDF specification says beyond it is done here: axes are normalised, chains
+of mimic joints are resolved, joints are put in Pinocchio's order. Meshes are never opened.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.tree import (
+    FloatArray,
+    Joint,
+    JointKind,
+    KinematicTree,
+    Limit,
+    Mimic,
+    build_tree,
+    with_root_joint,
+)
+
+if TYPE_CHECKING:
+    from yourdfpy import urdf as yourdf
+
+
+def read_tree(data: bytes, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
+    """The kinematic tree of a URDF.
+
+    Args:
+        data: The file's bytes, already found free of errors by `urdfkin.diagnostics`.
+        mimic: Whether mimic joints follow their leaders (the URDF's meaning) or move freely.
+        root_joint: `"floating"` or `"planar"` hangs the root link from a moving joint `root_joint`.
+
+    Raises:
+        InputError: the joints make no tree, a mimic joint cannot follow, or `root_joint` is no such kind.
+        UnknownNameError: a mimic joint names a leader that does not exist.
+    """
+    robot = _parse(data)
+    links = {link.name for link in robot.links}
+    roots = links - {joint.child for joint in robot.joints}
+    if len(roots) != 1:
+        raise InputError(
+            "a robot has one root link", where=robot.name, found=", ".join(sorted(roots)) or "none"
+        )
+    leaders = {joint.name: joint for joint in robot.joints}
+    rows = [(_joint(joint, leaders if mimic else None), joint.parent, joint.child) for joint in robot.joints]
+    tree = build_tree(robot.name, roots.pop(), rows)
+    return tree if root_joint is None else with_root_joint(tree, _root_kind(root_joint))
+
+
+def _parse(data: bytes) -> yourdf.Robot:
+    # Imported on first use: the meshing library under yourdfpy takes half a second.
+    from yourdfpy import URDF  # noqa: PLC0415
+
+    return URDF.load(
+        io.BytesIO(data), build_scene_graph=False, load_meshes=False, filename_handler=lambda name: name
+    ).robot
+
+
+def _root_kind(word: str) -> JointKind:
+    if word not in ("floating", "planar"):
+        raise InputError("root_joint is 'floating', 'planar' or None", found=repr(word))
+    return JointKind(word)
+
+
+def _joint(joint: yourdf.Joint, leaders: dict[str, yourdf.Joint] | None) -> Joint:
+    kind = JointKind(joint.type)
+    follows = leaders is not None and joint.mimic is not None and kind is not JointKind.FIXED
+    return Joint(
+        name=joint.name,
+        kind=kind,
+        parent=0,
+        T_parent_joint=np.eye(4) if joint.origin is None else joint.origin,
+        axis=_unit(joint.axis, joint.name) if kind.has_axis else np.array([1.0, 0.0, 0.0]),
+        limit=_limit(joint.limit, kind),
+        mimic=_resolve(joint, leaders or {}) if follows else None,
+    )
+
+
+def _unit(axis: FloatArray, joint: str) -> FloatArray:
+    """The axis divided by its length, as Pinocchio does; an axis that is a unit vector stays as it is."""
+    length = math.hypot(*axis)
+    if not 0.0 < length < math.inf:
+        raise InputError("a joint's axis has no direction", where=f"joint {joint}", found=str(axis.tolist()))
+    return axis if length == 1.0 else axis / length
+
+
+def _limit(limit: Any, kind: JointKind) -> Limit | None:
+    if limit is None or kind.nv == 0:
+        return None
+    bounded = kind in (JointKind.REVOLUTE, JointKind.PRISMATIC)
+    # A bound that is not written is zero, as in urdfdom; a continuous joint's are ignored by the specification.
+    return Limit(
+        lower=(limit.lower or 0.0) if bounded else -math.inf,
+        upper=(limit.upper or 0.0) if bounded else math.inf,
+        velocity=math.inf if limit.velocity is None else limit.velocity,
+        effort=math.inf if limit.effort is None else limit.effort,
+    )
+
+
+def _resolve(joint: yourdf.Joint, joints: dict[str, yourdf.Joint]) -> Mimic:
+    """Follow a chain of mimic joints to the one that moves: multipliers multiply, offsets add up."""
+    multiplier, offset = 1.0, 0.0
+    follower, met = joint, {joint.name}
+    while follower.mimic is not None and JointKind(follower.type) is not JointKind.FIXED:
+        rule = follower.mimic
+        offset += multiplier * rule.offset
+        multiplier *= rule.multiplier
+        if rule.joint not in joints:
+            raise UnknownNameError(
+                "mimic leader",
+                rule.joint,
+                joints,
+                where=f"joint {follower.name} (load with mimic off to ignore it)",
+            )
+        if rule.joint in met:
+            raise InputError("mimic joints follow each other in a circle", where=f"joint {joint.name}")
+        met.add(rule.joint)
+        follower = joints[rule.joint]
+    return Mimic(follower.name, multiplier, offset)
