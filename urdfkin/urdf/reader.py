@@ -94,7 +94,7 @@ def _limit(limit: Any, kind: JointKind) -> Limit | None:
     if limit is None or kind.nv == 0:
         return None
     bounded = kind in (JointKind.REVOLUTE, JointKind.PRISMATIC)
-    # A bound that is not written is zero, as in urdfdom; a continuous joint's are ignored by the specification.
+    # A bound that is not written is zero, as in urdfdom; the specification ignores a continuous joint's.
     return Limit(
         lower=(limit.lower or 0.0) if bounded else -math.inf,
         upper=(limit.upper or 0.0) if bounded else math.inf,
