@@ -1,0 +1,76 @@
+"""Checked input: what the text calls a vector or a matrix, as float64 arrays with leading batch axes.
+
+Every function of this part takes any leading batch shape, and every pair of arguments broadcasts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from urdfkin.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+#: A direction counts as a unit vector when its norm is one to this. Normalised doubles are within 4e-16;
+#: six typed digits are not, and would give a matrix that is no rotation.
+UNIT_TOLERANCE = 1e-12
+
+
+def scalars(value: ArrayLike, name: str) -> FloatArray:
+    """`value` as finite float64 of any shape; raises InputError naming the argument otherwise."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be numbers", found=repr(value)[:60]) from error
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} must be finite", found=str(array[~np.isfinite(array)][0]))
+    return array
+
+
+def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
+    """`value` as finite (..., size) float64; raises InputError naming the argument otherwise."""
+    array = scalars(value, name)
+    if array.ndim < 1 or array.shape[-1] != size:
+        raise InputError(f"{name} must have the shape (..., {size})", found=str(array.shape))
+    return array
+
+
+def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> FloatArray:
+    """`value` as finite (..., rows, columns) float64; raises InputError naming the argument otherwise."""
+    array = scalars(value, name)
+    if array.ndim < 2 or array.shape[-2:] != (rows, columns):
+        raise InputError(f"{name} must have the shape (..., {rows}, {columns})", found=str(array.shape))
+    return array
+
+
+def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
+    """`value` as (..., 3) unit vectors; raises InputError naming the argument otherwise.
+
+    They are used as they are: normalising in silence would hide a mistake in the caller's axis.
+    """
+    array = vectors(value, name)
+    norms = np.sqrt((array * array).sum(axis=-1))
+    if (np.abs(norms - 1.0) > UNIT_TOLERANCE).any():
+        worst = norms.flat[np.abs(norms - 1.0).argmax()]
+        raise InputError(
+            f"{name} must be a unit vector", found=f"norm {worst:.17g}", remedy="divide it by its norm"
+        )
+    return array
+
+
+def rotations(value: ArrayLike, name: str) -> FloatArray:
+    """`value` as (..., 3, 3) rotation matrices; raises InputError naming the argument otherwise."""
+    array = matrices(value, name)
+    residual = np.abs(array @ array.swapaxes(-1, -2) - np.eye(3)).max(initial=0.0)
+    if residual > 1e-9:
+        raise InputError(f"{name} must be a rotation", found=f"R R^T off the identity by {residual:.3g}")
+    if (determinant(array) < 0.0).any():
+        raise InputError(f"{name} must be a rotation", found="a reflection, determinant -1")
+    return array
+
+
+def determinant(matrix: FloatArray) -> FloatArray:
+    """Determinant of (..., 3, 3) as the triple product of the rows."""
+    triple: FloatArray = (np.cross(matrix[..., 0, :], matrix[..., 1, :]) * matrix[..., 2, :]).sum(axis=-1)
+    return triple
