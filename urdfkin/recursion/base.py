@@ -1,0 +1,78 @@
+"""The motion of the base: the initial conditions that start the recursion (end of section 7.7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from urdfkin.errors import InputError
+from urdfkin.tree import FloatArray, frozen
+
+#: How far R^T R may be from the identity: what seven printed digits leave.
+_ORTHONORMAL_TO = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BaseMotion:
+    """How the robot's root link moves in the text's frame -1, which then is the world.
+
+    Every field may carry leading batch axes, which broadcast against the configuration's.
+
+    Attributes:
+        placement: (..., 4, 4) T_world_base.
+        velocity: (..., 6) [linear; angular] of the base's origin, world axes, m/s and rad/s.
+        acceleration: (..., 6) [linear; angular], classical, world axes, m/s^2 and rad/s^2.
+
+    Raises:
+        InputError: a wrong shape, a number that is not finite, or a placement that is no rigid motion.
+    """
+
+    placement: FloatArray = field(default_factory=lambda: np.eye(4))
+    velocity: FloatArray = field(default_factory=lambda: np.zeros(6))
+    acceleration: FloatArray = field(default_factory=lambda: np.zeros(6))
+
+    def __post_init__(self) -> None:
+        for name, shape in (("placement", (4, 4)), ("velocity", (6,)), ("acceleration", (6,))):
+            array = frozen(getattr(self, name))
+            if array.shape[-len(shape) :] != shape or not np.isfinite(array).all():
+                raise InputError(
+                    f"the base's {name} is an array (..., {', '.join(map(str, shape))}) of finite numbers",
+                    found=f"shape {array.shape}" if array.shape[-len(shape) :] != shape else "nan or inf",
+                )
+            object.__setattr__(self, name, array)
+        R = self.placement[..., :3, :3]
+        defect = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0)
+        bottom = np.abs(self.placement[..., 3, :] - [0.0, 0.0, 0.0, 1.0]).max(initial=0.0)
+        if max(defect, bottom) > _ORTHONORMAL_TO or (np.linalg.det(R) < 0.0).any():
+            raise InputError("the base's placement is no rigid motion", found=f"a defect of {max(defect, bottom):.3g}")
+
+    def __reduce__(self) -> tuple[type[BaseMotion], tuple[Any, ...]]:
+        return type(self), (self.placement, self.velocity, self.acceleration)
+
+    @property
+    def batch_shape(self) -> tuple[int, ...]:
+        """The leading axes of the three fields together."""
+        return np.broadcast_shapes(
+            self.placement.shape[:-2], self.velocity.shape[:-1], self.acceleration.shape[:-1]
+        )
+
+    def state(self, batch_shape: tuple[int, ...]) -> FloatArray:
+        """(n, 24) rows [R, p, w, v, alpha, a] for the kernels, one row if the base is the same for all."""
+        shape = batch_shape if self.batch_shape else ()
+        parts = (
+            self.placement[..., :3, :3].reshape(*self.placement.shape[:-2], 9),
+            self.placement[..., :3, 3],
+            self.velocity[..., 3:],
+            self.velocity[..., :3],
+            self.acceleration[..., 3:],
+            self.acceleration[..., :3],
+        )
+        rows = np.concatenate([np.broadcast_to(part, (*shape, part.shape[-1])) for part in parts], axis=-1)
+        return np.ascontiguousarray(rows.reshape(-1, 24))
+
+
+#: A base that stands still at the world's origin.
+STILL = BaseMotion()
+STILL_STATE = frozen(STILL.state(()))

@@ -1,0 +1,237 @@
+"""What the recursion does for a tree, as plain arrays: one step a moving joint, one row a frame.
+
+Every joint frame is turned so that its axis is z (`A` below), as in the text: then each revolute joint is
+Rz and each prismatic one Tz. Fixed joints are folded into the offsets. A plan for one frame holds the
+frame's ancestors alone; a plan for several frames holds every joint one of them needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urdfkin.rotation.aligning import axis_aligning
+from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree
+
+IntArray = NDArray[np.int64]
+
+
+class Step(IntEnum):
+    """Columns of `Plan.steps` (whole numbers)."""
+
+    KIND = 0
+    RESUME = 1
+    SAVE = 2
+    Q = 3
+    V = 4
+
+
+class Motion(IntEnum):
+    """What a step does; the value in column `Step.KIND`."""
+
+    TURN = 0
+    SLIDE = 1
+    PLANAR = 2
+    FLOATING = 3
+
+
+class Geometry(IntEnum):
+    """Columns of `Plan.geometry`: R (9), the offset in the new axes (3), then the mimic rule."""
+
+    R = 0
+    OFFSET = 9
+    MULTIPLIER = 12
+    CONSTANT = 13
+
+
+class Column(IntEnum):
+    """Columns of `Plan.columns`: a column of eq. 7.85 each row."""
+
+    STEP = 0
+    AXIS = 1
+    TURNS = 2
+    V = 3
+
+
+_MOTION = {
+    JointKind.REVOLUTE: Motion.TURN,
+    JointKind.CONTINUOUS: Motion.TURN,
+    JointKind.PRISMATIC: Motion.SLIDE,
+    JointKind.PLANAR: Motion.PLANAR,
+    JointKind.FLOATING: Motion.FLOATING,
+}
+
+#: Which axis of the moved frame each rate of a joint acts along, and whether it turns about it.
+_RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
+    Motion.TURN: ((2, True),),
+    Motion.SLIDE: ((2, False),),
+    Motion.PLANAR: ((0, False), (1, False), (2, True)),
+    Motion.FLOATING: ((0, False), (1, False), (2, False), (0, True), (1, True), (2, True)),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The steps of a walk from the base outwards, and the frames met on the way.
+
+    Attributes:
+        nq: Length of `q`.
+        nv: Length of `v` and `a`.
+        joints: The moving joint of each step, as an index into the tree's joints.
+        steps: (steps, 5) whole numbers, columns `Step`. RESUME is -1 to go on from the step before, else
+            the slot of saved state to go on from; SAVE is the slot to save this step's state in, or -1.
+        geometry: (steps, 14), columns `Geometry`.
+        slots: How many slots of saved state the walk needs; slot 0 holds the base.
+        frames: (frames, 2): the step after which a frame is met (-1: the base), and its place in the
+            output; ordered by step.
+        offsets: (frames, 12): rotation (9) and offset (3) from the step's frame to the frame, the offset
+            in the frame's own axes.
+        columns: (columns, 4), columns `Column`: every rate of every step.
+        multipliers: (columns,) the mimic multiplier of each column.
+        uses: (frames, columns): 0 where the column is not the frame's ancestor, 1 where it is written
+            first to its place in the Jacobian, 2 where it is added to what is there.
+        idle: (frames, nv): 1 where a frame's Jacobian has a zero column.
+        depth: For each frame, in output order, how many URDF joints lie between it and the root.
+    """
+
+    nq: int
+    nv: int
+    joints: tuple[int, ...]
+    steps: IntArray
+    geometry: FloatArray
+    slots: int
+    frames: IntArray
+    offsets: FloatArray
+    columns: IntArray
+    multipliers: FloatArray
+    uses: IntArray
+    idle: IntArray
+    depth: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    def __reduce__(self) -> tuple[type[Plan], tuple[Any, ...]]:
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
+    """The walk that meets the frames of the given links.
+
+    Args:
+        tree: The robot.
+        links: Indices into `tree.links`, in the order in which results are wanted.
+    """
+    paths = [tree.path(link) for link in links]
+    needed = sorted({i for path in paths for i in path if tree.joints[i].kind.nv})
+    step_of_joint = {joint: step for step, joint in enumerate(needed)}
+    anchors = _anchors(tree, step_of_joint, {i for path in paths for i in path})
+    steps, geometry = _steps(tree, needed, anchors)
+    parents = [anchors[tree.joints[i].parent][0] for i in needed]
+    slots = _slots(steps, parents)
+    columns, multipliers = _columns(steps, geometry)
+    ancestors = [{step_of_joint[i] for i in path if i in step_of_joint} for path in paths]
+    uses, idle = _uses(columns, ancestors, tree.nv)
+    order = sorted(range(len(links)), key=lambda place: anchors[links[place]][0])
+    return Plan(
+        nq=tree.nq,
+        nv=tree.nv,
+        joints=tuple(needed),
+        steps=steps,
+        geometry=geometry,
+        slots=slots,
+        frames=np.array([[anchors[links[place]][0], place] for place in order], dtype=np.int64).reshape(-1, 2),
+        offsets=np.array([_flat(anchors[links[place]][1]) for place in order]).reshape(-1, 12),
+        columns=columns,
+        multipliers=multipliers,
+        uses=uses[order],
+        idle=idle[order],
+        depth=tuple(len(path) for path in paths),
+    )
+
+
+def _anchors(
+    tree: KinematicTree, step_of_joint: dict[int, int], wanted: set[int]
+) -> dict[int, tuple[int, FloatArray]]:
+    """For each link: the step that carries it (-1: the base) and its pose in that step's turned frame."""
+    anchors = {0: (-1, np.eye(4))}
+    for i in sorted(wanted):
+        joint = tree.joints[i]
+        if i in step_of_joint:
+            anchors[i + 1] = step_of_joint[i], turned(joint).T
+        else:
+            step, T_step_parent = anchors[joint.parent]
+            anchors[i + 1] = step, T_step_parent @ joint.T_parent_joint
+    return anchors
+
+
+def turned(joint: Joint) -> FloatArray:
+    """(4, 4) `A`: the pose, in the joint's URDF frame, of the frame whose z is the joint's axis."""
+    A = np.eye(4)
+    if joint.kind.has_axis:
+        A[:3, :3] = axis_aligning(joint.axis)
+    return A
+
+
+def _flat(T: FloatArray) -> FloatArray:
+    """R row by row, then R^T p: the offset seen in the new axes."""
+    return np.concatenate((T[:3, :3].ravel(), T[:3, :3].T @ T[:3, 3]))
+
+
+def _steps(
+    tree: KinematicTree, needed: Sequence[int], anchors: dict[int, tuple[int, FloatArray]]
+) -> tuple[IntArray, FloatArray]:
+    steps = np.full((len(needed), len(Step)), -1, dtype=np.int64)
+    geometry = np.zeros((len(needed), Geometry.CONSTANT + 1))
+    for row, i in enumerate(needed):
+        joint = tree.joints[i]
+        T_step_joint = anchors[joint.parent][1] @ joint.T_parent_joint @ turned(joint)
+        steps[row, Step.KIND] = _MOTION[joint.kind]
+        steps[row, Step.Q] = tree.q_index[i]
+        steps[row, Step.V] = tree.v_index[i]
+        geometry[row, : Geometry.MULTIPLIER] = _flat(T_step_joint)
+        rule = joint.mimic
+        geometry[row, Geometry.MULTIPLIER :] = (1.0, 0.0) if rule is None else (rule.multiplier, rule.offset)
+    return steps, geometry
+
+
+def _slots(steps: IntArray, parents: Sequence[int]) -> int:
+    """Fill RESUME and SAVE: a step whose parent is not the step before goes on from saved state."""
+    slot_of = {-1: 0}
+    for row, parent in enumerate(parents):
+        if parent != row - 1:
+            slot = slot_of.setdefault(parent, len(slot_of))
+            steps[row, Step.RESUME] = slot
+            if parent >= 0:
+                steps[parent, Step.SAVE] = slot
+    return len(slot_of)
+
+
+def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArray]:
+    rows = [
+        (row, axis, int(turns), step[Step.V] + place)
+        for row, step in enumerate(steps)
+        for place, (axis, turns) in enumerate(_RATES[Motion(step[Step.KIND])])
+    ]
+    columns = np.array(rows, dtype=np.int64).reshape(-1, len(Column))
+    return columns, geometry[columns[:, Column.STEP], Geometry.MULTIPLIER].copy()
+
+
+def _uses(columns: IntArray, ancestors: Sequence[set[int]], nv: int) -> tuple[IntArray, IntArray]:
+    uses = np.zeros((len(ancestors), len(columns)), dtype=np.int64)
+    idle = np.ones((len(ancestors), nv), dtype=np.int64)
+    for frame, steps in enumerate(ancestors):
+        for c, column in enumerate(columns):
+            if column[Column.STEP] in steps:
+                place = column[Column.V]
+                uses[frame, c] = 1 if idle[frame, place] else 2
+                idle[frame, place] = 0
+    return uses, idle
