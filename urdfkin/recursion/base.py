@@ -46,7 +46,9 @@ class BaseMotion:
         defect = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0)
         bottom = np.abs(self.placement[..., 3, :] - [0.0, 0.0, 0.0, 1.0]).max(initial=0.0)
         if max(defect, bottom) > _ORTHONORMAL_TO or (np.linalg.det(R) < 0.0).any():
-            raise InputError("the base's placement is no rigid motion", found=f"a defect of {max(defect, bottom):.3g}")
+            raise InputError(
+                "the base's placement is no rigid motion", found=f"a defect of {max(defect, bottom):.3g}"
+            )
 
     def __reduce__(self) -> tuple[type[BaseMotion], tuple[Any, ...]]:
         return type(self), (self.placement, self.velocity, self.acceleration)

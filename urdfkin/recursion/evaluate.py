@@ -8,11 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from urdfkin.recursion.base import STILL_STATE
-from urdfkin.recursion.kernels import jacobian as _jacobian_kernel
-from urdfkin.recursion.kernels import motion as _motion_kernel
-from urdfkin.recursion.kernels import scratch_rows
 from urdfkin.recursion.lanes import LANES
 from urdfkin.recursion.plan import Plan
+from urdfkin.recursion.walk import scratch_rows
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
 
@@ -36,8 +34,21 @@ def _motion(
     width = 6 if order else 16
     if out is None:
         out = np.empty((len(q), len(plan.frames), width))
-    _motion_kernel(
-        order, int(reference), plan.steps, plan.geometry, plan.frames, plan.offsets, base, q, v, a, out, _scratch(plan)
+    from urdfkin.recursion.motion_kernel import motion  # noqa: PLC0415  compiled when first needed
+
+    motion(
+        order,
+        int(reference),
+        plan.steps,
+        plan.geometry,
+        plan.frames,
+        plan.offsets,
+        base,
+        q,
+        v,
+        a,
+        out,
+        _scratch(plan),
     )
     return out
 
@@ -88,7 +99,9 @@ def jacobians(
     """(n, frames, 6, nv) velocity Jacobians: 7.85."""
     if out is None:
         out = np.empty((len(q), len(plan.frames), 6, plan.nv))
-    _jacobian_kernel(
+    from urdfkin.recursion.jacobian_kernel import jacobian  # noqa: PLC0415  compiled when first needed
+
+    jacobian(
         int(reference),
         plan.steps,
         plan.geometry,

@@ -27,14 +27,14 @@ lane_function: Any = numba.njit(fastmath={"contract"}, forceinline=True, error_m
 
 
 @lane_function
-def load(s, row, k):  # type: ignore[no-untyped-def]
+def load(s, row, k):
     """The vector in rows `row`, `row + 1`, `row + 2` of lane `k`."""
     at = row * LANES + k
     return s[at], s[at + LANES], s[at + 2 * LANES]
 
 
 @lane_function
-def store(s, row, k, x):  # type: ignore[no-untyped-def]
+def store(s, row, k, x):
     """Write a vector."""
     at = row * LANES + k
     s[at] = x[0]
@@ -43,56 +43,56 @@ def store(s, row, k, x):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def cross(x, y):  # type: ignore[no-untyped-def]
+def cross(x, y):
     """`x x y`, that is S(x) y with the matrix of eq. 7.16."""
     return x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]
 
 
 @lane_function
-def plus(x, y):  # type: ignore[no-untyped-def]
+def plus(x, y):
     """`x + y`."""
     return x[0] + y[0], x[1] + y[1], x[2] + y[2]
 
 
 @lane_function
-def minus(x, y):  # type: ignore[no-untyped-def]
+def minus(x, y):
     """`x - y`."""
     return x[0] - y[0], x[1] - y[1], x[2] - y[2]
 
 
 @lane_function
-def times(c, x):  # type: ignore[no-untyped-def]
+def times(c, x):
     """`c x` for a number c."""
     return c * x[0], c * x[1], c * x[2]
 
 
 @lane_function
-def dot(x, y):  # type: ignore[no-untyped-def]
+def dot(x, y):
     """`x . y`."""
     return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
 
 
 @lane_function
-def column(s, row, j, k):  # type: ignore[no-untyped-def]
+def column(s, row, j, k):
     """Column `j` of the rotation that begins at `row`: one of its axes, in the world frame."""
     at = (row + j) * LANES + k
     return s[at], s[at + 3 * LANES], s[at + 6 * LANES]
 
 
 @lane_function
-def rotate(s, row, x, k):  # type: ignore[no-untyped-def]
+def rotate(s, row, x, k):
     """`R x` for the rotation that begins at `row`."""
     return dot(load(s, row, k), x), dot(load(s, row + 3, k), x), dot(load(s, row + 6, k), x)
 
 
 @lane_function
-def rotate_back(s, row, x, k):  # type: ignore[no-untyped-def]
+def rotate_back(s, row, x, k):
     """`R^T x` for the rotation that begins at `row`."""
     return dot(column(s, row, 0, k), x), dot(column(s, row, 1, k), x), dot(column(s, row, 2, k), x)
 
 
 @lane_function
-def copy_rows(m, s, source, target, count):  # type: ignore[no-untyped-def]
+def copy_rows(m, s, source, target, count):
     """Copy `count` rows."""
     for r in range(count):
         for k in range(m):
@@ -127,7 +127,7 @@ _2_PI = 2.0 / math.pi
 
 
 @lane_function
-def sine_cosine(m, s, angle, sine, cosine):  # type: ignore[no-untyped-def]
+def sine_cosine(m, s, angle, sine, cosine):
     """Rows `sine` and `cosine` from row `angle`, to the last digit, without a branch in the loop."""
     largest = 0.0
     for k in range(m):

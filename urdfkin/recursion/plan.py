@@ -141,6 +141,7 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
     ancestors = [{step_of_joint[i] for i in path if i in step_of_joint} for path in paths]
     uses, idle = _uses(columns, ancestors, tree.nv)
     order = sorted(range(len(links)), key=lambda place: anchors[links[place]][0])
+    ends = [(*anchors[links[place]], place) for place in order]
     return Plan(
         nq=tree.nq,
         nv=tree.nv,
@@ -148,7 +149,9 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
         steps=steps,
         geometry=geometry,
         slots=slots,
-        frames=np.array([[anchors[links[place]][0], place] for place in order], dtype=np.int64).reshape(-1, 2),
+        frames=np.array([[anchors[links[place]][0], place] for place in order], dtype=np.int64).reshape(
+            -1, 2
+        ),
         offsets=np.array([_flat(anchors[links[place]][1]) for place in order]).reshape(-1, 12),
         columns=columns,
         multipliers=multipliers,

@@ -55,7 +55,7 @@ _TURN, _SLIDE, _PLANAR = int(Motion.TURN), int(Motion.SLIDE), int(Motion.PLANAR)
 
 
 @lane_function
-def turn_by_constant(m, s, at, g, i):  # type: ignore[no-untyped-def]
+def turn_by_constant(m, s, at, g, i):
     """R <- R G with the constant rotation G in row `i` of `g`."""
     x = (g[i, 0], g[i, 3], g[i, 6])
     y = (g[i, 1], g[i, 4], g[i, 7])
@@ -67,7 +67,7 @@ def turn_by_constant(m, s, at, g, i):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def turn_about_z(m, s):  # type: ignore[no-untyped-def]
+def turn_about_z(m, s):
     """R <- R Rz(angle), eq. 7.5: the third column, the axis, stays."""
     for row in range(3):
         for k in range(m):
@@ -79,7 +79,7 @@ def turn_about_z(m, s):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def turn_by_quaternion(m, s, q, b, at):  # type: ignore[no-untyped-def]
+def turn_by_quaternion(m, s, q, b, at):
     """R <- R R(quat) for the unit quaternion (x, y, z, w) in columns `at` to `at + 3` of `q`."""
     for k in range(m):
         x, y, z, w = q[b + k, at], q[b + k, at + 1], q[b + k, at + 2], q[b + k, at + 3]
@@ -93,22 +93,22 @@ def turn_by_quaternion(m, s, q, b, at):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def interorigin(m, s, at, g, i):  # type: ignore[no-untyped-def]
-    """d = R p for the constant offset in row `i` of `g`, seen in the axes of R."""
+def interorigin(m, s, at, g, i):
+    """D = R p for the constant offset in row `i` of `g`, seen in the axes of R."""
     p = (g[i, _OFFSET], g[i, _OFFSET + 1], g[i, _OFFSET + 2])
     for k in range(m):
         store(s, D, k, rotate(s, at + R, p, k))
 
 
 @lane_function
-def add_slide(m, s):  # type: ignore[no-untyped-def]
-    """d += R t for the slide t of the joint, in its own axes."""
+def add_slide(m, s):
+    """D += R t for the slide t of the joint, in its own axes."""
     for k in range(m):
         store(s, D, k, plus(load(s, D, k), rotate(s, R, load(s, SLIDE, k), k)))
 
 
 @lane_function
-def carry(m, s, at, order):  # type: ignore[no-untyped-def]
+def carry(m, s, at, order):
     """From one point of a rigid link to another, d away: 7.128 and 7.130, and P += d (7.77)."""
     for k in range(m):
         store(s, at + P, k, plus(load(s, at + P, k), load(s, D, k)))
@@ -125,7 +125,7 @@ def carry(m, s, at, order):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def move_revolute(m, s, order):  # type: ignore[no-untyped-def]
+def move_revolute(m, s, order):
     """The joint turns about z at rate v: 7.129, then 7.127, then the turn itself."""
     if order >= 2:
         for k in range(m):
@@ -140,7 +140,7 @@ def move_revolute(m, s, order):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def move_prismatic(m, s, order):  # type: ignore[no-untyped-def]
+def move_prismatic(m, s, order):
     """The joint slides along z at rate v: 7.130, then 7.128."""
     if order >= 2:
         for k in range(m):
@@ -155,7 +155,7 @@ def move_prismatic(m, s, order):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def move_free(m, s, order):  # type: ignore[no-untyped-def]
+def move_free(m, s, order):
     """A planar or floating joint: rates u (sliding) and o (turning) along the axes of the moved frame.
 
     The same derivation as 7.129 and 7.130 (differentiate R u and R o with R-dot = S(w_i) R):
@@ -179,7 +179,7 @@ def move_free(m, s, order):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def gather_joint(m, s, b, i, steps, g, q, v, a, order):  # type: ignore[no-untyped-def]
+def gather_joint(m, s, b, i, steps, g, q, v, a, order):
     """Coordinate and rates of a joint with one coordinate; a follower's come from its leader's."""
     at, rate_at = steps[i, 3], steps[i, 4]
     multiplier, constant = g[i, _MULTIPLIER], g[i, _CONSTANT]
@@ -194,7 +194,7 @@ def gather_joint(m, s, b, i, steps, g, q, v, a, order):  # type: ignore[no-untyp
 
 
 @lane_function
-def gather_free(m, s, b, at, planar, x, slide, turn):  # type: ignore[no-untyped-def]
+def gather_free(m, s, b, at, planar, x, slide, turn):
     """Rates of a planar (x, y, about z) or floating (three and three) joint into two vectors."""
     for k in range(m):
         if planar:
@@ -206,7 +206,7 @@ def gather_free(m, s, b, at, planar, x, slide, turn):  # type: ignore[no-untyped
 
 
 @lane_function
-def step_free(m, s, b, i, steps, q, v, a, order):  # type: ignore[no-untyped-def]
+def step_free(m, s, b, i, steps, q, v, a, order):
     """A planar or floating joint, after R <- R G and d = R p."""
     at, rate_at, planar = steps[i, 3], steps[i, 4], steps[i, 0] == _PLANAR
     for k in range(m):
@@ -229,7 +229,7 @@ def step_free(m, s, b, i, steps, q, v, a, order):  # type: ignore[no-untyped-def
 
 
 @lane_function
-def step(m, s, b, i, steps, g, q, v, a, order):  # type: ignore[no-untyped-def]
+def step(m, s, b, i, steps, g, q, v, a, order):
     """The state of link i-1 becomes the state of link i."""
     turn_by_constant(m, s, 0, g, i)
     interorigin(m, s, 0, g, i)
