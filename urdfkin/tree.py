@@ -13,11 +13,22 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.rotation.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
+__all__ = [
+    "FloatArray",
+    "Joint",
+    "JointKind",
+    "KinematicTree",
+    "Limit",
+    "Mimic",
+    "build_tree",
+    "frozen",
+    "with_root_joint",
+]
 
 
 def frozen(array: ArrayLike) -> FloatArray:

@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 from urdfkin.errors import InputError
+from urdfkin.rotation.quaternion import quaternion_of, rotation_of
 from urdfkin.tree import FloatArray, frozen
-
-#: How far R^T R may be from the identity: what seven printed digits leave.
-_ORTHONORMAL_TO = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,13 +40,12 @@ class BaseMotion:
                     found=f"shape {array.shape}" if array.shape[-len(shape) :] != shape else "nan or inf",
                 )
             object.__setattr__(self, name, array)
-        R = self.placement[..., :3, :3]
-        defect = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0)
-        bottom = np.abs(self.placement[..., 3, :] - [0.0, 0.0, 0.0, 1.0]).max(initial=0.0)
-        if max(defect, bottom) > _ORTHONORMAL_TO or (np.linalg.det(R) < 0.0).any():
-            raise InputError(
-                "the base's placement is no rigid motion", found=f"a defect of {max(defect, bottom):.3g}"
-            )
+        if (self.placement[..., 3, :] != [0.0, 0.0, 0.0, 1.0]).any():
+            raise InputError("the last row of the base's placement is 0 0 0 1")
+        # Through the quaternion and back: a rotation given to nine digits becomes one to the last digit.
+        placement = np.array(self.placement)
+        placement[..., :3, :3] = rotation_of(quaternion_of(placement[..., :3, :3]))
+        object.__setattr__(self, "placement", frozen(placement))
 
     def __reduce__(self) -> tuple[type[BaseMotion], tuple[Any, ...]]:
         return type(self), (self.placement, self.velocity, self.acceleration)

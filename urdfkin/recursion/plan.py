@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from enum import IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,7 +96,10 @@ class Plan:
         uses: (frames, columns): 0 where the column is not the frame's ancestor, 1 where it is written
             first to its place in the Jacobian, 2 where it is added to what is there.
         idle: (frames, nv): 1 where a frame's Jacobian has a zero column.
-        depth: For each frame, in output order, how many URDF joints lie between it and the root.
+        parents: (steps,) the step that each step goes on from, -1 for the base.
+        lengths: (steps + frames,) metres: the sum of the lengths of all URDF offsets, fixed joints' too,
+            from a step's parent to it, then from a frame's step to the frame (in the order of `frames`).
+        depth: (frames,) in output order, how many URDF joints lie between a frame and the root.
     """
 
     nq: int
@@ -111,7 +114,9 @@ class Plan:
     multipliers: FloatArray
     uses: IntArray
     idle: IntArray
-    depth: tuple[int, ...]
+    parents: IntArray
+    lengths: FloatArray
+    depth: IntArray
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -135,13 +140,13 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
     step_of_joint = {joint: step for step, joint in enumerate(needed)}
     anchors = _anchors(tree, step_of_joint, {i for path in paths for i in path})
     steps, geometry = _steps(tree, needed, anchors)
-    parents = [anchors[tree.joints[i].parent][0] for i in needed]
+    parents = [anchors[tree.joints[i].parent].step for i in needed]
     slots = _slots(steps, parents)
     columns, multipliers = _columns(steps, geometry)
     ancestors = [{step_of_joint[i] for i in path if i in step_of_joint} for path in paths]
     uses, idle = _uses(columns, ancestors, tree.nv)
-    order = sorted(range(len(links)), key=lambda place: anchors[links[place]][0])
-    ends = [(*anchors[links[place]], place) for place in order]
+    order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)
+    ends = [anchors[links[place]] for place in order]
     return Plan(
         nq=tree.nq,
         nv=tree.nv,
@@ -149,31 +154,47 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
         steps=steps,
         geometry=geometry,
         slots=slots,
-        frames=np.array([[anchors[links[place]][0], place] for place in order], dtype=np.int64).reshape(
-            -1, 2
-        ),
-        offsets=np.array([_flat(anchors[links[place]][1]) for place in order]).reshape(-1, 12),
+        frames=np.array(
+            [[end.step, place] for end, place in zip(ends, order, strict=True)], dtype=np.int64
+        ).reshape(-1, 2),
+        offsets=np.array([_flat(end.T) for end in ends]).reshape(-1, 12),
         columns=columns,
         multipliers=multipliers,
         uses=uses[order],
         idle=idle[order],
-        depth=tuple(len(path) for path in paths),
+        parents=np.array(parents, dtype=np.int64),
+        lengths=np.array(
+            [anchors[tree.joints[i].parent].length + _length(tree.joints[i]) for i in needed]
+            + [end.length for end in ends]
+        ),
+        depth=np.array([len(path) for path in paths], dtype=np.int64),
     )
 
 
-def _anchors(
-    tree: KinematicTree, step_of_joint: dict[int, int], wanted: set[int]
-) -> dict[int, tuple[int, FloatArray]]:
-    """For each link: the step that carries it (-1: the base) and its pose in that step's turned frame."""
-    anchors = {0: (-1, np.eye(4))}
+class _Anchor(NamedTuple):
+    """Where a link hangs: its step (-1: the base), its pose in that step's turned frame, and how far off."""
+
+    step: int
+    T: FloatArray
+    length: float
+
+
+def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: set[int]) -> dict[int, _Anchor]:
+    anchors = {0: _Anchor(-1, np.eye(4), 0.0)}
     for i in sorted(wanted):
         joint = tree.joints[i]
         if i in step_of_joint:
-            anchors[i + 1] = step_of_joint[i], turned(joint).T
+            anchors[i + 1] = _Anchor(step_of_joint[i], turned(joint).T, 0.0)
         else:
-            step, T_step_parent = anchors[joint.parent]
-            anchors[i + 1] = step, T_step_parent @ joint.T_parent_joint
+            parent = anchors[joint.parent]
+            anchors[i + 1] = _Anchor(
+                parent.step, parent.T @ joint.T_parent_joint, parent.length + _length(joint)
+            )
     return anchors
+
+
+def _length(joint: Joint) -> float:
+    return float(np.linalg.norm(joint.T_parent_joint[:3, 3]))
 
 
 def turned(joint: Joint) -> FloatArray:
@@ -190,13 +211,13 @@ def _flat(T: FloatArray) -> FloatArray:
 
 
 def _steps(
-    tree: KinematicTree, needed: Sequence[int], anchors: dict[int, tuple[int, FloatArray]]
+    tree: KinematicTree, needed: Sequence[int], anchors: dict[int, _Anchor]
 ) -> tuple[IntArray, FloatArray]:
     steps = np.full((len(needed), len(Step)), -1, dtype=np.int64)
     geometry = np.zeros((len(needed), Geometry.CONSTANT + 1))
     for row, i in enumerate(needed):
         joint = tree.joints[i]
-        T_step_joint = anchors[joint.parent][1] @ joint.T_parent_joint @ turned(joint)
+        T_step_joint = anchors[joint.parent].T @ joint.T_parent_joint @ turned(joint)
         steps[row, Step.KIND] = _MOTION[joint.kind]
         steps[row, Step.Q] = tree.q_index[i]
         steps[row, Step.V] = tree.v_index[i]

@@ -1,0 +1,284 @@
+"""Everything that asks Pinocchio: the only module that imports it.
+
+The oracle reads the URDF text itself, with its own parser, so that nothing of urdfkin's reading is shared.
+Its model is built without mimic joints (with them, Pinocchio 4.1 refuses four of the robots it ships with);
+followers are coupled here: q_full = G q + g_0, v_full = G v, J = J_full G.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from urdfkin.configuration import pinocchio_blocks
+from urdfkin.errors import UrdfkinError
+from urdfkin.recursion.base import BaseMotion
+from urdfkin.recursion.plan import IntArray
+from urdfkin.reference import Reference
+from urdfkin.tree import FloatArray, JointKind, KinematicTree
+
+
+class OracleError(UrdfkinError):
+    """Pinocchio refuses a robot, or reads another robot from the same text."""
+
+
+def version() -> str:
+    """The version of Pinocchio that checks, found without importing it."""
+    return importlib.metadata.version("pin")
+
+
+class Oracle:
+    """Pinocchio's answers for one robot, in urdfkin's layout of q, v and Jacobian columns.
+
+    Every method takes flat batches (n, nq), (n, nv) and a link of the tree by index.
+
+    Args:
+        text: The URDF, as Pinocchio is to read it.
+        tree: urdfkin's reading of the same text: names and layout only are taken from it.
+        moving_base: Build the model on a free-flyer, so that a base's motion can be given.
+
+    Raises:
+        OracleError: Pinocchio does not accept the text, or finds other joints in it.
+    """
+
+    def __init__(self, text: str, tree: KinematicTree, *, moving_base: bool = False) -> None:
+        import pinocchio as pin  # noqa: PLC0415  heavy: only when something is checked
+
+        self._pin = pin
+        self._tree = tree
+        self._moving_base = moving_base
+        self._model = self._build(text)
+        self._layout = _Layout(self._model, tree, 7 if moving_base else 0, 6 if moving_base else 0)
+        self._local = threading.local()
+        self._references = {
+            Reference.LOCAL: pin.LOCAL,
+            Reference.WORLD: pin.WORLD,
+            Reference.LOCAL_WORLD_ALIGNED: pin.LOCAL_WORLD_ALIGNED,
+        }
+
+    def _build(self, text: str) -> Any:
+        pin, roots = (
+            self._pin,
+            {JointKind.FLOATING: "JointModelFreeFlyer", JointKind.PLANAR: "JointModelPlanar"},
+        )
+        hung = (
+            bool(self._tree.joints)
+            and self._tree.joints[0].name == "root_joint"
+            and self._tree.links[0] == "universe"
+        )
+        try:
+            if hung or self._moving_base:
+                kind = self._tree.joints[0].kind if hung else JointKind.FLOATING
+                return pin.buildModelFromXML(text, getattr(pin, roots[kind])(), mimic=False)
+            return pin.buildModelFromXML(text, mimic=False)
+        except (ValueError, RuntimeError) as error:
+            raise OracleError(
+                "Pinocchio does not accept this robot", where=self._tree.name, found=str(error).strip()
+            ) from error
+
+    @property
+    def _data(self) -> Any:
+        """Pinocchio's workspace; each thread has its own."""
+        if not hasattr(self._local, "data"):
+            self._local.data = self._model.createData()
+        return self._local.data
+
+    def _frame(self, link: int) -> int:
+        return int(self._model.getFrameId(self._tree.links[link], self._pin.FrameType.BODY))
+
+    # -- quantities ----------------------------------------------------------------------------------
+
+    def placements(self, q: FloatArray, links: Sequence[int], base: BaseMotion | None = None) -> FloatArray:
+        """(n, links, 4, 4) T_world_frame: `updateFramePlacements`."""
+        pin, model, data = self._pin, self._model, self._data
+        frames = [self._frame(link) for link in links]
+        out = np.empty((len(q), len(frames), 4, 4))
+        for k, q_k in enumerate(self.configurations(q, base)):
+            pin.forwardKinematics(model, data, q_k)
+            for f, frame in enumerate(frames):
+                out[k, f] = pin.updateFramePlacement(model, data, frame).homogeneous
+        return out
+
+    def velocities(
+        self,
+        q: FloatArray,
+        v: FloatArray,
+        links: Sequence[int],
+        references: Sequence[Reference],
+        base: BaseMotion | None = None,
+    ) -> FloatArray:
+        """(n, links, references, 6): `getFrameVelocity`."""
+        pin, model, data = self._pin, self._model, self._data
+        frames = [self._frame(link) for link in links]
+        wanted = [self._references[reference] for reference in references]
+        out = np.empty((len(q), len(frames), len(wanted), 6))
+        v_full = self.rates(v, base)
+        for k, q_k in enumerate(self.configurations(q, base)):
+            pin.forwardKinematics(model, data, q_k, v_full[k])
+            for f, frame in enumerate(frames):
+                for r, reference in enumerate(wanted):
+                    out[k, f, r] = pin.getFrameVelocity(model, data, frame, reference).vector
+        return out
+
+    def accelerations(
+        self,
+        q: FloatArray,
+        v: FloatArray,
+        a: FloatArray,
+        links: Sequence[int],
+        references: Sequence[Reference],
+        base: BaseMotion | None = None,
+    ) -> FloatArray:
+        """(n, links, references, 6): `getFrameClassicalAcceleration`."""
+        pin, model, data = self._pin, self._model, self._data
+        frames = [self._frame(link) for link in links]
+        wanted = [self._references[reference] for reference in references]
+        out = np.empty((len(q), len(frames), len(wanted), 6))
+        v_full, a_full = self.rates(v, base), self.second_rates(a, base)
+        for k, q_k in enumerate(self.configurations(q, base)):
+            pin.forwardKinematics(model, data, q_k, v_full[k], a_full[k])
+            for f, frame in enumerate(frames):
+                for r, reference in enumerate(wanted):
+                    out[k, f, r] = pin.getFrameClassicalAcceleration(model, data, frame, reference).vector
+        return out
+
+    def jacobians(
+        self,
+        q: FloatArray,
+        links: Sequence[int],
+        references: Sequence[Reference],
+        base: BaseMotion | None = None,
+    ) -> FloatArray:
+        """(n, links, references, 6, nv): `computeJointJacobians`, then `getFrameJacobian`."""
+        pin, model, data = self._pin, self._model, self._data
+        frames = [self._frame(link) for link in links]
+        wanted = [self._references[reference] for reference in references]
+        full = np.empty((len(q), len(frames), len(wanted), 6, model.nv))
+        for k, q_k in enumerate(self.configurations(q, base)):
+            pin.computeJointJacobians(model, data, q_k)
+            for f, frame in enumerate(frames):
+                for r, reference in enumerate(wanted):
+                    full[k, f, r] = pin.getFrameJacobian(model, data, frame, reference)
+        return self._layout.couple(full)
+
+    def joint_jacobians(self, q: FloatArray, references: Sequence[Reference]) -> FloatArray:
+        """(n, joints, references, 6, nv): `getJointJacobian` of every moving joint, in the tree's order."""
+        pin, model, data = self._pin, self._model, self._data
+        wanted = [self._references[reference] for reference in references]
+        joints = self._layout.joint_ids
+        full = np.empty((len(q), len(joints), len(wanted), 6, model.nv))
+        for k, q_k in enumerate(self.configurations(q, None)):
+            pin.computeJointJacobians(model, data, q_k)
+            for j, joint in enumerate(joints):
+                for r, reference in enumerate(wanted):
+                    full[k, j, r] = pin.getJointJacobian(model, data, joint, reference)
+        return self._layout.couple(full)
+
+    def screws(self, q: FloatArray) -> FloatArray:
+        """(n, 6, rates): the whole `data.J` of `computeJointJacobians`, one column a rate, followers too."""
+        out = np.empty((len(q), 6, len(self._layout.rate_columns)))
+        for k, q_k in enumerate(self.configurations(q, None)):
+            J = self._pin.computeJointJacobians(self._model, self._data, q_k)
+            out[k] = J[:, self._layout.rate_columns]
+        return out
+
+    # -- layout --------------------------------------------------------------------------------------
+
+    def configurations(self, q: FloatArray, base: BaseMotion | None = None) -> FloatArray:
+        """Pinocchio's configurations for urdfkin's, with the base as a free-flyer where there is one."""
+        full = self._layout.configurations(q)
+        if self._moving_base:
+            motion = base or BaseMotion()
+            T = np.broadcast_to(motion.placement, (len(q), 4, 4))
+            full[:, :3] = T[:, :3, 3]
+            full[:, 3:7] = [self._pin.Quaternion(np.array(R)).coeffs() for R in T[:, :3, :3]]
+        return full
+
+    def rates(self, v: FloatArray, base: BaseMotion | None = None) -> FloatArray:
+        """Pinocchio's rates; a free-flyer's are those of the base in its own axes."""
+        full = self._layout.rates(v)
+        if self._moving_base and base is not None:
+            full[:, :6] = _in_own_axes(base, base.velocity, len(v))
+        return full
+
+    def second_rates(self, a: FloatArray, base: BaseMotion | None = None) -> FloatArray:
+        """Rates of the rates; a free-flyer's are spatial: acc - w x vel, in its own axes."""
+        full = self._layout.rates(a)
+        if self._moving_base and base is not None:
+            spatial = np.array(
+                np.broadcast_to(
+                    base.acceleration, np.broadcast_shapes(base.acceleration.shape, base.velocity.shape)
+                )
+            )
+            spatial[..., :3] -= np.cross(base.velocity[..., 3:], base.velocity[..., :3])
+            full[:, :6] = _in_own_axes(base, spatial, len(a))
+        return full
+
+
+def _in_own_axes(base: BaseMotion, six: FloatArray, n: int) -> FloatArray:
+    R = np.broadcast_to(base.placement[..., :3, :3], (n, 3, 3))
+    pairs = np.broadcast_to(six, (n, 6)).reshape(n, 2, 3)
+    turned: FloatArray = np.einsum("nji,npj->npi", R, pairs).reshape(n, 6)
+    return turned
+
+
+class _Layout:
+    """Where each joint's coordinates and rates stand in Pinocchio's model: by name, here and nowhere else."""
+
+    def __init__(self, model: Any, tree: KinematicTree, q_base: int, v_base: int) -> None:
+        self._tree, self._model, self._q_base, self._v_base = tree, model, q_base, v_base
+        moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
+        theirs = {name: j for j, name in enumerate(model.names) if j > (1 if q_base else 0)}
+        ours = {tree.joints[i].name for i in moving}
+        if set(theirs) != ours:
+            raise OracleError(
+                "Pinocchio finds other joints in this robot",
+                where=tree.name,
+                found=", ".join(sorted(set(theirs) ^ ours)[:5]),
+            )
+        self._moving = [(i, theirs[tree.joints[i].name]) for i in moving]
+        self.joint_ids = [joint for _, joint in self._moving]
+        #: Pinocchio's column of each rate, in the order of the tree's moving joints.
+        self.rate_columns = [
+            model.joints[j].idx_v + c for i, j in self._moving for c in range(tree.joints[i].kind.nv)
+        ]
+        self._rate_index, self._rate_factor = self._rate_rules()
+
+    def _rate_rules(self) -> tuple[IntArray, FloatArray]:
+        """For each of Pinocchio's rates: whose it is in urdfkin's `v`, and the factor (G)."""
+        index, factor = np.zeros(self._model.nv, dtype=np.int64), np.zeros(self._model.nv)
+        for i, j in self._moving:
+            joint = self._tree.joints[i]
+            at = self._model.joints[j].idx_v
+            for c in range(joint.kind.nv):
+                index[at + c] = self._tree.v_index[i] + c
+                factor[at + c] = joint.mimic.multiplier if joint.mimic else 1.0
+        return index, factor
+
+    def configurations(self, q: FloatArray) -> FloatArray:
+        full = np.zeros((len(q), self._model.nq))
+        q_at = {i: self._model.joints[j].idx_q for i, j in self._moving}
+        for i, block in pinocchio_blocks(self._tree, q, mimic=False):
+            full[:, q_at[i] : q_at[i] + block.shape[-1]] = block
+        return full
+
+    def rates(self, v: FloatArray) -> FloatArray:
+        if not self._tree.nv:
+            return np.zeros((len(v), self._model.nv))
+        full: FloatArray = v[:, self._rate_index] * self._rate_factor
+        return full
+
+    def couple(self, full: FloatArray) -> FloatArray:
+        """J_full G: columns of followers are added to their leaders'."""
+        own = full[..., self._v_base :] * self._rate_factor[self._v_base :]
+        index = self._rate_index[self._v_base :]
+        if len(index) == self._tree.nv and np.array_equal(index, np.arange(len(index))):
+            return np.ascontiguousarray(own)
+        coupled = np.zeros((*full.shape[:-1], self._tree.nv))
+        for column, at in enumerate(index):
+            coupled[..., at] += own[..., column]
+        return coupled

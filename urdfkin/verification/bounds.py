@@ -1,0 +1,145 @@
+"""How far two correct computations may differ: the one place where tolerances come from.
+
+A result is accepted when every number differs from Pinocchio's by at most
+
+    k * eps * scale,      eps = 2^-52,      k = ROUNDINGS * factors * joints.
+
+*scale* is the size of the terms that the number is summed from, in its own unit (`magnitudes`): two
+computations that add the same terms in another order differ in proportion to the terms, not to their sum.
+
+*k* counts roundings. First order in eps, in the Euclidean norm, one computation:
+
+1. A joint multiplies the rotation so far by its constant rotation and by its own turn. A rounded product
+   of 3 by 3 rotations is off by at most 3 u sqrt(3) < 2.6 eps for each column (u = eps/2; a dot product of
+   three terms rounds three times), the turn's two-term products by 2 u sqrt(2) < 1.5 eps, sine and cosine
+   by 1 eps, the constant itself, read from angles, by 2.5 eps. A rotated vector is off by at most the sum:
+   ROTATION = 7.6 eps, rounded up to 8, for each joint passed. It does not grow faster than linearly,
+   because rotations do not stretch what was wrong before.
+2. Adding the joint's term to the sum, and its cross product, cost 2 u + 2 u = 2 eps of the scale at most;
+   these are covered by rounding 7.6 up and by counting one joint more than there is.
+
+Two computations may err in opposite directions: ROUNDINGS = 16 for each joint and each *factor*. A
+quantity is multilinear in rotated vectors: a position has one in each term (R d), a velocity two (w and d),
+an acceleration three (w, w, d, or v z, w, d), a Jacobian's linear rows two (z and d); seeing it in the
+frame's own axes is one factor more, seeing it from the world's origin crosses it with p and is one more.
+
+The bound is a worst case; rounding seldom conspires. What is measured is a fraction of an eps for each
+joint, and reports give the disagreement itself, in multiples of eps * scale, so that it can be compared
+across robots.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from urdfkin.recursion.plan import Column, Plan
+from urdfkin.reference import Reference
+from urdfkin.tree import FloatArray
+from urdfkin.verification.magnitudes import Magnitudes
+
+EPS = float(np.finfo(np.float64).eps)
+#: Roundings for each joint and each factor, both computations together; derived above.
+ROUNDINGS = 16.0
+
+
+class Quantity(StrEnum):
+    """What can be checked."""
+
+    PLACEMENT = "placement"
+    VELOCITY = "velocity"
+    JACOBIAN = "jacobian"
+    ACCELERATION = "acceleration"
+    JOINT_JACOBIAN = "joint jacobian"
+    SCREWS = "screws"
+
+
+#: How many rotated vectors are multiplied in each term of [linear; angular], in LOCAL_WORLD_ALIGNED.
+_FACTORS = {
+    Quantity.PLACEMENT: 1,
+    Quantity.VELOCITY: 2,
+    Quantity.JACOBIAN: 2,
+    Quantity.ACCELERATION: 3,
+    Quantity.JOINT_JACOBIAN: 2,
+    Quantity.SCREWS: 2,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """What a quantity is measured against, each array shaped to broadcast against the results.
+
+    Attributes:
+        scale: The size of the terms, in the result's units; 0 where a result must agree exactly.
+        k: How many eps of it two correct computations may differ by.
+    """
+
+    scale: FloatArray
+    k: FloatArray
+
+
+def roundings(quantity: Quantity, reference: Reference, joints: FloatArray) -> FloatArray:
+    """`k` for paths with so many joints."""
+    extra = 0 if reference is Reference.LOCAL_WORLD_ALIGNED or quantity is Quantity.PLACEMENT else 1
+    return ROUNDINGS * (_FACTORS[quantity] + extra) * joints
+
+
+def placement_bound(size: Magnitudes) -> Bound:
+    """For (n, frames, 4, 4): the path's length for positions, 1 for rotations, 0 for the last row."""
+    scale = np.zeros((*size.p.shape, 4, 4))
+    scale[..., :3, :3] = 1.0
+    scale[..., :3, 3] = size.p[..., None]
+    k = roundings(Quantity.PLACEMENT, Reference.LOCAL_WORLD_ALIGNED, size.joints)
+    return Bound(scale, k[..., None, None])
+
+
+def velocity_bound(size: Magnitudes, reference: Reference) -> Bound:
+    """For (n, frames, 6)."""
+    linear = size.vel + size.w * size.p if reference is Reference.WORLD else size.vel
+    return Bound(_six(linear, size.w), roundings(Quantity.VELOCITY, reference, size.joints)[..., None])
+
+
+def acceleration_bound(size: Magnitudes, reference: Reference) -> Bound:
+    """For (n, frames, 6). Pinocchio goes through spatial accelerations, which differ by w x vel."""
+    linear = size.acc + size.w * size.vel
+    if reference is Reference.WORLD:
+        linear = linear + size.w * size.vel + (size.alpha + size.w**2) * size.p
+    return Bound(
+        _six(linear, size.alpha), roundings(Quantity.ACCELERATION, reference, size.joints)[..., None]
+    )
+
+
+def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
+    return np.repeat(np.stack((linear, angular), axis=-1), 3, axis=-1)
+
+
+def jacobian_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
+    """For (n, frames, 6, nv): the path's length for turning columns, 1 for sliding ones, 0 for idle ones."""
+    turning, sliding = column_weights(plan)
+    linear = turning * size.p[..., None] + sliding
+    scale = np.repeat(np.stack((linear, np.broadcast_to(turning, linear.shape)), axis=-2), 3, axis=-2)
+    return Bound(scale, roundings(Quantity.JACOBIAN, reference, size.joints)[..., None, None])
+
+
+def column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
+    """(frames, nv) each: the sum of the mimic multipliers that turn, or slide, along each column."""
+    weights = np.zeros((2, len(plan.frames), plan.nv))
+    for f, (_, place) in enumerate(plan.frames):
+        for c in np.flatnonzero(plan.uses[f]):
+            kind = 0 if plan.columns[c, Column.TURNS] else 1
+            weights[kind, place, plan.columns[c, Column.V]] += abs(plan.multipliers[c])
+    return weights[0], weights[1]
+
+
+def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
+    """|ours - theirs| in multiples of eps * scale; inf where the scale is 0 and they differ.
+
+    A result that is not a number disagrees by inf.
+    """
+    difference = np.abs(ours - theirs)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        units = difference / (EPS * bound.scale)
+    units = np.where(difference == 0.0, 0.0, units)
+    return np.where(np.isfinite(difference), units, np.inf)

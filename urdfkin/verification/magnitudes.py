@@ -1,0 +1,82 @@
+"""The recursion in absolute values: how large the terms are that a result is summed from.
+
+Replacing every vector of 7.127 to 7.130 by its length and every minus by a plus gives numbers that no
+intermediate value can exceed. Rounding errors are proportional to them, not to the result, which may be
+small because large terms cancel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from urdfkin.recursion.plan import Geometry, Motion, Plan, Step
+from urdfkin.tree import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Magnitudes:
+    """Upper bounds on the size of everything that enters a frame's motion.
+
+    Attributes:
+        p: (n, frames) m: the length of the path from the world's origin, slides included.
+        w: (n, frames) rad/s.
+        vel: (n, frames) m/s.
+        alpha: (n, frames) rad/s^2.
+        acc: (n, frames) m/s^2.
+        joints: (n, frames) how many joints' worth of rounding lies on the path: one for each URDF joint,
+            and for a follower its angle as well, which is itself rounded before its sine is taken.
+    """
+
+    p: FloatArray
+    w: FloatArray
+    vel: FloatArray
+    alpha: FloatArray
+    acc: FloatArray
+    joints: FloatArray
+
+
+def magnitudes(plan: Plan, q: FloatArray, v: FloatArray, a: FloatArray, base: FloatArray) -> Magnitudes:
+    """For flat batches q (n, nq), v and a (n, nv) and a base state (1 or n, 24)."""
+    n = len(q)
+    start = [np.broadcast_to(_norm(base[:, at : at + 3]), (n,)) for at in (9, 12, 15, 18, 21)]
+    states = [[*start, np.zeros(n)]]
+    for i in range(len(plan.steps)):
+        states.append(_step(plan, i, states[plan.parents[i] + 1], q, v, a))
+    out = np.empty((6, n, len(plan.frames)))
+    for f, (step, place) in enumerate(plan.frames):
+        out[:, :, place] = _carry(states[step + 1], plan.lengths[len(plan.steps) + f])
+    out[5] += plan.depth + 1
+    return Magnitudes(*out)
+
+
+def _norm(x: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt((x * x).sum(axis=-1)))
+
+
+def _carry(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
+    p, w, vel, alpha, acc, angles = state
+    return [p + d, w, vel + w * d, alpha, acc + (alpha + w * w) * d, angles]
+
+
+def _step(
+    plan: Plan, i: int, state: list[FloatArray], q: FloatArray, v: FloatArray, a: FloatArray
+) -> list[FloatArray]:
+    kind, at, rate_at = (int(plan.steps[i, c]) for c in (Step.KIND, Step.Q, Step.V))
+    multiplier, constant = plan.geometry[i, Geometry.MULTIPLIER :]
+    if kind in (Motion.TURN, Motion.SLIDE):
+        own = np.abs(multiplier * q[:, at]) + abs(constant)
+        rate, rate_2 = np.abs(multiplier * v[:, rate_at]), np.abs(multiplier * a[:, rate_at])
+        if kind == Motion.TURN:
+            p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i])
+            follows = (multiplier, constant) != (1.0, 0.0)
+            return [p, w + rate, vel, alpha + rate_2 + rate * w, acc, angles + own if follows else angles]
+        p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i] + own)
+        return [p, w, vel + rate, alpha, acc + rate_2 + 2.0 * rate * w, angles]
+    slides, turns = (2, 1) if kind == Motion.PLANAR else (3, 3)
+    p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i] + _norm(q[:, at : at + slides]))
+    u, o = _norm(v[:, rate_at : rate_at + slides]), _norm(v[:, rate_at + slides : rate_at + slides + turns])
+    u_rate = _norm(a[:, rate_at : rate_at + slides])
+    o_rate = _norm(a[:, rate_at + slides : rate_at + slides + turns])
+    return [p, w + o, vel + u, alpha + o_rate + w * o, acc + u_rate + (2.0 * w + o) * u, angles]
