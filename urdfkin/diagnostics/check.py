@@ -1,0 +1,50 @@
+"""The checks in their order: bytes, XML, dialect, numbers, names, structure, joints, and what looks odd."""
+
+from __future__ import annotations
+
+from urdfkin.diagnostics.codes import text as codes
+from urdfkin.diagnostics.document import DEFAULT_LIMITS, Limits, parse
+from urdfkin.diagnostics.encoding import utf8_bytes
+from urdfkin.diagnostics.finding import Finding
+from urdfkin.diagnostics.reporter import Reporter
+
+
+def check_text(
+    data: bytes,
+    *,
+    file: str = "<text>",
+    limits: Limits = DEFAULT_LIMITS,
+    mimic: bool = True,
+    root_joint: str | None = None,
+    fold: bool = True,
+) -> tuple[Finding, ...]:
+    """Everything there is to say about a URDF, by line.
+
+    A pure function of the bytes: it opens no file and no connection, and asks neither yourdfpy nor Pinocchio.
+
+    Args:
+        data: The file's bytes.
+        file: What to call it in the findings.
+        limits: How large the file may be.
+        mimic: Whether mimic joints are to follow their leaders; without, what is wrong with them is a note.
+        root_joint: `"floating"` or `"planar"` when the robot will hang from such a joint: then the names that
+            joint takes are errors.
+        fold: Whether many warnings of one kind are folded into one that lists the lines.
+
+    Returns:
+        Findings, sorted by line; empty for a file nothing can be said against.
+    """
+    report = Reporter(file, data)
+    if len(data) > limits.bytes:
+        report.add(
+            codes.TOO_LARGE,
+            "the file is too large",
+            found=f"{len(data)} bytes, more than {limits.bytes}",
+            remedy="raise the limit with --max-bytes if the file is right",
+        )
+        return report.findings(fold=fold)
+    text = utf8_bytes(report, data)
+    if text is not None:
+        report.data = text
+        parse(report, text, limits)
+    return report.findings(fold=fold)

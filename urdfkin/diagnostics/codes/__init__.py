@@ -1,0 +1,23 @@
+"""Every code urdfkin can report, by its id; one module a family.
+
+The first digit tells the family: 1 text and XML, 2 dialect and elements, 3 numbers, 4 names and structure,
+5 joints, 6 suspicious, 7 inertials, geometry and materials.
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+from urdfkin.diagnostics.codes import text
+from urdfkin.diagnostics.codes.base import Code
+
+_FAMILIES: tuple[ModuleType, ...] = (text,)
+
+#: Id -> code, in the order of the ids.
+REGISTRY: dict[str, Code] = {
+    code.id: code
+    for code in sorted(
+        (value for family in _FAMILIES for value in vars(family).values() if isinstance(value, Code)),
+        key=lambda code: code.id,
+    )
+}

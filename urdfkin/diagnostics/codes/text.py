@@ -1,0 +1,161 @@
+"""URDF1xx: the file as bytes and as XML, before anyone asks what it means."""
+
+from urdfkin.diagnostics.codes.base import ERROR, NOTE, REFUSES, WARNING, Code
+
+_ROBOT = '<robot name="example">\n  <link name="base"/>\n</robot>\n'
+
+EMPTY = Code(
+    "URDF101",
+    "empty-file",
+    ERROR,
+    "the file is empty or holds only blanks",
+    why="There is nothing to read. Usually a failed export, or a pipe whose first command printed nothing.",
+    bad="   \n",
+    good=_ROBOT,
+    others="Pinocchio refuses it; yourdfpy raises an error of its XML parser.",
+)
+
+ENCODING = Code(
+    "URDF102",
+    "not-utf8",
+    ERROR,
+    "the bytes are not UTF-8 text",
+    why="A URDF is UTF-8. urdfdom ignores what the XML declaration says about the encoding and takes the"
+    " bytes as they are, so a name in another encoding is a different name in each reader. A zero byte ends"
+    " the file for some readers and not for others: they would see two different robots.",
+    bad='<robot name="example">\n  <link name="base"/>\n</robot>\n\x00<joint name="hidden"/>\n',
+    good=_ROBOT,
+    others="Pinocchio stops at a zero byte and reads what stands before it; yourdfpy refuses or repairs.",
+)
+
+DECLARED = Code(
+    "URDF103",
+    "declared-encoding",
+    ERROR,
+    "the XML declaration names an encoding that is not UTF-8",
+    why="XML readers obey the declaration, urdfdom does not. With any character outside ASCII the two read"
+    " different names.",
+    bad='<?xml version="1.0" encoding="UTF-16"?>\n' + _ROBOT,
+    good='<?xml version="1.0" encoding="UTF-8"?>\n' + _ROBOT,
+    others="Pinocchio ignores the declaration; yourdfpy obeys it.",
+)
+
+DECLARED_ASCII = Code(
+    "URDF104",
+    "declared-encoding-unused",
+    WARNING,
+    "the XML declaration names another encoding, but the text is plain ASCII",
+    why="Harmless as long as every character is ASCII. The first umlaut in a name will be read differently by"
+    " urdfdom, which ignores the declaration, and by everyone else.",
+    bad='<?xml version="1.0" encoding="ISO-8859-1"?>\n' + _ROBOT,
+    good='<?xml version="1.0" encoding="UTF-8"?>\n' + _ROBOT,
+    others="Pinocchio and yourdfpy read it.",
+)
+
+SYNTAX = Code(
+    "URDF105",
+    "xml-syntax",
+    ERROR,
+    "the file is not well-formed XML",
+    why="Readers that go on after a syntax error guess, and two readers guess differently: a file cut in the"
+    " middle may look like a smaller robot. urdfkin never repairs.",
+    bad='<robot name="example">\n  <link name="base">\n</robot>\n',
+    good=_ROBOT,
+    others="Pinocchio refuses it; yourdfpy falls back to a parser that recovers and returns what it got.",
+)
+
+ENTITY = Code(
+    "URDF106",
+    "entity",
+    ERROR,
+    "the file declares or uses entities, or refers to an external definition",
+    why="Entities can read files, open network connections and grow to gigabytes while they are expanded."
+    " A URDF needs none. urdfkin never expands an entity and never opens what a file refers to. urdfdom keeps"
+    " the reference as literal text, so even a harmless entity gives two readers two names.",
+    bad='<!DOCTYPE robot [<!ENTITY n "tool">]>\n<robot name="example">\n  <link name="&n;"/>\n</robot>\n',
+    good='<robot name="example">\n  <link name="tool"/>\n</robot>\n',
+    others="Pinocchio keeps '&n;' as text; yourdfpy expands entities, those that read local files included.",
+)
+
+DOCTYPE = Code(
+    "URDF107",
+    "doctype",
+    WARNING,
+    "a document type declaration without content",
+    why="It has no meaning in a URDF and is ignored. With content it would be an error (URDF106).",
+    bad="<!DOCTYPE robot>\n" + _ROBOT,
+    good=_ROBOT,
+    others="Pinocchio and yourdfpy ignore it.",
+)
+
+TOO_LARGE = Code(
+    "URDF108",
+    "too-large",
+    ERROR,
+    "the file is larger, deeper or has more elements than the limits allow",
+    why="The limits keep a hostile or broken file from taking all memory. No real robot comes near them;"
+    " each can be raised: --max-bytes, --max-depth, --max-elements, or `Limits` in the library.",
+    bad='<robot name="example">\n  <link name="base"/>\n' + "<a>" * 500 + "</a>" * 500 + "\n</robot>\n",
+    good=_ROBOT,
+    others="urdfdom's parser refuses elements nested deeper than 500, libxml2 deeper than 256.",
+)
+
+DEEP_NESTING = Code(
+    "URDF109",
+    "deep-nesting",
+    WARNING,
+    "elements are nested deeper than common readers accept",
+    why="The robot can be computed, but programs built on libxml2 (all that use lxml, yourdfpy among them)"
+    " refuse to read such a file.",
+    bad='<robot name="example">\n  <link name="base"/>\n' + "<a>" * 300 + "</a>" * 300 + "\n</robot>\n",
+    good=_ROBOT,
+    others="Pinocchio reads up to 500 levels; yourdfpy up to 256.",
+)
+
+TOO_DEEP_FOR_ORACLE = Code(
+    "URDF110",
+    "too-deep-for-pinocchio",
+    WARNING,
+    "elements are nested deeper than urdfdom reads",
+    why="Only seen when --max-depth is raised. The robot can be computed, but Pinocchio cannot read the file,"
+    " so nothing can be verified.",
+    bad='<robot name="example">\n  <link name="base"/>\n' + "<a>" * 600 + "</a>" * 600 + "\n</robot>\n",
+    good=_ROBOT,
+    others="Pinocchio and yourdfpy refuse it.",
+    oracle=REFUSES,
+)
+
+XML_VERSION = Code(
+    "URDF111",
+    "xml-version",
+    WARNING,
+    "the XML declaration names a version other than 1.0",
+    why="A URDF is XML 1.0. urdfdom does not look; strict XML readers may refuse.",
+    bad='<?xml version="1.1"?>\n' + _ROBOT,
+    good='<?xml version="1.0"?>\n' + _ROBOT,
+    others="Pinocchio and yourdfpy read it.",
+)
+
+INCLUDE = Code(
+    "URDF112",
+    "include",
+    ERROR,
+    "the file includes another file",
+    why="urdfkin reads the bytes it is given and opens nothing else. A part that is not included would be"
+    " missing from the robot in silence.",
+    bad='<robot name="example" xmlns:xi="http://www.w3.org/2001/XInclude">\n  <link name="base"/>\n'
+    '  <xi:include href="arm.urdf"/>\n</robot>\n',
+    good=_ROBOT,
+    others="Pinocchio and yourdfpy skip the element: the part is missing without a word.",
+)
+
+BYTE_ORDER_MARK = Code(
+    "URDF113",
+    "byte-order-mark",
+    NOTE,
+    "a byte order mark stands before the text",
+    why="Allowed by XML and skipped. Some scripts that look for '<' at the very beginning stumble over it.",
+    bad="\ufeff" + _ROBOT,
+    good=_ROBOT,
+    others="Pinocchio and yourdfpy skip it.",
+)

@@ -1,0 +1,263 @@
+"""XML to a light tree of elements with their places, without ever expanding or opening anything.
+
+The parser is expat: it keeps names as the file writes them (`xacro:macro`), gives the exact place of every
+start tag, needs no stack for deep nesting and cannot open anything by itself. A document type definition
+with content stops it before the first entity could be expanded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+from urdfkin.diagnostics.codes import text as codes
+from urdfkin.diagnostics.reporter import Reporter, quoted
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How large a file may be before it is refused unread.
+
+    Attributes:
+        bytes: Size of the file.
+        depth: How deep elements may be nested. urdfdom's parser refuses more than 500.
+        elements: How many elements there may be.
+    """
+
+    bytes: int = 100_000_000
+    depth: int = 500
+    elements: int = 2_000_000
+
+
+DEFAULT_LIMITS = Limits()
+
+#: libxml2, and with it everything built on lxml, refuses deeper nesting unless told otherwise.
+COMMON_DEPTH = 256
+
+
+@dataclass(slots=True, eq=False)
+class Element:
+    """One element: tag and attributes as written, children in order, text without blanks, and its place."""
+
+    tag: str
+    attributes: dict[str, str]
+    parent: Element | None
+    line: int
+    column: int
+    offset: int
+    children: list[Element] = field(default_factory=list)
+    text: str = ""
+
+    def all(self, tag: str) -> list[Element]:
+        """Children of one tag."""
+        return [child for child in self.children if child.tag == tag]
+
+    def first(self, tag: str) -> Element | None:
+        """The first child of a tag, which is the one every reader takes."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    def walk(self) -> Iterator[Element]:
+        """This element and everything below it, in the order of the file, without recursion."""
+        stack = [self]
+        while stack:
+            element = stack.pop()
+            yield element
+            stack += reversed(element.children)
+
+    @property
+    def holder(self) -> Element:
+        """The link, joint or other child of `<robot>` this element belongs to; itself at the top."""
+        element = self
+        while element.parent is not None and element.parent.parent is not None:
+            element = element.parent
+        return element
+
+    @property
+    def owner(self) -> str:
+        """The tag a person would name: `joint` for everything inside a joint."""
+        return self.holder.tag
+
+    @property
+    def label(self) -> str | None:
+        """The name of the link or joint this element belongs to."""
+        return self.holder.attributes.get("name") if self.parent is not None else None
+
+
+class _Stop(Exception):  # noqa: N818 - not an error: the parser has been told enough
+    """Ends the parse after a finding that makes the rest meaningless."""
+
+
+def parse(report: Reporter, data: bytes, limits: Limits = DEFAULT_LIMITS) -> Element | None:
+    """The root element, or None after a finding that says why there is none.
+
+    Args:
+        report: Where findings go.
+        data: UTF-8 bytes, already checked by `urdfkin.diagnostics.encoding`, without a byte order mark.
+        limits: Depth and count of elements.
+    """
+    builder = _Builder(report, limits)
+    parser = builder.parser
+    try:
+        parser.Parse(data, True)
+    except _Stop:
+        return None
+    except expat.ExpatError as error:
+        builder.syntax_error(error)
+        return None
+    if builder.deepest > COMMON_DEPTH:
+        report.add(
+            codes.DEEP_NESTING,
+            f"elements are nested {builder.deepest} deep",
+            builder.deepest_element,
+            remedy=f"readers built on libxml2 refuse more than {COMMON_DEPTH}",
+        )
+    return builder.root
+
+
+class _Builder:
+    """Handlers that grow the tree and watch the limits."""
+
+    def __init__(self, report: Reporter, limits: Limits) -> None:
+        self.report, self.limits = report, limits
+        self.root: Element | None = None
+        self.open: list[Element] = []
+        self.count = self.deepest = 0
+        self.deepest_element: Element | None = None
+        self.parser = parser = expat.ParserCreate("utf-8")
+        parser.buffer_text = True
+        parser.StartElementHandler = self.start
+        parser.EndElementHandler = self.end
+        parser.CharacterDataHandler = self.characters
+        parser.StartDoctypeDeclHandler = self.doctype
+        parser.SkippedEntityHandler = self.skipped
+
+    def here(self) -> tuple[int, int]:
+        """Line and column of what expat is reading."""
+        return self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        line, column = self.here()
+        parent = self.open[-1] if self.open else None
+        element = Element(tag, attributes, parent, line, column, self.parser.CurrentByteIndex)
+        if parent is None:
+            self.root = element
+        else:
+            parent.children.append(element)
+        self.open.append(element)
+        self.count += 1
+        if len(self.open) > self.deepest:
+            self.deepest, self.deepest_element = len(self.open), element
+        if self.deepest > self.limits.depth:
+            self.refuse("nested too deep", f"more than {self.limits.depth} levels", "max-depth")
+        if self.count > self.limits.elements:
+            self.refuse("too many elements", f"more than {self.limits.elements}", "max-elements")
+
+    def refuse(self, what: str, found: str, option: str) -> None:
+        self.report.add(
+            codes.TOO_LARGE,
+            f"the file is {what}" if what.startswith("nested") else f"the file has {what}",
+            found=found,
+            remedy=f"raise the limit with --{option} if the file is right",
+            position=self.here(),
+        )
+        raise _Stop
+
+    def end(self, tag: str) -> None:
+        element = self.open.pop()
+        element.text = element.text.strip()
+
+    def characters(self, text: str) -> None:
+        if not text.isspace():
+            self.open[-1].text += text
+
+    def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
+        """Judge a document type declaration before anything in it can act."""
+        start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
+        position = line_and_column(self.report.data, start)
+        if system is None and public is None and not has_subset:
+            self.report.add(
+                codes.DOCTYPE,
+                "a document type declaration has no use in a URDF",
+                found=quoted(f"<!DOCTYPE {name}>"),
+                remedy="remove it; it is ignored",
+                position=position,
+            )
+            return
+        what = "has content of its own" if has_subset else "refers to an external definition"
+        found = quoted(f"<!DOCTYPE {name} [...") if system is None else quoted(system)
+        self.report.add(
+            codes.ENTITY,
+            f"the document type declaration {what}",
+            found=found,
+            remedy="remove it and write values out; nothing was expanded or opened",
+            position=position,
+        )
+        raise _Stop
+
+    def skipped(self, name: str, is_parameter: int) -> None:
+        self.undefined_entity(name)
+        raise _Stop
+
+    def undefined_entity(self, name: str | None) -> None:
+        self.report.add(
+            codes.ENTITY,
+            "an entity is used that XML does not define",
+            found=quoted(f"&{name};") if name else None,
+            remedy="write the character itself, or one of &lt; &gt; &amp; &quot; &apos;",
+            position=self.here(),
+        )
+
+    def syntax_error(self, error: expat.ExpatError) -> None:
+        """Say what expat found in the words of the file."""
+        reason = expat.errors.messages[error.code]
+        if reason == expat.errors.XML_ERROR_UNDEFINED_ENTITY:
+            self.undefined_entity(None)
+            return
+        innermost = self.open[-1] if self.open else None
+        message, remedy = _REASONS.get(reason, (reason, None))
+        if innermost is not None:
+            opened = f"<{innermost.tag}>, opened on line {innermost.line},"
+            if reason == expat.errors.XML_ERROR_TAG_MISMATCH:
+                remedy = f"close {opened} first"
+            elif reason in (expat.errors.XML_ERROR_NO_ELEMENTS, expat.errors.XML_ERROR_UNCLOSED_TOKEN):
+                message, remedy = "the file ends too early", f"{opened} is never closed"
+        ended = reason == expat.errors.XML_ERROR_NO_ELEMENTS
+        self.report.add(
+            codes.SYNTAX,
+            f"not well-formed XML: {message}",
+            found=None if ended else self._around(error),
+            remedy=remedy,
+            position=(error.lineno, error.offset + 1),
+        )
+
+    def _around(self, error: expat.ExpatError) -> str | None:
+        """The text at the place of an error."""
+        line = self.report.data.splitlines()[error.lineno - 1 : error.lineno]
+        text = line[0].decode("utf-8", "replace")[error.offset :][:30] if line else ""
+        return quoted(text) if text.strip() else None
+
+
+#: expat's reasons that deserve better words, and what to do about them.
+_REASONS: dict[str, tuple[str, str | None]] = {
+    expat.errors.XML_ERROR_SYNTAX: ("text where an element should begin", "a URDF begins with <robot ...>"),
+    expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
+    expat.errors.XML_ERROR_BAD_CHAR_REF: ("a character that XML does not allow", None),
+    expat.errors.XML_ERROR_TAG_MISMATCH: ("a closing tag does not match the element that is open", None),
+    expat.errors.XML_ERROR_NO_ELEMENTS: ("there is no element in the file", None),
+    expat.errors.XML_ERROR_DUPLICATE_ATTRIBUTE: ("an attribute is given twice", "remove one of the two"),
+    expat.errors.XML_ERROR_MISPLACED_XML_PI: (
+        "the XML declaration is not at the very beginning of the file",
+        "remove what stands before <?xml",
+    ),
+    expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT: (
+        "something follows the closing tag of the root element",
+        "a file holds one robot",
+    ),
+}
+
+
+def line_and_column(data: bytes, offset: int) -> tuple[int, int]:
+    """Line and column of a byte, both from 1."""
+    before = data[: max(offset, 0)].decode("utf-8", "replace")
+    return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1

@@ -1,0 +1,159 @@
+"""Collects findings while a file is checked: it knows the file, its bytes and where its attributes stand."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from urdfkin.diagnostics.finding import Finding, Severity
+
+if TYPE_CHECKING:
+    from urdfkin.diagnostics.codes.base import Code
+    from urdfkin.diagnostics.document import Element
+
+#: Longest piece of a file that is quoted in a message.
+QUOTED = 60
+
+#: From how many of the same kind on warnings and notes are folded into one.
+FOLDED = 4
+
+
+@dataclass(slots=True)
+class Reporter:
+    """The findings of one file.
+
+    Attributes:
+        file: The file's name, for the findings.
+        data: The file's bytes, from which positions of attributes are read.
+    """
+
+    file: str
+    data: bytes = b""
+    _found: list[tuple[Finding, float]] = field(default_factory=list)
+
+    def add(
+        self,
+        code: Code,
+        message: str,
+        at: Element | None = None,
+        *,
+        attribute: str | None = None,
+        found: str | None = None,
+        remedy: str | None = None,
+        name: str | None = None,
+        severity: Severity | None = None,
+        position: tuple[int, int] = (1, 1),
+        weight: float = 0.0,
+    ) -> None:
+        """Report one finding.
+
+        Args:
+            code: Which kind.
+            message: The claim in one clause.
+            at: The element it is about; without it `position` says where.
+            attribute: The attribute of `at` to point to.
+            found: The offending text, quoted as it should be printed.
+            remedy: What to do.
+            name: The name to show when it is not the element's own.
+            severity: Overrides the code's.
+            position: (line, column) when there is no element.
+            weight: When findings of one kind are folded, the one of the greatest weight stays.
+        """
+        line, column = position
+        if at is not None:
+            line, column = self._place(at, attribute)
+            name = at.label if name is None else name
+        finding = Finding(
+            code.id,
+            code.severity if severity is None else severity,
+            message,
+            found,
+            remedy,
+            self.file,
+            line,
+            column,
+            None if at is None else at.owner,
+            name,
+            code.oracle,
+        )
+        self._found.append((finding, weight))
+
+    @property
+    def failed(self) -> bool:
+        """Whether an error was reported."""
+        return any(finding.severity is Severity.ERROR for finding, _ in self._found)
+
+    def findings(self, *, fold: bool = True) -> tuple[Finding, ...]:
+        """Everything reported, by line; with `fold`, many warnings of one kind become one."""
+        found = self._found
+        if fold:
+            found = _folded(found)
+        return tuple(
+            sorted(
+                (finding for finding, _ in found),
+                key=lambda f: (f.line, f.column, f.severity.rank, f.code, f.message),
+            )
+        )
+
+    def _place(self, at: Element, attribute: str | None) -> tuple[int, int]:
+        """Line and column of an element's start tag, or of one of its attributes."""
+        if attribute is None or attribute not in at.attributes:
+            return at.line, at.column
+        tag = _START_TAG.match(self.data, at.offset)
+        if tag is None:
+            return at.line, at.column
+        for match in _ATTRIBUTE.finditer(self.data, at.offset + len(at.tag.encode()) + 1, tag.end()):
+            if match[1].decode() == attribute:
+                return _position(self.data, at, match.start(1))
+        return at.line, at.column
+
+
+#: A start tag: '<', then quoted values, in which '>' may stand, and everything else.
+_START_TAG = re.compile(rb"""<(?:[^<>"']|"[^"]*"|'[^']*')*>""")
+_ATTRIBUTE = re.compile(rb"""([^\s=<>/"']+)\s*=\s*(?:"[^"]*"|'[^']*')""")
+
+
+def _position(data: bytes, at: Element, offset: int) -> tuple[int, int]:
+    between = data[at.offset : offset]
+    lines = _NEWLINE.findall(between)
+    if not lines:
+        return at.line, at.column + len(between.decode("utf-8", "replace"))
+    last = re.split(_NEWLINE, between)[-1]
+    return at.line + len(lines), len(last.decode("utf-8", "replace")) + 1
+
+
+_NEWLINE = re.compile(rb"\r\n|\r|\n")
+
+
+def _folded(found: list[tuple[Finding, float]]) -> list[tuple[Finding, float]]:
+    """Fold warnings and notes of one kind, when there are many, into the weightiest of them."""
+    groups: dict[tuple[object, ...], list[tuple[Finding, float]]] = {}
+    for finding, weight in found:
+        own = finding.severity is Severity.ERROR
+        key = (finding,) if own else (finding.code, finding.severity, finding.oracle)
+        groups.setdefault(key, []).append((finding, weight))
+    kept: list[tuple[Finding, float]] = []
+    for group in groups.values():
+        if len(group) < FOLDED or group[0][0].severity is Severity.ERROR:
+            kept += group
+            continue
+        best, weight = max(group, key=lambda pair: pair[1])
+        lines = sorted({finding.line for finding, _ in group if finding is not best} - {best.line})
+        kept.append((replace(best, also=tuple(lines)), weight))
+    return kept
+
+
+def quoted(text: str, limit: int = QUOTED) -> str:
+    """A piece of the file, safe to print: escaped, in double quotes, and cut when it is long."""
+    cut = text if len(text) <= limit else text[: limit - 3] + "..."
+    return '"' + printable(cut).replace('"', '\\"') + '"'
+
+
+def printable(text: str) -> str:
+    r"""The text with everything that a terminal could act on written as an escape.
+
+    >>> print(printable("a\u202eb\x1b[31m"))
+    a\u202eb\x1b[31m
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
