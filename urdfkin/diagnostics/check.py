@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 from urdfkin.diagnostics.codes import text as codes
-from urdfkin.diagnostics.document import DEFAULT_LIMITS, Limits, parse
+from urdfkin.diagnostics.dialect import check_dialect
+from urdfkin.diagnostics.document import DEFAULT_LIMITS, Element, Limits, parse
 from urdfkin.diagnostics.encoding import utf8_bytes
+from urdfkin.diagnostics.extras import check_extras
 from urdfkin.diagnostics.finding import Finding
+from urdfkin.diagnostics.joints import check_joints
+from urdfkin.diagnostics.mimic import check_mimic
+from urdfkin.diagnostics.names import check_names
+from urdfkin.diagnostics.records import read_robot
 from urdfkin.diagnostics.reporter import Reporter
+from urdfkin.diagnostics.structure import check_structure
+from urdfkin.diagnostics.suspicious import check_suspicious
+from urdfkin.diagnostics.vocabulary import check_vocabulary
 
 
 def check_text(
@@ -46,5 +55,21 @@ def check_text(
     text = utf8_bytes(report, data)
     if text is not None:
         report.data = text
-        parse(report, text, limits)
+        root = parse(report, text, limits)
+        if root is not None:
+            _check_robot(report, root, mimic=mimic, root_joint=root_joint)
     return report.findings(fold=fold)
+
+
+def _check_robot(report: Reporter, root: Element, *, mimic: bool, root_joint: str | None) -> None:
+    version = check_dialect(report, root)
+    if version is None:
+        return
+    check_vocabulary(report, root)
+    robot = read_robot(report, root, version)
+    check_names(report, robot, root_joint)
+    sound = check_structure(report, robot)
+    check_joints(report, robot)
+    check_mimic(report, robot, obeyed=mimic)
+    check_suspicious(report, robot, sound=sound)
+    check_extras(report, robot)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -14,6 +16,9 @@ if TYPE_CHECKING:
 
 #: Longest piece of a file that is quoted in a message.
 QUOTED = 60
+
+#: How many misspelt names of a file get suggestions.
+SEARCHES = 20
 
 #: From how many of the same kind on warnings and notes are folded into one.
 FOLDED = 4
@@ -30,6 +35,8 @@ class Reporter:
 
     file: str
     data: bytes = b""
+    _searches: int = 0
+    _raw_blanks: bool | None = None
     _found: list[tuple[Finding, float]] = field(default_factory=list)
 
     def add(
@@ -79,6 +86,13 @@ class Reporter:
         )
         self._found.append((finding, weight))
 
+    def nearest(self, word: str, known: Iterable[str]) -> list[str]:
+        """Up to three known names that look like `word`; only for the first few, because it is slow."""
+        self._searches += 1
+        if self._searches > SEARCHES:
+            return []
+        return difflib.get_close_matches(word, list(known)[:5000], n=3, cutoff=0.6)
+
     @property
     def failed(self) -> bool:
         """Whether an error was reported."""
@@ -96,22 +110,36 @@ class Reporter:
             )
         )
 
-    def _place(self, at: Element, attribute: str | None) -> tuple[int, int]:
-        """Line and column of an element's start tag, or of one of its attributes."""
-        if attribute is None or attribute not in at.attributes:
-            return at.line, at.column
+    @property
+    def has_raw_blanks(self) -> bool:
+        """Whether any value holds a tab, a line end or a reference, which XML readers turn into others."""
+        if self._raw_blanks is None:
+            self._raw_blanks = _RAW_BLANK.search(self.data) is not None
+        return self._raw_blanks
+
+    def raw(self, at: Element, attribute: str) -> str | None:
+        """An attribute's value as the file has it, before XML turns its blanks and references into others."""
+        match = self._attribute(at, attribute)
+        return None if match is None else match[2].decode("utf-8", "replace")[1:-1]
+
+    def _attribute(self, at: Element, attribute: str) -> re.Match[bytes] | None:
         tag = _START_TAG.match(self.data, at.offset)
         if tag is None:
-            return at.line, at.column
-        for match in _ATTRIBUTE.finditer(self.data, at.offset + len(at.tag.encode()) + 1, tag.end()):
-            if match[1].decode() == attribute:
-                return _position(self.data, at, match.start(1))
-        return at.line, at.column
+            return None
+        matches = _ATTRIBUTE.finditer(self.data, at.offset + len(at.tag.encode()) + 1, tag.end())
+        return next((match for match in matches if match[1].decode() == attribute), None)
 
+    def _place(self, at: Element, attribute: str | None) -> tuple[int, int]:
+        """Line and column of an element's start tag, or of one of its attributes."""
+        match = None if attribute is None else self._attribute(at, attribute)
+        return (at.line, at.column) if match is None else _position(self.data, at, match.start(1))
+
+
+_RAW_BLANK = re.compile(rb"""=\s*(?:"[^"<]*[\t\r\n&][^"<]*"|'[^'<]*[\t\r\n&][^'<]*')""")
 
 #: A start tag: '<', then quoted values, in which '>' may stand, and everything else.
 _START_TAG = re.compile(rb"""<(?:[^<>"']|"[^"]*"|'[^']*')*>""")
-_ATTRIBUTE = re.compile(rb"""([^\s=<>/"']+)\s*=\s*(?:"[^"]*"|'[^']*')""")
+_ATTRIBUTE = re.compile(rb"""([^\s=<>/"']+)\s*=\s*("[^"]*"|'[^']*')""")
 
 
 def _position(data: bytes, at: Element, offset: int) -> tuple[int, int]:

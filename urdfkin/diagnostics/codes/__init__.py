@@ -8,10 +8,18 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from urdfkin.diagnostics.codes import text
+from urdfkin.diagnostics.codes import dialect, extras, joints, numbers, structure, suspicious, text
 from urdfkin.diagnostics.codes.base import Code
 
-_FAMILIES: tuple[ModuleType, ...] = (text,)
+_FAMILIES: tuple[ModuleType, ...] = (
+    text,
+    dialect,
+    numbers,
+    structure,
+    joints,
+    suspicious,
+    extras,
+)
 
 #: Id -> code, in the order of the ids.
 REGISTRY: dict[str, Code] = {

@@ -1,0 +1,128 @@
+"""Axes and limits of joints."""
+
+from __future__ import annotations
+
+import math
+
+from urdfkin.diagnostics.codes import joints as codes
+from urdfkin.diagnostics.finding import Severity
+from urdfkin.diagnostics.records import AXIAL, JointRecord, LimitRecord, RobotRecord
+from urdfkin.diagnostics.reporter import Reporter, quoted
+
+#: Lengths whose square neither under- nor overflows.
+SHORTEST, LONGEST = 1e-150, 1e150
+
+#: A length that differs from one by less is rounding of the last digits and worth a note at most.
+ROUNDING = 2e-4
+
+
+def check_joints(report: Reporter, robot: RobotRecord) -> None:
+    """Axes that have no direction, are no unit vectors or are not used; limits that contradict themselves."""
+    for joint in robot.joints:
+        if joint.kind in AXIAL:
+            _check_axis(report, joint)
+        elif joint.kind == "planar":
+            _check_planar(report, joint)
+        if joint.limit is not None:
+            _check_limit(report, joint, joint.limit)
+
+
+def _written(joint: JointRecord) -> str:
+    axis = joint.axis_element
+    return f"xyz={quoted(axis.attributes.get('xyz', ''))}" if axis is not None else 'the default "1 0 0"'
+
+
+def _check_axis(report: Reporter, joint: JointRecord) -> None:
+    if joint.axis is None or joint.axis_element is None:
+        return
+    length = math.hypot(*joint.axis)
+    if not SHORTEST < length < LONGEST:
+        what = "is zero" if length == 0.0 else f"has no usable length ({length:.3g})"
+        report.add(
+            codes.NO_DIRECTION,
+            f"the axis {what}",
+            joint.axis_element,
+            attribute="xyz",
+            found=_written(joint),
+            remedy='write a unit vector, such as xyz="0 0 1"',
+        )
+    elif abs(length - 1.0) > 1e-12:
+        unit = " ".join(repr(x / length) for x in joint.axis)
+        report.add(
+            codes.AXIS_LENGTH,
+            f"the axis has length {length:.6g} and is normalised",
+            joint.axis_element,
+            attribute="xyz",
+            found=_written(joint),
+            remedy=f'write xyz="{unit}"',
+            severity=Severity.NOTE if abs(length - 1.0) < ROUNDING else None,
+            weight=abs(length - 1.0),
+        )
+
+
+def _check_planar(report: Reporter, joint: JointRecord) -> None:
+    x, y, z = joint.axis or (0.0, 0.0, 0.0)
+    if z > 0.0 and math.hypot(x, y) <= 1e-9 * z:
+        return
+    at = joint.axis_element or joint.element
+    report.add(
+        codes.PLANAR_AXIS,
+        "a planar joint moves in the XY plane of its frame, whatever its axis says",
+        at,
+        attribute="xyz",
+        found=_written(joint),
+        remedy='turn the origin so that the normal is z, and write <axis xyz="0 0 1"/>',
+    )
+
+
+def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord) -> None:
+    for attribute, value in (("effort", limit.effort), ("velocity", limit.velocity)):
+        if value is not None and value < 0.0:
+            report.add(
+                codes.NEGATIVE_LIMIT,
+                f"the limit of {attribute} is negative; Pinocchio refuses it",
+                limit.element,
+                attribute=attribute,
+                found=quoted(limit.element.attributes[attribute]),
+                remedy="write its magnitude",
+            )
+    if joint.kind == "continuous":
+        _check_continuous(report, limit)
+    if joint.kind not in ("revolute", "prismatic"):
+        return
+    written = {"lower", "upper"} & limit.element.attributes.keys()
+    if any(getattr(limit, name) is None for name in written):
+        return
+    lower, upper = limit.lower or 0.0, limit.upper or 0.0
+    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "neither lower nor upper, so both are 0"
+    if lower > upper:
+        report.add(
+            codes.INVERTED_LIMIT,
+            "the lower limit is above the upper limit",
+            limit.element,
+            attribute="lower",
+            found=found if len(written) == 2 else f"{found} (what is not written is 0)",
+            remedy="swap the two" if len(written) == 2 else "write both limits",
+        )
+    elif lower == upper:
+        report.add(
+            codes.EMPTY_RANGE,
+            "the joint cannot move: its limits are equal",
+            limit.element,
+            attribute="lower",
+            found=found,
+            remedy="write the range, or make the joint fixed",
+        )
+
+
+def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
+    written = [name for name in ("lower", "upper") if name in limit.element.attributes]
+    if any(getattr(limit, name) for name in written):
+        report.add(
+            codes.IGNORED,
+            "a continuous joint has no position limits; they are ignored",
+            limit.element,
+            attribute=written[0],
+            found=" ".join(f"{name}={quoted(limit.element.attributes[name])}" for name in written),
+            remedy='remove them, or write type="revolute"',
+        )

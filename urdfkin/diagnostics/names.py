@@ -1,0 +1,111 @@
+"""Names of links and joints: those Pinocchio keeps for itself, and those other programs stumble over."""
+
+from __future__ import annotations
+
+import unicodedata
+
+from urdfkin.diagnostics.codes import structure as codes
+from urdfkin.diagnostics.document import Element
+from urdfkin.diagnostics.finding import Severity
+from urdfkin.diagnostics.records import RobotRecord
+from urdfkin.diagnostics.reporter import Reporter, printable, quoted
+
+#: Longer names break tables, and paths made of them.
+LONGEST = 200
+
+
+def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) -> None:
+    """Odd, reserved and confusable names.
+
+    Args:
+        report: Where findings go.
+        robot: What was read.
+        root_joint: Set when the robot will hang from a joint `root_joint` in a link `universe`.
+    """
+    links = list(robot.links.items())
+    joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
+    for name, element in (*links, *joints):
+        _check_odd(report, name, element)
+        _check_blanks(report, element)
+        _check_reserved(report, name, element, root_joint)
+    for kind in (links, joints):
+        _check_lookalikes(report, kind)
+
+
+def _check_odd(report: Reporter, name: str, element: Element) -> None:
+    reason = None
+    if any(not c.isprintable() for c in name):
+        reason = "the name holds characters that cannot be printed"
+    elif name != name.strip():
+        reason = "the name begins or ends with a blank"
+    elif "/" in name or "\\" in name:
+        reason = "the name holds a slash, as a path does"
+    elif name[0] in "=+-@":
+        reason = "the name begins like a spreadsheet formula"
+    elif len(name) > LONGEST:
+        reason = f"the name has {len(name)} characters"
+    elif any(c in "\"'<>&|;`$" for c in name):
+        reason = "the name holds a character that shells or XML treat specially"
+    if reason:
+        report.add(
+            codes.ODD_NAME,
+            reason,
+            element,
+            attribute="name",
+            found=quoted(name),
+            remedy="use letters, digits, - and _",
+            name=printable(name[:LONGEST]),
+        )
+
+
+def _check_blanks(report: Reporter, element: Element) -> None:
+    raw = report.raw(element, "name") if report.has_raw_blanks else None
+    if raw is not None and any(c in raw for c in "\t\r\n"):
+        report.add(
+            codes.NAME_BLANKS,
+            "a tab or line end stands inside the name",
+            element,
+            attribute="name",
+            found=quoted(raw),
+            remedy="write the name on one line, without tabs",
+        )
+
+
+def _check_reserved(report: Reporter, name: str, element: Element, root_joint: str | None) -> None:
+    if name == "universe":
+        needed = root_joint is not None and element.tag == "link"
+        report.add(
+            codes.UNIVERSE,
+            "Pinocchio calls the world by this name",
+            element,
+            attribute="name",
+            remedy="rename it",
+            severity=Severity.ERROR if needed else None,
+        )
+    elif name == "root_joint" and element.tag == "joint":
+        report.add(
+            codes.RESERVED_NAME,
+            "a free or planar base is called by this name",
+            element,
+            attribute="name",
+            remedy="rename it" if root_joint else "rename it, or load without root_joint",
+            severity=Severity.ERROR if root_joint else None,
+        )
+
+
+def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> None:
+    seen: dict[str, str] = {}
+    for name, element in named:
+        if name.isascii():
+            continue
+        key = unicodedata.normalize("NFKC", name)
+        first = seen.setdefault(key, name)
+        if first != name:
+            report.add(
+                codes.LOOKALIKE,
+                "another name looks the same and is written with other characters",
+                element,
+                attribute="name",
+                found=ascii(name) + " and " + ascii(first),
+                remedy="use one of the two",
+            )
