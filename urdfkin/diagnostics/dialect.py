@@ -7,7 +7,8 @@ import re
 from urdfkin.diagnostics.codes import dialect as codes
 from urdfkin.diagnostics.codes import structure, text
 from urdfkin.diagnostics.document import Element
-from urdfkin.diagnostics.reporter import Reporter, quoted
+from urdfkin.diagnostics.escape import quoted
+from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.diagnostics.vocabulary import OPAQUE
 
 #: What another root element is the sign of.

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from urdfkin.diagnostics.codes import text as codes
-from urdfkin.diagnostics.reporter import Reporter, quoted
+from urdfkin.diagnostics.escape import quoted
+from urdfkin.diagnostics.reporter import Reporter
 
 
 @dataclass(frozen=True, slots=True)

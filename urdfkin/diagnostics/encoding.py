@@ -7,7 +7,8 @@ import re
 
 from urdfkin.diagnostics.codes import text as codes
 from urdfkin.diagnostics.document import line_and_column
-from urdfkin.diagnostics.reporter import Reporter, quoted
+from urdfkin.diagnostics.escape import quoted
+from urdfkin.diagnostics.reporter import Reporter
 
 #: Byte order marks of encodings that are not UTF-8; the longer ones first.
 _MARKS = (

@@ -7,12 +7,19 @@ from collections.abc import Sequence
 
 from urdfkin.diagnostics.codes import extras as codes
 from urdfkin.diagnostics.document import Element
+from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.numbers import NumberReader
 from urdfkin.diagnostics.records import RobotRecord
-from urdfkin.diagnostics.reporter import Reporter, quoted
+from urdfkin.diagnostics.reporter import Reporter
 
 #: Heaviest mass in kg and longest lever in m that are taken for real.
 HEAVIEST, FARTHEST = 1e9, 1e6
+
+#: Lighter bodies, in kg, are placeholders, whose moments mean nothing.
+NEGLIGIBLE = 1e-3
+
+#: Moments of inertia for each kg, in m^2, that are nothing but rounding: a body of 0.03 mm.
+ROUNDING = 1e-9
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -65,7 +72,7 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
     if tensor is not None:
         moments = [numbers.scalar(tensor, name) for name in _MOMENTS]
         if all(moment is not None for moment in moments):
-            _check_moments(report, tensor, [moment for moment in moments if moment is not None])
+            _check_moments(report, tensor, [moment for moment in moments if moment is not None], mass)
 
 
 def _check_mass(
@@ -93,9 +100,12 @@ def _check_mass(
         )
 
 
-def _check_moments(report: Reporter, tensor: Element, moments: list[float]) -> None:
+def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass: float | None) -> None:
+    kilograms = 1.0 if mass is None else abs(mass)
+    if 0.0 < kilograms < NEGLIGIBLE:
+        return
     small, middle, large = principal_moments(moments)
-    slack = 1e-6 * max(abs(small), abs(large))
+    slack = 1e-6 * max(abs(small), abs(large)) + ROUNDING * kilograms
     if small < -slack:
         what, found = "a principal moment of inertia is negative", f"{small:.3g}"
     elif large > middle + small + slack:
@@ -109,7 +119,6 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float]) -> N
         tensor,
         found=found,
         remedy="check units and signs; kinematics is untouched",
-        weight=0.0,
     )
 
 

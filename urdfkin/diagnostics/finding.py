@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from enum import Enum
 from typing import Any
 
+from urdfkin.diagnostics.escape import printable, shortened
 from urdfkin.errors import UrdfkinError
 
 
@@ -76,7 +77,8 @@ class Finding:
         """What the finding is about, as a person would name it: `joint 'elbow'`, or an empty string."""
         if self.element is None:
             return ""
-        return self.element if self.name is None else f"{self.element} {self.name!r}"
+        tag = shortened(self.element)
+        return tag if self.name is None else f"{tag} '{shortened(self.name)}'"
 
     @property
     def sentence(self) -> str:
@@ -88,7 +90,8 @@ class Finding:
         return f"{subject}{self.message}{found}{again}{remedy}"
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}:{self.column}: {self.code} {self.severity.value}: {self.sentence}"
+        place = f"{printable(self.file)}:{self.line}:{self.column}"
+        return f"{place}: {self.code} {self.severity.value}: {self.sentence}"
 
     def as_dict(self) -> dict[str, Any]:
         """The finding as JSON has it: the words of the enums, lists for tuples."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 from urdfkin.diagnostics.codes import joints as codes
+from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.finding import Severity
 from urdfkin.diagnostics.records import AXIAL, JointRecord, LimitRecord, RobotRecord
-from urdfkin.diagnostics.reporter import Reporter, quoted
+from urdfkin.diagnostics.reporter import Reporter
 
 #: Lengths whose square neither under- nor overflows.
 SHORTEST, LONGEST = 1e-150, 1e150

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from urdfkin.diagnostics.codes import joints as codes
 from urdfkin.diagnostics.codes.base import Code
+from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.finding import Severity
 from urdfkin.diagnostics.records import AXIAL, JointRecord, MimicRecord, RobotRecord
-from urdfkin.diagnostics.reporter import Reporter, quoted
+from urdfkin.diagnostics.reporter import Reporter
 
 
 def check_mimic(report: Reporter, robot: RobotRecord, *, obeyed: bool) -> None:

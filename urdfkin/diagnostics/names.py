@@ -6,9 +6,10 @@ import unicodedata
 
 from urdfkin.diagnostics.codes import structure as codes
 from urdfkin.diagnostics.document import Element
+from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.finding import Severity
 from urdfkin.diagnostics.records import RobotRecord
-from urdfkin.diagnostics.reporter import Reporter, printable, quoted
+from urdfkin.diagnostics.reporter import Reporter
 
 #: Longer names break tables, and paths made of them.
 LONGEST = 200
@@ -54,7 +55,6 @@ def _check_odd(report: Reporter, name: str, element: Element) -> None:
             attribute="name",
             found=quoted(name),
             remedy="use letters, digits, - and _",
-            name=printable(name[:LONGEST]),
         )
 
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from urdfkin.diagnostics.codes import numbers as codes
 from urdfkin.diagnostics.codes.base import Code
 from urdfkin.diagnostics.document import Element
-from urdfkin.diagnostics.reporter import Reporter, quoted
+from urdfkin.diagnostics.escape import quoted
+from urdfkin.diagnostics.reporter import Reporter
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _BLANKS = re.compile(r"[ \t\r\n]+")
@@ -52,9 +53,12 @@ class NumberReader:
         if written is None:
             return None
         pieces = [piece for piece in _BLANKS.split(written) if piece]
-        values = [self._number(element, attribute, piece) for piece in pieces]
-        if any(value is None for value in values):
-            return None
+        values: list[float] = []
+        for piece in pieces:
+            value = self._number(element, attribute, piece)
+            if value is None:
+                return None
+            values.append(value)
         if len(values) != count:
             self.report.add(
                 self.bad_vector,
@@ -62,12 +66,12 @@ class NumberReader:
                 element,
                 attribute=attribute,
                 found=f"{attribute}={quoted(written)}",
-                remedy=f"write {attribute}={quoted(' '.join(['0'] * count))} for none",
+                remedy=f"write {count} numbers with a space between them",
             )
             return None
         if self.report.has_raw_blanks:
             self._check_raw(element, attribute, single=False)
-        return tuple(value for value in values if value is not None)
+        return tuple(values)
 
     def _number(self, element: Element, attribute: str, piece: str) -> float | None:
         value = float(piece) if _NUMBER.fullmatch(piece) and len(piece) <= _LONGEST else None

@@ -12,8 +12,9 @@ from urdfkin.diagnostics.codes import dialect as codes
 from urdfkin.diagnostics.codes import joints as joint_codes
 from urdfkin.diagnostics.codes import structure as structure_codes
 from urdfkin.diagnostics.document import Element
+from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.numbers import NumberReader
-from urdfkin.diagnostics.reporter import Reporter, quoted
+from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.diagnostics.vocabulary import JOINT_TYPES, nearest
 
 Vector = tuple[float, ...]

@@ -14,14 +14,12 @@ if TYPE_CHECKING:
     from urdfkin.diagnostics.codes.base import Code
     from urdfkin.diagnostics.document import Element
 
-#: Longest piece of a file that is quoted in a message.
-QUOTED = 60
-
 #: How many misspelt names of a file get suggestions.
 SEARCHES = 20
 
-#: From how many of the same kind on warnings and notes are folded into one.
-FOLDED = 4
+#: From how many of the same kind on warnings and notes are folded into one; what kinematics does not need
+#: (URDF7xx) is folded sooner.
+FOLDED, FOLDED_EXTRAS = 4, 2
 
 
 @dataclass(slots=True)
@@ -48,7 +46,7 @@ class Reporter:
         attribute: str | None = None,
         found: str | None = None,
         remedy: str | None = None,
-        name: str | None = None,
+        owner: str | None = None,
         severity: Severity | None = None,
         position: tuple[int, int] = (1, 1),
         weight: float = 0.0,
@@ -62,15 +60,17 @@ class Reporter:
             attribute: The attribute of `at` to point to.
             found: The offending text, quoted as it should be printed.
             remedy: What to do.
-            name: The name to show when it is not the element's own.
+            owner: The tag to name instead of that of the link or joint around the element, for an element
+                that is a link or joint itself but stands in the wrong place.
             severity: Overrides the code's.
             position: (line, column) when there is no element.
             weight: When findings of one kind are folded, the one of the greatest weight stays.
         """
         line, column = position
+        name = None
         if at is not None:
             line, column = self._place(at, attribute)
-            name = at.label if name is None else name
+            name = at.label if owner is None else at.attributes.get("name")
         finding = Finding(
             code.id,
             code.severity if severity is None else severity,
@@ -80,7 +80,7 @@ class Reporter:
             self.file,
             line,
             column,
-            None if at is None else at.owner,
+            owner if owner or at is None else at.owner,
             name,
             code.oracle,
         )
@@ -163,25 +163,11 @@ def _folded(found: list[tuple[Finding, float]]) -> list[tuple[Finding, float]]:
         groups.setdefault(key, []).append((finding, weight))
     kept: list[tuple[Finding, float]] = []
     for group in groups.values():
-        if len(group) < FOLDED or group[0][0].severity is Severity.ERROR:
+        enough = FOLDED_EXTRAS if group[0][0].code.startswith("URDF7") else FOLDED
+        if len(group) < enough or group[0][0].severity is Severity.ERROR:
             kept += group
             continue
         best, weight = max(group, key=lambda pair: pair[1])
         lines = sorted({finding.line for finding, _ in group if finding is not best} - {best.line})
         kept.append((replace(best, also=tuple(lines)), weight))
     return kept
-
-
-def quoted(text: str, limit: int = QUOTED) -> str:
-    """A piece of the file, safe to print: escaped, in double quotes, and cut when it is long."""
-    cut = text if len(text) <= limit else text[: limit - 3] + "..."
-    return '"' + printable(cut).replace('"', '\\"') + '"'
-
-
-def printable(text: str) -> str:
-    r"""The text with everything that a terminal could act on written as an escape.
-
-    >>> print(printable("a\u202eb\x1b[31m"))
-    a\u202eb\x1b[31m
-    """
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

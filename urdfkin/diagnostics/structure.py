@@ -6,8 +6,9 @@ Everything here is iterative: a chain of 50,000 links must not meet a stack.
 from __future__ import annotations
 
 from urdfkin.diagnostics.codes import structure as codes
+from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.records import JointRecord, RobotRecord
-from urdfkin.diagnostics.reporter import Reporter, quoted
+from urdfkin.diagnostics.reporter import Reporter
 
 
 def check_structure(report: Reporter, robot: RobotRecord) -> bool:
@@ -112,6 +113,8 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
         report.add(codes.CYCLE, "no link is a root: every one is the child of a joint", robot.element)
     if len(roots) < 2:
         return len(roots) == 1
+    if None in children:
+        return False  # a joint that names no child has lost one of these; it has been reported
     parents = {joint.parent for joint in robot.joints}
     # The root that carries most is the robot; the others are what fell off.
     main = max(roots, key=lambda link: (link in parents, -list(robot.links).index(link)))

@@ -6,9 +6,10 @@ import math
 from fractions import Fraction
 
 from urdfkin.diagnostics.codes import suspicious as codes
+from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.finding import Severity
 from urdfkin.diagnostics.records import AXIAL, JointRecord, RobotRecord
-from urdfkin.diagnostics.reporter import Reporter, quoted
+from urdfkin.diagnostics.reporter import Reporter
 
 #: A joint further than this from its parent, in m, is probably given in millimetres.
 FAR = 100.0
@@ -53,8 +54,7 @@ def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float])
         if any(abs(angle) >= 10.0 for angle in joint.rpy):
             _degrees(report, joint, "rpy", quoted(" ".join(written)))
         elif len(written) == 3:
-            for text, angle in zip(written, joint.rpy, strict=True):
-                _check_rounded(report, joint, text, angle, reach.get(joint.child or ""))
+            _check_rounded(report, joint, written, reach.get(joint.child or "", 0.0))
     limit = joint.limit
     if limit is not None and joint.kind == "revolute":
         bounds = [bound for bound in (limit.lower, limit.upper) if bound is not None]
@@ -79,26 +79,25 @@ def _degrees(report: Reporter, joint: JointRecord, what: str, found: str) -> Non
     )
 
 
-def _check_rounded(
-    report: Reporter, joint: JointRecord, text: str, angle: float, reach: float | None
-) -> None:
-    meant = rounded_pi(text, angle)
-    if meant is None:
+def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], reach: float) -> None:
+    """The angle of an origin that is furthest off a multiple of pi it was probably meant to be."""
+    off, text, multiple, meant = 0.0, "", Fraction(0), 0.0
+    for word, angle in zip(written, joint.rpy, strict=True):
+        found = rounded_pi(word, angle)
+        if found is not None and abs(angle - found[1]) > off:
+            off, text, (multiple, meant) = abs(angle - found[1]), word, found
+    if not off:
         return
-    multiple, value = meant
-    off = abs(angle - value)
-    moves = ""
-    if reach is not None:
-        moves = f", which moves what it carries by up to {_metres(off * reach)}"
+    moves = f", which moves what it carries by up to {_metres(off * reach)}" if reach > 0.0 else ""
     report.add(
         codes.ROUNDED_PI,
         f"rpy holds a rounded {_as_pi(multiple)}, off by {off:.1e} rad{moves}",
         joint.origin_element,
         attribute="rpy",
         found=quoted(text),
-        remedy=f"write {value!r} if {_as_pi(multiple)} is meant; it is used as written",
-        severity=Severity.WARNING if reach is not None and off * reach > NOTICEABLE else None,
-        weight=off * (reach or 0.0),
+        remedy=f"write {meant!r} if {_as_pi(multiple)} is meant; it is used as written",
+        severity=Severity.WARNING if off * reach > NOTICEABLE else None,
+        weight=off * reach,
     )
 
 

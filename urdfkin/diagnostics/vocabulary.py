@@ -7,8 +7,9 @@ from functools import cache
 
 from urdfkin.diagnostics.codes import dialect as codes
 from urdfkin.diagnostics.document import Element
+from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.finding import Severity
-from urdfkin.diagnostics.reporter import Reporter, quoted
+from urdfkin.diagnostics.reporter import Reporter
 
 #: Extensions that may hold anything, `<joint>` and `<link>` included.
 OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
@@ -113,7 +114,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
             f"{what} is not read, so it is missing from the robot",
             part,
             remedy=f"write <{meant}> as a child of <robot>",
-            name=part.attributes.get("name"),
+            owner=part.tag,
         )
     if parts:
         return
@@ -175,6 +176,8 @@ def _check_attributes(report: Reporter, element: Element) -> None:
 def _check_text(report: Reporter, element: Element) -> None:
     if not element.text or element.tag not in _VALUES | {"robot", "joint", "link"}:
         return
+    if element.tag in ("parent", "child") and "link" not in element.attributes:
+        return  # reported as a missing attribute, with this text
     lost = element.tag in ("origin", "axis") and not element.attributes
     report.add(
         codes.STRAY_TEXT,
@@ -216,5 +219,8 @@ def _check_repeats(report: Reporter, element: Element) -> None:
 def nearest(word: str, known: frozenset[str]) -> str | None:
     """The known word that `word` was probably meant to be."""
     folded = {name.lower(): name for name in known}
-    close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.75)
-    return folded[close[0]] if close else None
+    close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.8)
+    if close:
+        return folded[close[0]]
+    letters = sorted(word.lower())
+    return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
