@@ -1,1 +1,67 @@
-"""Textbook kinematics from any URDF, every number checked against Pinocchio."""
+"""Textbook kinematics from any URDF, every number checked against Pinocchio.
+
+>>> import urdfkin
+>>> robot = urdfkin.load("ur5")
+>>> J = robot.jacobian(robot.neutral(), "tool0")
+>>> J.shape, robot.certificate().verified
+((6, 6), True)
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from urdfkin.diagnostics import Finding, UrdfError, UrdfWarning
+    from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
+    from urdfkin.loading import load
+    from urdfkin.recursion.base import BaseMotion
+    from urdfkin.reference import Reference
+    from urdfkin.robot import NotVerifiedWarning, Robot
+    from urdfkin.verification.certificate import Certificate, VerificationError
+
+# Loaded when first asked for: `import urdfkin` needs no numpy, no Pinocchio and no compiler.
+_HOMES = {
+    "BaseMotion": "urdfkin.recursion.base",
+    "Certificate": "urdfkin.verification.certificate",
+    "Finding": "urdfkin.diagnostics",
+    "InputError": "urdfkin.errors",
+    "NotVerifiedWarning": "urdfkin.robot",
+    "Reference": "urdfkin.reference",
+    "Robot": "urdfkin.robot",
+    "SourceError": "urdfkin.errors",
+    "UnknownNameError": "urdfkin.errors",
+    "UrdfError": "urdfkin.diagnostics",
+    "UrdfWarning": "urdfkin.diagnostics",
+    "UrdfkinError": "urdfkin.errors",
+    "VerificationError": "urdfkin.verification.certificate",
+    "load": "urdfkin.loading",
+}
+
+__all__ = [
+    "BaseMotion",
+    "Certificate",
+    "Finding",
+    "InputError",
+    "NotVerifiedWarning",
+    "Reference",
+    "Robot",
+    "SourceError",
+    "UnknownNameError",
+    "UrdfError",
+    "UrdfWarning",
+    "UrdfkinError",
+    "VerificationError",
+    "load",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'urdfkin' has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin import configuration
+from urdfkin.diagnostics import Finding
 from urdfkin.errors import InputError
 from urdfkin.oracle import Oracle, OracleError, version
 from urdfkin.recursion import evaluate
@@ -44,6 +45,8 @@ class Robot:
         urdf: The URDF text that Pinocchio checks against.
         source: What `load` was given, for messages and reproducing lines.
         verify: Whether results are checked unless a call says otherwise.
+        findings: What there was to say about the URDF; no errors.
+        base_frame: The catalogue's base for chains; for other robots the root link.
     """
 
     def __init__(
@@ -53,6 +56,7 @@ class Robot:
         *,
         source: str,
         verify: bool = True,
+        findings: tuple[Finding, ...] = (),
         unverifiable: str | None = None,
         base_frame: str | None = None,
         tip_frame: str | None = None,
@@ -61,6 +65,7 @@ class Robot:
         self.urdf = urdf
         self.source = source
         self.verify = verify
+        self.findings = findings
         self.base_frame = base_frame or tree.links[0]
         self._tip_frame = tip_frame
         self._unverifiable = unverifiable

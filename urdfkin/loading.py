@@ -1,0 +1,78 @@
+"""`load`: from any source to a robot, through the checks."""
+
+from __future__ import annotations
+
+import warnings
+
+from urdfkin.diagnostics import Finding, Oracle, Severity, UrdfError, UrdfWarning, check_text
+from urdfkin.robot import Robot
+from urdfkin.sources import Source, Text, read_source
+from urdfkin.urdf.reader import read_tree
+
+
+def load(
+    source: Source,
+    *,
+    verify: bool = True,
+    mimic: bool | None = None,
+    root_joint: str | None = None,
+) -> Robot:
+    """A robot from a URDF, checked before it is read.
+
+    Args:
+        source: A path, a name of the catalogue (`urdfkin robots` lists them), URDF text, bytes, an open
+            file, or `-` for standard input.
+        verify: Whether every result is held against Pinocchio's.
+        mimic: Whether mimic joints follow their leaders, as the URDF says; False lets each move freely.
+            None: True, except for the robots whose catalogue entry says that theirs cannot work.
+        root_joint: `"floating"` or `"planar"` hangs the root link from a moving joint.
+
+    Returns:
+        The robot. Its findings are warned of (`UrdfWarning`), except for robots of the catalogue.
+
+    Raises:
+        UrdfError: the file has errors; `findings` tells which and where.
+        SourceError: it cannot be read.
+        UnknownNameError: no file and no robot of that name; the nearest names are offered.
+
+    >>> robot = load("panda")
+    >>> robot.nq, robot.placement(robot.neutral(), "panda_hand")[:3, 3].round(4).tolist()
+    (8, [0.088, 0.0, 0.926])
+    """
+    text = read_source(source)
+    if mimic is None:
+        mimic = text.entry is None or text.entry.mimic
+    findings = check_text(text.data, file=text.label, mimic=mimic, root_joint=root_joint)
+    if any(finding.severity is Severity.ERROR for finding in findings):
+        raise UrdfError(findings)
+    if text.entry is None:
+        for finding in findings:
+            if finding.severity is Severity.WARNING:
+                warnings.warn(str(finding), UrdfWarning, stacklevel=2)
+    return _robot(text, findings, verify=verify, mimic=mimic, root_joint=root_joint)
+
+
+def _robot(
+    text: Text, findings: tuple[Finding, ...], *, verify: bool, mimic: bool, root_joint: str | None
+) -> Robot:
+    tree = read_tree(text.data, mimic=mimic, root_joint=root_joint)
+    return Robot(
+        tree,
+        text.data.decode("utf-8-sig"),
+        source=text.source,
+        verify=verify,
+        findings=findings,
+        unverifiable=_unverifiable(findings),
+        base_frame=text.entry.base if text.entry else None,
+        tip_frame=text.entry.tip if text.entry else None,
+    )
+
+
+def _unverifiable(findings: tuple[Finding, ...]) -> str | None:
+    """Why Pinocchio cannot check the robot, if a finding says that it cannot."""
+    for finding in findings:
+        if finding.oracle is Oracle.REFUSES:
+            return f"Pinocchio refuses the file ({finding.code}, line {finding.line}: {finding.message})"
+        if finding.oracle is Oracle.DIFFERS:
+            return f"Pinocchio reads another robot ({finding.code}, line {finding.line}: {finding.message})"
+    return None
