@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from urdfkin.recursion.base import BaseMotion
     from urdfkin.reference import Reference
     from urdfkin.robot import NotVerifiedWarning, Robot
+    from urdfkin.validation.campaign import validate
     from urdfkin.verification.certificate import Certificate, VerificationError
 
 # Loaded when first asked for: `import urdfkin` needs no numpy, no Pinocchio and no compiler.
@@ -37,6 +38,7 @@ _HOMES = {
     "UrdfkinError": "urdfkin.errors",
     "VerificationError": "urdfkin.verification.certificate",
     "load": "urdfkin.loading",
+    "validate": "urdfkin.validation.campaign",
 }
 
 __all__ = [
@@ -54,6 +56,7 @@ __all__ = [
     "UrdfkinError",
     "VerificationError",
     "load",
+    "validate",
 ]
 
 

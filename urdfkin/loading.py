@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 
 from urdfkin.diagnostics import Finding, Oracle, Severity, UrdfError, UrdfWarning, check_text
@@ -40,6 +41,7 @@ def load(
     (8, [0.088, 0.0, 0.926])
     """
     text = read_source(source)
+    words, given_mimic = _words(text, mimic, root_joint), mimic
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     findings = check_text(text.data, file=text.label, mimic=mimic, root_joint=root_joint)
@@ -49,23 +51,28 @@ def load(
         for finding in findings:
             if finding.severity is Severity.WARNING:
                 warnings.warn(str(finding), UrdfWarning, stacklevel=2)
-    return _robot(text, findings, verify=verify, mimic=mimic, root_joint=root_joint)
-
-
-def _robot(
-    text: Text, findings: tuple[Finding, ...], *, verify: bool, mimic: bool, root_joint: str | None
-) -> Robot:
-    tree = read_tree(text.data, mimic=mimic, root_joint=root_joint)
     return Robot(
-        tree,
+        read_tree(text.data, mimic=mimic, root_joint=root_joint),
         text.data.decode("utf-8-sig"),
-        source=text.source,
+        source=words,
         verify=verify,
+        mimic=given_mimic,
+        root_joint=root_joint,
         findings=findings,
         unverifiable=_unverifiable(findings),
         base_frame=text.entry.base if text.entry else None,
         tip_frame=text.entry.tip if text.entry else None,
     )
+
+
+def _words(text: Text, mimic: bool | None, root_joint: str | None) -> str:
+    """What to write on a command line to get the same robot."""
+    words = [shlex.quote(text.source)]
+    if mimic is False:
+        words.append("--no-mimic")
+    if root_joint is not None:
+        words.append(f"--root-joint {root_joint}")
+    return " ".join(words)
 
 
 def _unverifiable(findings: tuple[Finding, ...]) -> str | None:

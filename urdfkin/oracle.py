@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ def version() -> str:
 class Oracle:
     """Pinocchio's answers for one robot, in urdfkin's layout of q, v and Jacobian columns.
 
-    Every method takes flat batches (n, nq), (n, nv) and a link of the tree by index.
+    Every method takes flat batches (n, nq), (n, nv) and frames by name, as `KinematicTree.frame_link` does.
 
     Args:
         text: The URDF, as Pinocchio is to read it.
@@ -87,19 +87,36 @@ class Oracle:
             self._local.data = self._model.createData()
         return self._local.data
 
-    def _frame(self, link: int) -> int:
-        return int(self._model.getFrameId(self._tree.links[link], self._pin.FrameType.BODY))
+    def _moving(self, q: FloatArray, base: BaseMotion | None) -> Iterator[tuple[int, FloatArray]]:
+        """Numbered configurations; none for a robot without rates.
+
+        Its Jacobians have no columns, and Pinocchio 4.1 kills the process when asked for one.
+        """
+        return enumerate(self.configurations(q, base) if self._model.nv else ())
+
+    def _frame(self, name: str) -> int:
+        """Pinocchio's index of a frame; it answers `nframes` for a name it does not know."""
+        types, tree = self._pin.FrameType, self._tree
+        link = tree.frame_link(name)
+        own, kind = tree.links[link], types.BODY
+        if link > 0 and name not in (own, f"link:{own}"):
+            joint = tree.joints[link - 1]
+            own, kind = joint.name, types.JOINT if joint.kind.nv else types.FIXED_JOINT
+        index = int(self._model.getFrameId(own, kind))
+        if index == self._model.nframes:
+            raise OracleError("Pinocchio has no such frame", where=tree.name, found=repr(name))
+        return index
 
     # -- quantities ----------------------------------------------------------------------------------
 
-    def placements(self, q: FloatArray, links: Sequence[int], base: BaseMotion | None = None) -> FloatArray:
-        """(n, links, 4, 4) T_world_frame: `updateFramePlacements`."""
+    def placements(self, q: FloatArray, frames: Sequence[str], base: BaseMotion | None = None) -> FloatArray:
+        """(n, frames, 4, 4) T_world_frame: `updateFramePlacements`."""
         pin, model, data = self._pin, self._model, self._data
-        frames = [self._frame(link) for link in links]
-        out = np.empty((len(q), len(frames), 4, 4))
+        ids = [self._frame(frame) for frame in frames]
+        out = np.empty((len(q), len(ids), 4, 4))
         for k, q_k in enumerate(self.configurations(q, base)):
             pin.forwardKinematics(model, data, q_k)
-            for f, frame in enumerate(frames):
+            for f, frame in enumerate(ids):
                 out[k, f] = pin.updateFramePlacement(model, data, frame).homogeneous
         return out
 
@@ -107,19 +124,19 @@ class Oracle:
         self,
         q: FloatArray,
         v: FloatArray,
-        links: Sequence[int],
+        frames: Sequence[str],
         references: Sequence[Reference],
         base: BaseMotion | None = None,
     ) -> FloatArray:
-        """(n, links, references, 6): `getFrameVelocity`."""
+        """(n, frames, references, 6): `getFrameVelocity`."""
         pin, model, data = self._pin, self._model, self._data
-        frames = [self._frame(link) for link in links]
+        ids = [self._frame(frame) for frame in frames]
         wanted = [self._references[reference] for reference in references]
-        out = np.empty((len(q), len(frames), len(wanted), 6))
+        out = np.empty((len(q), len(ids), len(wanted), 6))
         v_full = self.rates(v, base)
         for k, q_k in enumerate(self.configurations(q, base)):
             pin.forwardKinematics(model, data, q_k, v_full[k])
-            for f, frame in enumerate(frames):
+            for f, frame in enumerate(ids):
                 for r, reference in enumerate(wanted):
                     out[k, f, r] = pin.getFrameVelocity(model, data, frame, reference).vector
         return out
@@ -129,19 +146,19 @@ class Oracle:
         q: FloatArray,
         v: FloatArray,
         a: FloatArray,
-        links: Sequence[int],
+        frames: Sequence[str],
         references: Sequence[Reference],
         base: BaseMotion | None = None,
     ) -> FloatArray:
-        """(n, links, references, 6): `getFrameClassicalAcceleration`."""
+        """(n, frames, references, 6): `getFrameClassicalAcceleration`."""
         pin, model, data = self._pin, self._model, self._data
-        frames = [self._frame(link) for link in links]
+        ids = [self._frame(frame) for frame in frames]
         wanted = [self._references[reference] for reference in references]
-        out = np.empty((len(q), len(frames), len(wanted), 6))
+        out = np.empty((len(q), len(ids), len(wanted), 6))
         v_full, a_full = self.rates(v, base), self.second_rates(a, base)
         for k, q_k in enumerate(self.configurations(q, base)):
             pin.forwardKinematics(model, data, q_k, v_full[k], a_full[k])
-            for f, frame in enumerate(frames):
+            for f, frame in enumerate(ids):
                 for r, reference in enumerate(wanted):
                     out[k, f, r] = pin.getFrameClassicalAcceleration(model, data, frame, reference).vector
         return out
@@ -149,18 +166,18 @@ class Oracle:
     def jacobians(
         self,
         q: FloatArray,
-        links: Sequence[int],
+        frames: Sequence[str],
         references: Sequence[Reference],
         base: BaseMotion | None = None,
     ) -> FloatArray:
-        """(n, links, references, 6, nv): `computeJointJacobians`, then `getFrameJacobian`."""
+        """(n, frames, references, 6, nv): `computeJointJacobians`, then `getFrameJacobian`."""
         pin, model, data = self._pin, self._model, self._data
-        frames = [self._frame(link) for link in links]
+        ids = [self._frame(frame) for frame in frames]
         wanted = [self._references[reference] for reference in references]
-        full = np.empty((len(q), len(frames), len(wanted), 6, model.nv))
-        for k, q_k in enumerate(self.configurations(q, base)):
+        full = np.empty((len(q), len(ids), len(wanted), 6, model.nv))
+        for k, q_k in self._moving(q, base):
             pin.computeJointJacobians(model, data, q_k)
-            for f, frame in enumerate(frames):
+            for f, frame in enumerate(ids):
                 for r, reference in enumerate(wanted):
                     full[k, f, r] = pin.getFrameJacobian(model, data, frame, reference)
         return self._layout.couple(full)
@@ -171,7 +188,7 @@ class Oracle:
         wanted = [self._references[reference] for reference in references]
         joints = self._layout.joint_ids
         full = np.empty((len(q), len(joints), len(wanted), 6, model.nv))
-        for k, q_k in enumerate(self.configurations(q, None)):
+        for k, q_k in self._moving(q, None):
             pin.computeJointJacobians(model, data, q_k)
             for j, joint in enumerate(joints):
                 for r, reference in enumerate(wanted):
@@ -181,7 +198,7 @@ class Oracle:
     def screws(self, q: FloatArray) -> FloatArray:
         """(n, 6, rates): the whole `data.J` of `computeJointJacobians`, one column a rate, followers too."""
         out = np.empty((len(q), 6, len(self._layout.rate_columns)))
-        for k, q_k in enumerate(self.configurations(q, None)):
+        for k, q_k in self._moving(q, None):
             J = self._pin.computeJointJacobians(self._model, self._data, q_k)
             out[k] = J[:, self._layout.rate_columns]
         return out

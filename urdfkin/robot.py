@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from collections.abc import Sequence
 from typing import Any
@@ -43,9 +44,12 @@ class Robot:
     Attributes:
         tree: Links and joints.
         urdf: The URDF text that Pinocchio checks against.
-        source: What `load` was given, for messages and reproducing lines.
+        source: The words that name it on a command line, for reproducing lines.
         verify: Whether results are checked unless a call says otherwise.
+        mimic: As it was given to `load`.
+        root_joint: As it was given to `load`.
         findings: What there was to say about the URDF; no errors.
+        unverifiable: Why Pinocchio cannot check this robot; None if it can, as far as is known.
         base_frame: The catalogue's base for chains; for other robots the root link.
     """
 
@@ -56,6 +60,8 @@ class Robot:
         *,
         source: str,
         verify: bool = True,
+        mimic: bool | None = None,
+        root_joint: str | None = None,
         findings: tuple[Finding, ...] = (),
         unverifiable: str | None = None,
         base_frame: str | None = None,
@@ -65,10 +71,12 @@ class Robot:
         self.urdf = urdf
         self.source = source
         self.verify = verify
+        self.mimic = mimic
+        self.root_joint = root_joint
         self.findings = findings
         self.base_frame = base_frame or tree.links[0]
         self._tip_frame = tip_frame
-        self._unverifiable = unverifiable
+        self.unverifiable = unverifiable
         self._ledger = Ledger()
         self._plans: dict[tuple[int, ...], Plan] = {}
         self._oracles: dict[bool, Oracle] = {}
@@ -116,6 +124,12 @@ class Robot:
     def frame_names(self) -> tuple[str, ...]:
         """Every link and joint, each once, under Pinocchio's names."""
         return self.tree.frame_names
+
+    @property
+    def all_frames(self) -> tuple[str, ...]:
+        """Every link and every joint once, as `link:NAME` and `joint:NAME`: no name stands for two."""
+        links = tuple(f"link:{name}" for name in self.tree.links)
+        return links + tuple(f"joint:{joint.name}" for joint in self.tree.joints)
 
     @property
     def tip_frame(self) -> str:
@@ -175,7 +189,7 @@ class Robot:
         call = _Call(self, frame, _ALIGNED, base, q)
         result = evaluate.placements(call.plan, call.q, base=call.state, out=call.flat(out, 4, 4))[:, 0]
         if self._wants(verify, Quantity.PLACEMENT, call.n, base):
-            theirs = self._oracle(base).placements(call.q, call.links, call.flat_base)[:, 0]
+            theirs = self._oracle(base).placements(call.q, call.frames, call.flat_base)[:, 0]
             call.check(Quantity.PLACEMENT, result, theirs, bounds.placement_bound(call.size()))
         return call.shaped(result, out)
 
@@ -197,7 +211,7 @@ class Robot:
         )[:, 0]
         if self._wants(verify, Quantity.VELOCITY, call.n, base):
             theirs = self._oracle(base).velocities(
-                call.q, call.v, call.links, [call.reference], call.flat_base
+                call.q, call.v, call.frames, [call.reference], call.flat_base
             )[:, 0, 0]
             call.check(Quantity.VELOCITY, result, theirs, bounds.velocity_bound(call.size(), call.reference))
         return call.shaped(result, out)
@@ -221,7 +235,7 @@ class Robot:
             call.plan, call.q, call.reference, base=call.state, out=call.flat(out, 6, self.nv)
         )[:, 0]
         if self._wants(verify, Quantity.JACOBIAN, call.n, base):
-            theirs = self._oracle(base).jacobians(call.q, call.links, [call.reference], call.flat_base)[
+            theirs = self._oracle(base).jacobians(call.q, call.frames, [call.reference], call.flat_base)[
                 :, 0, 0
             ]
             bound = bounds.jacobian_bound(call.plan, call.size(), call.reference)
@@ -250,7 +264,7 @@ class Robot:
         )[:, 0]
         if self._wants(verify, Quantity.ACCELERATION, call.n, base):
             theirs = self._oracle(base).accelerations(
-                call.q, call.v, call.a, call.links, [call.reference], call.flat_base
+                call.q, call.v, call.a, call.frames, [call.reference], call.flat_base
             )[:, 0, 0]
             bound = bounds.acceleration_bound(call.size(), call.reference)
             call.check(Quantity.ACCELERATION, result, theirs, bound)
@@ -282,14 +296,14 @@ class Robot:
         if not (self.verify if verify is None else verify):
             self._ledger.unchecked(quantity, n, "verify=False was asked for")
             return False
-        if self._unverifiable is None:
+        if self.unverifiable is None:
             try:
                 self._oracle(base)
             except OracleError as error:
-                self._unverifiable = str(error)
-        if self._unverifiable is not None:
-            warnings.warn(f"not verified: {self._unverifiable}", NotVerifiedWarning, stacklevel=3)
-            self._ledger.unchecked(quantity, n, self._unverifiable)
+                self.unverifiable = str(error)
+        if self.unverifiable is not None:
+            warnings.warn(f"not verified: {self.unverifiable}", NotVerifiedWarning, stacklevel=3)
+            self._ledger.unchecked(quantity, n, self.unverifiable)
             return False
         return True
 
@@ -323,8 +337,8 @@ class _Call:
     ) -> None:
         self.robot, self.frame, self.base = robot, frame, base
         self.reference = Reference.of(reference)
-        self.links = (robot.tree.frame_link(frame),)
-        self.plan = robot.plan(self.links)
+        self.frames = (frame,)
+        self.plan = robot.plan((robot.tree.frame_link(frame),))
         given = [robot._checked(x, name) for x, name in ((q, "q"), (v, "v"), (a, "a")) if x is not None]
         self.shape = self._batch_shape(given)
         self.n = int(np.prod(self.shape))
@@ -401,7 +415,7 @@ class _Call:
         )
 
     def _replay(self, quantity: Quantity, k: int) -> str:
-        words = ["urdfkin", str(quantity), repr(self.robot.source), "--frame", self.frame]
+        words = ["urdfkin", str(quantity), self.robot.source, "--frame", shlex.quote(self.frame)]
         if quantity is not Quantity.PLACEMENT:
             words += ["--reference", self.reference.name.lower()]
         for name, array in zip("qva", (self.q, self.v, self.a)[: self.given], strict=False):

@@ -26,6 +26,7 @@ __all__ = [
     "Limit",
     "Mimic",
     "build_tree",
+    "freed",
     "frozen",
     "with_root_joint",
 ]
@@ -314,6 +315,11 @@ def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
     root = Joint("root_joint", kind, 0, np.eye(4), np.array([1.0, 0.0, 0.0]))
     moved = [replace(joint, parent=joint.parent + 1) for joint in tree.joints]
     return KinematicTree(tree.name, ("universe", *tree.links), (root, *moved))
+
+
+def freed(tree: KinematicTree) -> KinematicTree:
+    """The tree with every mimic joint free to move on its own."""
+    return KinematicTree(tree.name, tree.links, tuple(replace(joint, mimic=None) for joint in tree.joints))
 
 
 def build_tree(

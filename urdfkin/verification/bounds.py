@@ -7,21 +7,26 @@ A result is accepted when every number differs from Pinocchio's by at most
 *scale* is the size of the terms that the number is summed from, in its own unit (`magnitudes`): two
 computations that add the same terms in another order differ in proportion to the terms, not to their sum.
 
-*k* counts roundings. First order in eps, in the Euclidean norm, one computation:
+*k* counts roundings, to first order in eps, in the Euclidean norm. A joint multiplies the rotation so far
+by its constant rotation and by its own turn, so that a rotated vector is off by at most, for each joint:
 
-1. A joint multiplies the rotation so far by its constant rotation and by its own turn. A rounded product
-   of 3 by 3 rotations is off by at most 3 u sqrt(3) < 2.6 eps for each column (u = eps/2; a dot product of
-   three terms rounds three times), the turn's two-term products by 2 u sqrt(2) < 1.5 eps, sine and cosine
-   by 1 eps, the constant itself, read from angles, by 2.5 eps. A rotated vector is off by at most the sum:
-   ROTATION = 7.6 eps, rounded up to 8, for each joint passed. It does not grow faster than linearly,
-   because rotations do not stretch what was wrong before.
-2. Adding the joint's term to the sum, and its cross product, cost 2 u + 2 u = 2 eps of the scale at most;
-   these are covered by rounding 7.6 up and by counting one joint more than there is.
+| | urdfkin | Pinocchio |
+|---|---|---|
+| the product with the constant: three terms round three times, 3 u sqrt(3) (u = eps/2) | 2.6 | 2.6 |
+| the turn: two terms, 2 u sqrt(2), and its sine and cosine, 1 | 2.5 | 2.5 |
+| the constant as read from roll, pitch, yaw: products of sines; through a quaternion, doubled | 2.5 | 6.0 |
+| the axis: divided by its length; turned about by Rodrigues' formula where it is no coordinate axis | 0.5 | 2.0 |
+| | 8.1 | 13.1 |
 
-Two computations may err in opposite directions: ROUNDINGS = 16 for each joint and each *factor*. A
-quantity is multilinear in rotated vectors: a position has one in each term (R d), a velocity two (w and d),
-an acceleration three (w, w, d, or v z, w, d), a Jacobian's linear rows two (z and d); seeing it in the
-frame's own axes is one factor more, seeing it from the world's origin crosses it with p and is one more.
+Rotations do not stretch what was wrong before, so the error grows with the number of joints and no faster.
+Adding the joint's term to the sum and its cross product cost 2 eps at most on each side; counting one joint
+more than there is covers the frame's own offset and the first of these sums, and the rest is in rounding
+8.1 + 13.1 = 21.2 up to ROUNDINGS = 24. The two may err in opposite directions, hence the sum.
+
+A quantity is multilinear in rotated vectors, each a *factor* that may be off by as much: a position has one
+in each term (R d), a velocity two (w and d), an acceleration three (w, w, d, or v z, w, d), a Jacobian's
+linear rows two (z and d); seeing it in the frame's own axes is one factor more, seeing it from the world's
+origin crosses it with p and is one more.
 
 The bound is a worst case; rounding seldom conspires. What is measured is a fraction of an eps for each
 joint, and reports give the disagreement itself, in multiples of eps * scale, so that it can be compared
@@ -42,7 +47,7 @@ from urdfkin.verification.magnitudes import Magnitudes
 
 EPS = float(np.finfo(np.float64).eps)
 #: Roundings for each joint and each factor, both computations together; derived above.
-ROUNDINGS = 16.0
+ROUNDINGS = 24.0
 
 
 class Quantity(StrEnum):

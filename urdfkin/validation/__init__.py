@@ -1,0 +1,1 @@
+"""Validation: many samples, every quantity, every frame, every joint, held against Pinocchio."""

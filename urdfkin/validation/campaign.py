@@ -1,0 +1,182 @@
+"""`validate`: cut the work into chunks, run them here or in processes, add the tallies up.
+
+The chunks go through `Executor.map`-like submission only, so that any engine with the interface of
+`concurrent.futures` can run them.
+"""
+
+from __future__ import annotations
+
+import datetime
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+
+from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.oracle import OracleError
+from urdfkin.robot import Robot
+from urdfkin.sources import Source, read_source
+from urdfkin.validation.chunk import SPECIAL, Chunk, ChunkResult, Subject, chunks, run_chunk
+from urdfkin.validation.report import RobotReport, ValidationReport, Verdict
+from urdfkin.validation.tally import Key, Tally
+
+#: Called after each chunk with (chunks done, chunks in all, the robot's source).
+Progress = Callable[[int, int, str], None]
+
+
+def validate(
+    robots: Source | Robot | Sequence[Source | Robot],
+    *,
+    samples: int = 1000,
+    seed: int = 0,
+    jobs: int = 1,
+    mimic: bool | None = None,
+    root_joint: str | None = None,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> ValidationReport:
+    """Hold every quantity of every frame and joint against Pinocchio's, in all three references.
+
+    Args:
+        robots: One robot or several: anything `load` takes, or robots that were loaded.
+        samples: Random configurations within limits for each robot; the neutral one and the two ends of
+            the limits are added. Every eighth sample has rates a hundred times larger.
+        seed: The same seed gives the same numbers, whatever `jobs` and `executor` are.
+        jobs: Local processes.
+        mimic: As in `load`.
+        root_joint: As in `load`.
+        executor: Runs the chunks instead of local processes.
+        progress: Told after each chunk.
+
+    Returns:
+        The report. A robot that cannot be read or checked is reported, not raised; an interrupt ends the
+        run and keeps what had finished.
+
+    Raises:
+        InputError: a negative number of samples or no job.
+
+    >>> report = validate("ur5", samples=10)
+    >>> report.passed, report.robots[0].failed
+    (True, 0)
+    """
+    if samples < 0 or jobs < 1:
+        raise InputError("validate needs samples >= 0 and jobs >= 1", found=f"{samples} and {jobs}")
+    many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
+    subjects = [_subject(robot, mimic, root_joint) for robot in many]
+    started, begin = datetime.datetime.now(datetime.UTC), time.perf_counter()
+    run = _Run(subjects, samples, seed, progress)
+    try:
+        if executor is not None:
+            run.spread(executor)
+        elif jobs == 1:
+            run.here()
+        else:
+            context = multiprocessing.get_context("spawn")
+            with ProcessPoolExecutor(max_workers=jobs, mp_context=context) as pool:
+                run.spread(pool)
+    except KeyboardInterrupt:
+        run.interrupted = True
+    return ValidationReport(
+        robots=tuple(run.reports()),
+        samples=samples,
+        seed=seed,
+        started=started.isoformat(timespec="seconds"),
+        seconds=time.perf_counter() - begin,
+        interrupted=run.interrupted,
+    )
+
+
+def _subject(robot: Source | Robot, mimic: bool | None, root_joint: str | None) -> Subject:
+    if isinstance(robot, Robot):
+        return Subject.of(robot)
+    if isinstance(robot, os.PathLike):
+        return Subject(os.fspath(robot), mimic, root_joint)
+    if isinstance(robot, str | bytes):
+        return Subject(robot, mimic, root_joint)
+    text = read_source(robot)  # an open file is read once, here
+    return Subject(text.data, mimic, root_joint, text.source)
+
+
+class _Run:
+    """The state of a run: which chunks there are and what has come back."""
+
+    def __init__(
+        self, subjects: Sequence[Subject], samples: int, seed: int, progress: Progress | None
+    ) -> None:
+        self._subjects, self._samples, self._progress = subjects, samples, progress
+        self._work = [
+            (i, chunk) for i, subject in enumerate(subjects) for chunk in chunks(subject, samples, seed)
+        ]
+        self._results: dict[int, list[ChunkResult]] = {}
+        self._failures: dict[int, UrdfkinError] = {}
+        self._done = 0
+        self.interrupted = False
+
+    def here(self) -> None:
+        """One chunk after another, in this process."""
+        for i, chunk in self._work:
+            if i not in self._failures:
+                try:
+                    self._enter(i, run_chunk(chunk))
+                except UrdfkinError as error:
+                    self._failures[i] = error
+            self._tell(i)
+
+    def spread(self, executor: Executor) -> None:
+        """All chunks at once to an executor; results are taken in order, so that sums are the same."""
+        futures: list[tuple[int, Chunk, Future[ChunkResult]]] = [
+            (i, chunk, executor.submit(run_chunk, chunk)) for i, chunk in self._work
+        ]
+        try:
+            for i, _, future in futures:
+                try:
+                    self._enter(i, future.result())
+                except UrdfkinError as error:
+                    self._failures[i] = error
+                self._tell(i)
+        except BaseException:
+            for _, _, future in futures:
+                future.cancel()
+            raise
+
+    def _enter(self, i: int, result: ChunkResult) -> None:
+        self._results.setdefault(i, []).append(result)
+
+    def _tell(self, i: int) -> None:
+        self._done += 1
+        if self._progress is not None:
+            self._progress(self._done, len(self._work), self._subjects[i].label)
+
+    def reports(self) -> Iterable[RobotReport]:
+        """A report for each robot of which something is known."""
+        for i, subject in enumerate(self._subjects):
+            if i in self._failures:
+                yield _refused(subject, self._failures[i])
+            elif i in self._results:
+                yield _report(subject, self._results[i], self._samples)
+
+
+def _refused(subject: Subject, error: UrdfkinError) -> RobotReport:
+    verdict = Verdict.NOT_VERIFIED if isinstance(error, OracleError) else Verdict.BAD_INPUT
+    return RobotReport(subject.label, subject.label, verdict, str(error), (), (), {}, 0, 0.0)
+
+
+def _report(subject: Subject, results: Sequence[ChunkResult], samples: int) -> RobotReport:
+    tallies: dict[Key, Tally] = {}
+    for result in results:
+        for key, tally in result.tallies.items():
+            tallies[key] = tallies[key] + tally if key in tallies else tally
+    failed = any(tally.failed for tally in tallies.values())
+    first = results[0]
+    return RobotReport(
+        source=first.source,
+        name=first.name,
+        verdict=Verdict.DISAGREES if failed else Verdict.VERIFIED,
+        reason=None,
+        joints=first.joints,
+        frames=first.frames,
+        tallies=tallies,
+        samples=samples + SPECIAL,
+        seconds=sum(result.seconds for result in results),
+    )

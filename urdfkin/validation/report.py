@@ -1,0 +1,202 @@
+"""What a validation found, as data: for a person to read, for a program to act on, to be merged and kept.
+
+`ValidationReport.as_dict` is the JSON document; its layout is `SCHEMA` and changes only with its number.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib import metadata
+from typing import Any
+
+from urdfkin.validation.tally import Key, Tally, WorstCase
+from urdfkin.verification.bounds import Quantity
+
+#: Name and version of the JSON layout; documented in docs/validation.md.
+SCHEMA = "urdfkin-validation/1"
+
+
+class Verdict(StrEnum):
+    """What a robot's validation comes to."""
+
+    VERIFIED = "verified"
+    DISAGREES = "disagrees"
+    NOT_VERIFIED = "not verified"
+    BAD_INPUT = "bad input"
+
+
+@dataclass(frozen=True, slots=True)
+class RobotReport:
+    """One robot.
+
+    Attributes:
+        source: The words that name it on a command line.
+        name: The robot's name in the URDF.
+        verdict: What it comes to.
+        reason: Why it was not verified or could not be read; None otherwise.
+        joints: Moving joints, followers too.
+        frames: Names of the frames that were compared: every link and every joint.
+        tallies: What was compared.
+        samples: How many configurations.
+        seconds: Time spent computing and comparing.
+    """
+
+    source: str
+    name: str
+    verdict: Verdict
+    reason: str | None
+    joints: tuple[str, ...]
+    frames: tuple[str, ...]
+    tallies: dict[Key, Tally]
+    samples: int
+    seconds: float
+
+    @property
+    def results(self) -> int:
+        """How many results were compared."""
+        return sum(tally.results for tally in self.tallies.values())
+
+    @property
+    def failed(self) -> int:
+        """How many of them lie outside their bound."""
+        return sum(tally.failed for tally in self.tallies.values())
+
+    def of(self, quantity: Quantity) -> list[Tally]:
+        """The tallies of one quantity, one a reference."""
+        return [tally for (kind, _), tally in self.tallies.items() if kind is quantity]
+
+    def worst(self, quantity: Quantity) -> float | None:
+        """The largest disagreement of a quantity in eps * scale, None if it was not compared."""
+        return max((tally.worst for tally in self.of(quantity)), default=None)
+
+    def replay(self, key: Key) -> str | None:
+        """A command that computes a quantity's worst case again."""
+        quantity, reference = key
+        case = self.tallies[key].case
+        return None if case is None else replay(self.source, quantity, reference, case)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The robot's part of the JSON document."""
+        return {
+            "source": self.source,
+            "name": self.name,
+            "verdict": self.verdict.value,
+            "reason": self.reason,
+            "joints": list(self.joints),
+            "frames": list(self.frames),
+            "samples": self.samples,
+            "results": self.results,
+            "failed": self.failed,
+            "seconds": round(self.seconds, 3),
+            "checks": [self._check(key) for key in self.tallies],
+        }
+
+    def _check(self, key: Key) -> dict[str, Any]:
+        quantity, reference = key
+        tally = self.tallies[key]
+        case = tally.case
+        return {
+            "quantity": quantity.value,
+            "reference": reference or None,
+            "results": tally.results,
+            "failed": tally.failed,
+            "median": tally.percentile(50.0),
+            "p99": tally.percentile(99.0),
+            "worst": tally.worst,
+            "share_of_bound": tally.share,
+            "histogram": list(tally.histogram),
+            "worst_by_frame": list(tally.by_frame),
+            "worst_case": None
+            if case is None
+            else {
+                "sample": case.sample,
+                "frame": case.frame,
+                "disagreement": case.units,
+                "q": list(case.q),
+                "v": list(case.v),
+                "a": list(case.a),
+                "replay": self.replay(key),
+            },
+        }
+
+
+def replay(source: str, quantity: Quantity, reference: str, case: WorstCase) -> str:
+    """The command for one case; numbers are written so that they read back exactly."""
+    command = {Quantity.JOINT_JACOBIAN: "jacobian", Quantity.SCREWS: "jacobian"}.get(quantity, quantity.value)
+    words = ["urdfkin", command, source, "--frame", _quoted(case.frame)]
+    if reference:
+        words += ["--reference", reference]
+    given = {"placement": "q", "jacobian": "q", "velocity": "qv", "acceleration": "qva"}[command]
+    for letter in given:
+        words += [f"--{letter}", ",".join(repr(x) for x in getattr(case, letter)) or "neutral"]
+    return " ".join(words)
+
+
+def _quoted(frame: str) -> str:
+    import shlex  # noqa: PLC0415  only for the message
+
+    return shlex.quote(frame)
+
+
+@dataclass(frozen=True, slots=True)
+class ValidationReport:
+    """A whole run.
+
+    Attributes:
+        robots: One report a robot, in the order asked for.
+        samples: Random configurations for each robot.
+        seed: What they were drawn from.
+        started: When, ISO 8601, UTC.
+        seconds: Wall time.
+        interrupted: Whether the run was stopped; what had finished is kept.
+    """
+
+    robots: tuple[RobotReport, ...]
+    samples: int
+    seed: int
+    started: str
+    seconds: float
+    interrupted: bool = False
+
+    @property
+    def passed(self) -> bool:
+        """Whether every robot was verified and the run was finished."""
+        return not self.interrupted and all(robot.verdict is Verdict.VERIFIED for robot in self.robots)
+
+    @property
+    def exit_code(self) -> int:
+        """0 verified, 1 a disagreement or an unverified robot or an unfinished run, 2 a robot that cannot be read."""
+        verdicts = {robot.verdict for robot in self.robots}
+        if verdicts & {Verdict.DISAGREES, Verdict.NOT_VERIFIED} or self.interrupted:
+            return 1
+        return 2 if Verdict.BAD_INPUT in verdicts else 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """The JSON document."""
+        return {
+            "schema": SCHEMA,
+            "versions": versions(),
+            "started": self.started,
+            "seconds": round(self.seconds, 3),
+            "seed": self.seed,
+            "samples": self.samples,
+            "interrupted": self.interrupted,
+            "passed": self.passed,
+            "robots": [robot.as_dict() for robot in self.robots],
+        }
+
+
+def versions() -> dict[str, str]:
+    """What computed and what checked."""
+    packages: Sequence[str] = ("urdfkin", "pin", "numpy", "numba", "yourdfpy", "example-robot-data")
+    return {"python": platform.python_version()} | {package: _version(package) for package in packages}
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"

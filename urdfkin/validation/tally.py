@@ -1,0 +1,133 @@
+"""What a validation counts, so that it can be added up: over chunks, processes and machines.
+
+Tallies form a commutative monoid under `+` except for ties of the worst case, which the earlier sample
+wins; the sum does not depend on how the work was cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from urdfkin.tree import FloatArray
+from urdfkin.verification.bounds import Bound, Quantity, disagreement
+
+#: Edges of the histogram of disagreements, in eps * scale: ten bins a decade from 0.001 to 100,000.
+HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
+
+
+#: q, v and a of one sample.
+Inputs = tuple[list[float], list[float], list[float]]
+
+
+@dataclass(frozen=True, slots=True)
+class WorstCase:
+    """The sample with the largest share of its bound, with what is needed to compute it again."""
+
+    share: float
+    units: float
+    sample: int
+    frame: str
+    q: tuple[float, ...]
+    v: tuple[float, ...]
+    a: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """One quantity in one reference.
+
+    Attributes:
+        results: How many results were compared; each is a matrix or a six-vector.
+        failed: How many of them lie outside their bound.
+        worst: The largest disagreement, in eps * scale.
+        share: The largest share of a bound.
+        histogram: (82,) how many results disagree by how much: below the first of `HISTOGRAM_EDGES`,
+            between each two, above the last.
+        by_frame: The largest disagreement of each frame, in the robot's order.
+        case: Where the largest share was.
+    """
+
+    results: int
+    failed: int
+    worst: float
+    share: float
+    histogram: tuple[int, ...]
+    by_frame: tuple[float, ...]
+    case: WorstCase | None
+
+    def __add__(self, other: Tally) -> Tally:
+        first, second = self.case, other.case
+        if first is None or (second is not None and _before(second, first)):
+            first = second
+        return Tally(
+            self.results + other.results,
+            self.failed + other.failed,
+            max(self.worst, other.worst),
+            max(self.share, other.share),
+            tuple(a + b for a, b in zip(self.histogram, other.histogram, strict=True)),
+            tuple(max(a, b) for a, b in zip(self.by_frame, other.by_frame, strict=True)),
+            first,
+        )
+
+    def percentile(self, percent: float) -> float:
+        """The disagreement that `percent` of the results stay below, to a histogram bin (26 %)."""
+        counts = np.cumsum(self.histogram)
+        if not counts[-1]:
+            return 0.0
+        bin_ = int(np.searchsorted(counts, counts[-1] * percent / 100.0))
+        if bin_ == 0:
+            return 0.0
+        return float(min(HISTOGRAM_EDGES[min(bin_, len(HISTOGRAM_EDGES) - 1)], self.worst))
+
+
+def _before(case: WorstCase, other: WorstCase) -> bool:
+    return (case.share, -case.sample) > (other.share, -other.sample)
+
+
+def tally(
+    ours: FloatArray,
+    theirs: FloatArray,
+    bound: Bound,
+    frames: tuple[str, ...],
+    first_sample: int,
+    inputs: Sequence[Inputs],
+) -> Tally:
+    """Compare (n, frames, ...) results.
+
+    Args:
+        ours: Results.
+        theirs: Pinocchio's.
+        bound: Scale and k, broadcastable.
+        frames: A name for each frame.
+        first_sample: The number of the first of the n samples.
+        inputs: q, v and a of each sample, for the worst case.
+    """
+    units = disagreement(ours, theirs, bound)
+    share = units / bound.k
+    n, count = units.shape[:2]
+    if not units.size:
+        return Tally(n * count, 0, 0.0, 0.0, (n * count, *([0] * len(HISTOGRAM_EDGES))), (0.0,) * count, None)
+    units, share = (x.reshape(n, count, -1).max(axis=2) for x in (units, share))
+    k, f = divmod(int(share.argmax()), count)
+    q, v, a = inputs[k]
+    case = WorstCase(
+        float(share[k, f]), float(units[k, f]), first_sample + k, frames[f], tuple(q), tuple(v), tuple(a)
+    )
+    bins = np.searchsorted(HISTOGRAM_EDGES, units.ravel(), side="right")
+    histogram = np.bincount(bins, minlength=len(HISTOGRAM_EDGES) + 1)
+    return Tally(
+        results=n * count,
+        failed=int((share > 1.0).sum()),
+        worst=float(units.max()),
+        share=float(share.max()),
+        histogram=tuple(int(x) for x in histogram),
+        by_frame=tuple(float(x) for x in units.max(axis=0)),
+        case=case,
+    )
+
+
+#: What each tally of a robot is about: a quantity and the reference it was taken in.
+Key = tuple[Quantity, str]
