@@ -1,16 +1,12 @@
 """What both walks share: initial conditions, going on from saved state, frames fixed to a link.
 
 Each kernel works through a batch in blocks of `LANES` configurations; what is left over goes one by one,
-compiled with a single lane. Compiled code is kept on disk; the global interpreter lock is released.
+compiled with a single lane.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
-import numba
-from numba import types
-
+from urdfkin.recursion.compiling import INT, ROW, ROWS, SCRATCH, WHOLE, kernel
 from urdfkin.recursion.lanes import LANES, copy_rows, lane_function
 from urdfkin.recursion.steps import (
     FIXED_ROWS,
@@ -22,19 +18,10 @@ from urdfkin.recursion.steps import (
     turn_by_constant,
 )
 
-# Inputs may be read-only; a writable array converts without a copy. One signature, compiled once.
-WHOLE = types.Array(types.int64, 2, "C", readonly=True)
-ROWS = types.Array(types.float64, 2, "C", readonly=True)
-ROW = types.Array(types.float64, 1, "C", readonly=True)
-SCRATCH = types.Array(types.float64, 1, "C")
-INT = types.int64
-
-
-def kernel(*arguments: Any) -> Any:
-    """Decorator: compile for these argument types, keep the result on disk, release the lock."""
-    signature = types.void(*arguments)
-    return numba.njit([signature], fastmath={"contract"}, error_model="numpy", nogil=True, cache=True)
-
+__all__ = [
+    "COLUMN", "INT", "ROW", "ROWS", "SCRATCH", "SLOTS", "WHOLE",
+    "advance", "frame_state", "kernel", "scratch_rows", "start",
+]  # fmt: skip
 
 # After the rows of `steps`: a column of the Jacobian on its way out, then slots of saved state, then the
 # axis and origin of each column met so far.

@@ -168,7 +168,7 @@ class ValidationReport:
 
     @property
     def exit_code(self) -> int:
-        """0 verified, 1 a disagreement or an unverified robot or an unfinished run, 2 a robot that cannot be read."""
+        """0 verified, 1 disagreement, unverified or unfinished, 2 a robot that cannot be read."""
         verdicts = {robot.verdict for robot in self.robots}
         if verdicts & {Verdict.DISAGREES, Verdict.NOT_VERIFIED} or self.interrupted:
             return 1

@@ -15,7 +15,7 @@ by its constant rotation and by its own turn, so that a rotated vector is off by
 | the product with the constant: three terms round three times, 3 u sqrt(3) (u = eps/2) | 2.6 | 2.6 |
 | the turn: two terms, 2 u sqrt(2), and its sine and cosine, 1 | 2.5 | 2.5 |
 | the constant as read from roll, pitch, yaw: products of sines; through a quaternion, doubled | 2.5 | 6.0 |
-| the axis: divided by its length; turned about by Rodrigues' formula where it is no coordinate axis | 0.5 | 2.0 |
+| the axis: divided by its length; Rodrigues' formula where it is no coordinate axis | 0.5 | 2.0 |
 | | 8.1 | 13.1 |
 
 Rotations do not stretch what was wrong before, so the error grows with the number of joints and no faster.
