@@ -21,7 +21,10 @@ class UrdfkinError(Exception):
         where: File, line, frame, sample: whatever locates it; None when there is no place.
         found: The offending value, as the user wrote it.
         remedy: What to do.
+        is_disagreement: Whether it is urdfkin and Pinocchio that disagree, not the input that is wrong.
     """
+
+    is_disagreement = False
 
     def __init__(
         self, what: str, *, where: str | None = None, found: str | None = None, remedy: str | None = None

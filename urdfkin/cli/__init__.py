@@ -14,7 +14,15 @@ import click
 from urdfkin.errors import UrdfkinError
 
 #: Command name -> (module that holds `command`, one-line summary), in the order of the help page.
-COMMANDS: dict[str, tuple[str, str]] = {}
+COMMANDS: dict[str, tuple[str, str]] = {
+    "robots": ("urdfkin.cli.robots", "robots that can be called by a short name"),
+    "info": ("urdfkin.cli.info", "joints, limits, frames and coordinates of a robot"),
+    "placement": ("urdfkin.cli.placement", "pose of a frame"),
+    "velocity": ("urdfkin.cli.velocity", "velocity of a frame"),
+    "jacobian": ("urdfkin.cli.jacobian", "velocity Jacobian of a frame"),
+    "acceleration": ("urdfkin.cli.acceleration", "classical acceleration of a frame"),
+    "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
+}
 
 
 class LazyGroup(click.Group):
@@ -45,9 +53,12 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Entry point of the `urdfkin` command: exit 0 verified, 1 disagreement, 2 bad input or usage."""
+    """Entry point of the `urdfkin` command.
+
+    Exit 0: verified. 1: a disagreement. 2: bad input or usage. 3: computed, but Pinocchio did not check it.
+    """
     try:
         cli(standalone_mode=True)
     except UrdfkinError as error:
         click.echo(f"urdfkin: error: {error}", err=True)
-        sys.exit(2)
+        sys.exit(1 if error.is_disagreement else 2)

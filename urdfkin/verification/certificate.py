@@ -26,6 +26,8 @@ class VerificationError(UrdfkinError):
         reproduce: A line that computes the case again.
     """
 
+    is_disagreement = True
+
     def __init__(
         self,
         quantity: Quantity,

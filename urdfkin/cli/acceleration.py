@@ -1,0 +1,64 @@
+"""`urdfkin acceleration`: classical acceleration of a frame (eq. 7.129, 7.130)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from urdfkin.cli.arguments import (
+    a_option,
+    frame_option,
+    load_robot,
+    q_option,
+    read_inputs,
+    reference_option,
+    robot_argument,
+    seed_option,
+    v_option,
+    verify_option,
+)
+from urdfkin.cli.output import compiling, emit, exit_code, format_option, output_option
+
+EXAMPLE = "urdfkin acceleration panda --q random --v random --a random"
+
+
+@click.command(epilog=f"Example: {EXAMPLE}")
+@robot_argument
+@frame_option
+@reference_option
+@q_option
+@v_option
+@a_option
+@seed_option
+@verify_option
+@format_option
+@output_option
+@click.pass_context
+def command(
+    context: click.Context,
+    robot: str,
+    mimic: bool | None,
+    root_joint: str | None,
+    frame: str | None,
+    reference: str,
+    q: str,
+    v: str,
+    a: str,
+    seed: int,
+    verify: bool,
+    format_: str,
+    output: Path | None,
+) -> None:
+    """Classical acceleration of a frame (eq. 7.129, 7.130).
+
+    The second derivative of the origin's position in m/s^2 and the angular acceleration in
+    rad/s^2, for rates --v and their rates --a. Gravity is not in it.
+    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input.
+    """
+    loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    x = read_inputs(loaded, frame, seed, q, v, a)
+    with compiling():
+        result = loaded.acceleration(x.q, x.v, x.a, x.frame, reference)
+    emit(x, "acceleration", reference, result, format_, output)
+    context.exit(exit_code(loaded.certificate()))

@@ -1,0 +1,206 @@
+"""What several commands take: a robot, a frame, configurations and rates."""
+
+from __future__ import annotations
+
+import csv
+import math
+import shlex
+import sys
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from urdfkin.errors import InputError, SourceError
+
+if TYPE_CHECKING:
+    from urdfkin.robot import Robot
+    from urdfkin.tree import FloatArray
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+REFERENCES = ("local", "world", "local_world_aligned")
+#: How many samples `random` draws, unless `random:N` says otherwise.
+_RANDOM_SAMPLES = 1
+
+
+def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
+    """Several click decorators as one, in the order written."""
+
+    def decorate(function: _F) -> _F:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return decorate
+
+
+robot_argument = together(
+    click.argument("robot", metavar="ROBOT"),
+    click.option(
+        "--mimic/--no-mimic",
+        default=None,
+        help="Whether mimic joints follow their leaders (the URDF's meaning, the default).",
+    ),
+    click.option(
+        "--root-joint",
+        type=click.Choice(["floating", "planar"]),
+        help="Hang the root link from a moving joint.",
+    ),
+)
+
+frame_option = click.option("--frame", metavar="NAME", help="A link or joint. Default: the robot's tip.")
+reference_option = click.option(
+    "--reference",
+    type=click.Choice(REFERENCES, case_sensitive=False),
+    default="local_world_aligned",
+    show_default=True,
+    help="Pinocchio's reference frames.",
+)
+verify_option = click.option(
+    "--verify/--no-verify", default=True, help="Whether Pinocchio checks each result (the default)."
+)
+seed_option = click.option(
+    "--seed", type=int, default=0, show_default=True, help="What `random` is drawn from."
+)
+_VALUES = "Numbers '0,0.5,...', '@FILE.csv' for a batch, 'neutral', 'random' or 'random:N'."
+q_option = click.option("--q", metavar="VALUES", default="neutral", show_default=True, help=_VALUES)
+v_option = click.option("--v", metavar="VALUES", default="neutral", help="Rates, likewise; neutral is zero.")
+a_option = click.option("--a", metavar="VALUES", default="neutral", help="Rates of the rates, likewise.")
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """A robot and what to compute with."""
+
+    robot: Robot
+    frame: str
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+
+
+def load_robot(source: str, mimic: bool | None, root_joint: str | None, *, verify: bool = True) -> Robot:
+    """The robot of a command; its warnings go to stderr, one line each."""
+    from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        robot = load(source, mimic=mimic, root_joint=root_joint, verify=verify)
+    for warning in caught:
+        click.echo(str(warning.message), err=True)
+    return robot
+
+
+def read_inputs(
+    robot: Robot, frame: str | None, seed: int, q: str, v: str = "neutral", a: str = "neutral"
+) -> Inputs:
+    """Values from the command line; batches of one length, single ones repeated.
+
+    Raises:
+        InputError: a number that is none, a wrong count, batches of different lengths.
+        SourceError: a file that cannot be read.
+    """
+    import numpy as np  # noqa: PLC0415  keeps --help fast
+
+    rng = np.random.default_rng(seed)
+    rows = [_values(robot, letter, text, rng) for letter, text in (("q", q), ("v", v), ("a", a))]
+    lengths = {len(part) for part in rows if len(part) != 1}
+    if len(lengths) > 1:
+        raise InputError(
+            "batches of --q, --v and --a have different lengths",
+            found=", ".join(str(len(part)) for part in rows),
+        )
+    n = lengths.pop() if lengths else 1
+    full = [np.ascontiguousarray(np.broadcast_to(part, (n, part.shape[1]))) for part in rows]
+    for line in robot.limit_violations(full[0]):
+        click.echo(f"warning: {line}", err=True)
+    return Inputs(robot, frame or robot.tip_frame, *full)
+
+
+def _values(robot: Robot, letter: str, text: str, rng: Any) -> FloatArray:
+    """(n, width) for one option."""
+    import numpy as np  # noqa: PLC0415
+
+    from urdfkin.verification.sampling import sample  # noqa: PLC0415
+
+    names = robot.coordinate_names if letter == "q" else robot.rate_names
+    if text == "neutral":
+        return robot.neutral()[None] if letter == "q" else np.zeros((1, len(names)))
+    word, _, count = text.partition(":")
+    if word == "random":
+        n = _count(letter, count) if count else _RANDOM_SAMPLES
+        return sample(robot.tree, n, rng) if letter == "q" else rng.standard_normal((n, len(names)))
+    if text.startswith("@"):
+        return _read_csv(Path(text[1:]), letter, names)
+    return np.array([_numbers(text.split(","), f"--{letter}", names)])
+
+
+def _count(letter: str, text: str) -> int:
+    if not text.isdecimal():
+        raise InputError("random:N wants a whole number", where=f"--{letter}", found=repr(text))
+    return int(text)
+
+
+def _numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[float]:
+    values = []
+    for cell in cells:
+        try:
+            value = float(cell)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise InputError("not a finite number", where=where, found=repr(cell.strip()))
+        values.append(value)
+    if len(values) != len(names):
+        expected = ", ".join(names) if names else "none: nothing moves"
+        raise InputError(
+            f"{len(names)} numbers are expected ({expected})", where=where, found=str(len(values))
+        )
+    return values
+
+
+def _read_csv(path: Path, letter: str, names: Sequence[str]) -> FloatArray:
+    """A batch, one sample a line; a first line of names may put the columns in any order."""
+    import numpy as np  # noqa: PLC0415
+
+    try:
+        with sys.stdin if str(path) == "-" else path.open(newline="", encoding="utf-8-sig") as stream:
+            rows = [
+                (i, row) for i, row in enumerate(csv.reader(stream), 1) if row and not row[0].startswith("#")
+            ]
+    except (OSError, UnicodeDecodeError) as error:
+        raise SourceError("cannot be read", where=str(path), found=str(error)) from error
+    order = list(range(len(names)))
+    if rows and not _is_number(rows[0][1][0]):
+        header = [cell.strip() for cell in rows.pop(0)[1]]
+        if sorted(header) != sorted(names):
+            raise InputError(
+                f"the first line must name the columns of --{letter}: {', '.join(names)}",
+                where=f"{path}:1",
+                found=", ".join(header),
+            )
+        order = [header.index(name) for name in names]
+    if not rows:
+        raise InputError(
+            "no samples", where=str(path), remedy="one line a sample, numbers separated by commas"
+        )
+    return np.array([_numbers(row, f"{path}:{line}", names) for line, row in rows]).reshape(-1, len(names))[
+        :, order
+    ]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def command_line() -> str:
+    """The command as it was typed, for reports."""
+    return shlex.join(["urdfkin", *sys.argv[1:]])

@@ -1,0 +1,242 @@
+"""Results on the terminal or as json, csv and npy; files are written whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import sys
+import tempfile
+import threading
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from urdfkin.cli.arguments import Inputs
+from urdfkin.errors import SourceError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from urdfkin.tree import FloatArray
+    from urdfkin.verification.certificate import Certificate
+
+FORMATS = ("table", "json", "csv", "npy")
+SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
+#: How many samples of a batch a table shows.
+_SHOWN = 5
+#: Compiling says what it is doing when it takes longer than this, in seconds.
+_PATIENCE = 1.5
+
+format_option = click.option(
+    "--format",
+    "format_",
+    type=click.Choice(FORMATS),
+    default="table",
+    show_default=True,
+    help="Output format.",
+)
+output_option = click.option(
+    "--output", "-o", type=click.Path(path_type=Path), help="Write to a file instead of standard output."
+)
+
+
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Say what takes so long when the recursion is compiled on a machine for the first time."""
+    message = "urdfkin: compiling the recursion for this machine, once; some ten seconds ..."
+    timer = threading.Timer(_PATIENCE, click.echo, [message], {"err": True})
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def console(*, err: bool = False) -> Console:
+    """A terminal 80 columns wide or as wide as it is; colours only where there is a terminal."""
+    from rich.console import Console  # noqa: PLC0415  keeps --help fast
+
+    stream = sys.stderr if err else sys.stdout
+    width = None if stream.isatty() else int(os.environ.get("COLUMNS", "100"))
+    return Console(file=stream, width=width, highlight=False, soft_wrap=False, emoji=False, markup=False)
+
+
+def write_file(path: Path, data: bytes) -> None:
+    """Write beside the target and rename, so that a file is there whole or not at all.
+
+    Raises:
+        SourceError: no permission, no such folder, no room.
+    """
+    name = ""
+    try:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as stream:
+            name = stream.name
+            stream.write(data)
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(name).chmod(0o666 & ~mask)
+        Path(name).replace(path)
+    except OSError as error:
+        if name:
+            Path(name).unlink(missing_ok=True)
+        raise SourceError("cannot be written", where=str(path), found=error.strerror or str(error)) from error
+
+
+def emit(
+    inputs: Inputs,
+    quantity: str,
+    reference: str | None,
+    result: FloatArray,
+    format_: str,
+    output: Path | None,
+) -> None:
+    """Show or write (n, ...) results with their certificate."""
+    certificate = inputs.robot.certificate()
+    if format_ == "table" and output is None:
+        _print_table(inputs, quantity, reference, result, certificate)
+        return
+    data = {
+        "table": _as_csv, "csv": _as_csv, "json": _as_json, "npy": _as_npy,
+    }[format_](inputs, quantity, reference, result, certificate)  # fmt: skip
+    if output is not None:
+        write_file(output, data)
+    else:
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    if format_ != "json":
+        click.echo(check_line(certificate), err=True)
+
+
+def check_line(certificate: Certificate) -> str:
+    """One line: what was checked and how closely, or why not."""
+    by = f"Pinocchio {certificate.pinocchio}"
+    if certificate.not_verified:
+        return f"NOT VERIFIED by {by}: {'; '.join(certificate.not_verified)}"
+    parts = [
+        f"{line.checked} {line.quantity} result{'s' if line.checked != 1 else ''}, "
+        f"worst disagreement {line.worst:.2g} eps*scale ({line.share:.1%} of the bound)"
+        for line in certificate.lines
+    ]
+    return f"verified by {by}: {'; '.join(parts)}"
+
+
+def exit_code(certificate: Certificate) -> int:
+    """0 verified; 3 where results were handed out without a check."""
+    return 0 if certificate.verified else 3
+
+
+# -- machine formats ---------------------------------------------------------------------------------
+
+
+def _as_json(
+    inputs: Inputs, quantity: str, reference: str | None, result: FloatArray, certificate: Certificate
+) -> bytes:
+    document: dict[str, Any] = {
+        "robot": inputs.robot.name,
+        "source": inputs.robot.source,
+        "quantity": quantity,
+        "frame": inputs.frame,
+        "reference": reference,
+        "rows": list(SIX) if quantity != "placement" else None,
+        "coordinates": list(inputs.robot.coordinate_names),
+        "rates": list(inputs.robot.rate_names),
+        "q": inputs.q.tolist(),
+    }
+    if quantity in ("velocity", "acceleration"):
+        document["v"] = inputs.v.tolist()
+    if quantity == "acceleration":
+        document["a"] = inputs.a.tolist()
+    document["result"] = result.tolist()
+    document["verified"] = certificate.verified
+    document["check"] = check_line(certificate)
+    return (json.dumps(document, indent=2, allow_nan=False) + "\n").encode()
+
+
+def _as_csv(
+    inputs: Inputs, quantity: str, reference: str | None, result: FloatArray, certificate: Certificate
+) -> bytes:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    if quantity == "jacobian":
+        writer.writerow(["sample", "row", *inputs.robot.rate_names])
+        for k, J in enumerate(result):
+            writer.writerows(
+                [k, row, *map(repr, values)] for row, values in zip(SIX, J.tolist(), strict=True)
+            )
+    else:
+        names = SIX if quantity != "placement" else [f"T{i}{j}" for i in range(4) for j in range(4)]
+        writer.writerow(["sample", *names])
+        writer.writerows(
+            [k, *map(repr, row)] for k, row in enumerate(result.reshape(len(result), -1).tolist())
+        )
+    return stream.getvalue().encode()
+
+
+def _as_npy(
+    inputs: Inputs, quantity: str, reference: str | None, result: FloatArray, certificate: Certificate
+) -> bytes:
+    import numpy as np  # noqa: PLC0415
+
+    stream = io.BytesIO()
+    np.save(stream, result)
+    return stream.getvalue()
+
+
+# -- tables ------------------------------------------------------------------------------------------
+
+
+def _print_table(
+    inputs: Inputs, quantity: str, reference: str | None, result: FloatArray, certificate: Certificate
+) -> None:
+    out = console()
+    where = f", {reference}" if reference else ""
+    out.print(f"{inputs.robot.name}: {quantity} of {inputs.frame}{where}", style="bold")
+    for k, value in enumerate(result[:_SHOWN]):
+        if len(result) > 1:
+            out.print(f"sample {k}")
+        out.print(_table(inputs, quantity, value))
+    if len(result) > _SHOWN:
+        out.print(f"... and {len(result) - _SHOWN} more samples: --format csv, json or npy has them all")
+    out.print(check_line(certificate), style="green" if certificate.verified else "bold yellow")
+
+
+def _table(inputs: Inputs, quantity: str, value: FloatArray) -> Table:
+    if quantity == "jacobian":
+        return make_table(["joint", *SIX], zip(inputs.robot.rate_names, *value.tolist(), strict=True))
+    if quantity == "placement":
+        return make_table(
+            ["axis of the world", "x of frame", "y of frame", "z of frame", "position [m]"],
+            ((axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)),
+        )
+    linear, angular = ("m/s", "rad/s") if quantity == "velocity" else ("m/s^2", "rad/s^2")
+    rows = zip((f"linear [{linear}]", f"angular [{angular}]"), value.reshape(2, 3).tolist(), strict=True)
+    return make_table(["", "x", "y", "z"], ((name, *row) for name, row in rows))
+
+
+def make_table(columns: Sequence[str], rows: Iterable[Sequence[str | float]], *, words: int = 1) -> Table:
+    """A plain table: the first `words` columns left, the others right, numbers at six digits.
+
+    What is below rounding of the table's largest number is shown as 0: full precision is for machines.
+    """
+    from rich import box  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i < words else "right", overflow="fold")
+    cells = [list(row) for row in rows]
+    largest = max((abs(cell) for row in cells for cell in row if not isinstance(cell, str)), default=0.0)
+    for row in cells:
+        table.add_row(*(cell if isinstance(cell, str) else _number(cell, 1e-15 * largest) for cell in row))
+    return table
+
+
+def _number(value: float, noise: float) -> str:
+    return "0" if abs(value) <= noise else f"{value:.6g}"

@@ -1,0 +1,52 @@
+"""`urdfkin robots`: the catalogue."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import click
+
+from urdfkin.catalogue import Entry, catalogue
+
+EXAMPLE = "urdfkin robots --family arm"
+
+
+@click.command(epilog=f"Example: {EXAMPLE}")
+@click.option("--family", metavar="NAME", help="Only arms, hands, humanoids, quadrupeds, ...")
+@click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
+def command(family: str | None, format_: str) -> None:
+    """Robots that can be called by a short name.
+
+    The URDF files of example-robot-data and urdfkin's own. A limb's base and tip are the defaults of
+    commands that take frames; the first limb's tip is the default --frame.
+    """
+    entries = [entry for entry in catalogue().values() if family in (None, entry.family)]
+    if not entries:
+        families = sorted({entry.family for entry in catalogue().values()})
+        raise click.UsageError(f"no robot of family {family!r}; there are: {', '.join(families)}")
+    if format_ == "json":
+        json.dump([_as_dict(entry) for entry in entries], sys.stdout, indent=2)
+        click.echo()
+        return
+    from urdfkin.cli.output import console, make_table  # noqa: PLC0415  json needs no tables
+
+    rows = ((entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries)
+    out = console()
+    out.print(make_table(["name", "family", "base", "tip"], rows, words=4))
+    out.print(f"{len(entries)} robots")
+    for entry in entries:
+        if entry.reason:
+            out.print(f"{entry.name}: mimic joints are off: {entry.reason}")
+
+
+def _as_dict(entry: Entry) -> dict[str, object]:
+    return {
+        "name": entry.name,
+        "family": entry.family,
+        "path": str(entry.path),
+        "limbs": {limb: list(ends) for limb, ends in entry.limbs.items()},
+        "mimic": entry.mimic,
+        "reason": entry.reason,
+        "own": entry.own,
+    }

@@ -1,0 +1,141 @@
+"""`urdfkin validate`: every quantity of every frame against Pinocchio."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from urdfkin.catalogue import examples
+from urdfkin.cli.output import compiling, console, make_table, write_file
+
+if TYPE_CHECKING:
+    from urdfkin.validation.campaign import Progress
+    from urdfkin.validation.report import RobotReport, ValidationReport
+
+EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
+
+
+@click.command(epilog=f"Example: {EXAMPLE}")
+@click.argument("robots", nargs=-1, metavar="[ROBOT]...")
+@click.option("--all", "all_", is_flag=True, help="Every robot of example-robot-data in the catalogue.")
+@click.option("--samples", type=click.IntRange(0), default=1000, show_default=True, help="For each robot.")
+@click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same numbers.")
+@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Local processes.")
+@click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow (the default).")
+@click.option("--root-joint", type=click.Choice(["floating", "planar"]), help="Hang the root from a joint.")
+@click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as data.")
+@click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case.")
+@click.pass_context
+def command(
+    context: click.Context,
+    robots: tuple[str, ...],
+    all_: bool,
+    samples: int,
+    seed: int,
+    jobs: int,
+    mimic: bool | None,
+    root_joint: str | None,
+    json_: Path | None,
+    cases: bool,
+) -> None:
+    """Compare every quantity, frame, joint and reference with Pinocchio's, on many samples.
+
+    Configurations are drawn within limits; the neutral one and the ends of the limits are added, and every
+    eighth sample has rates a hundred times larger. Disagreement is given in multiples of eps * scale: 1 to
+    10 is what rounding gives. Exit 0: verified. 1: a disagreement. 2: a robot that cannot be read.
+    """
+    if bool(robots) == all_:
+        raise click.UsageError("name robots, or say --all for the whole catalogue")
+    from urdfkin.validation.campaign import validate  # noqa: PLC0415  keeps --help fast
+
+    if json_ is not None:
+        write_file(json_, b"")  # fail before the work, not after it
+    with compiling(), _progress() as progress:
+        report = validate(
+            list(robots or examples()),
+            samples=samples,
+            seed=seed,
+            jobs=jobs,
+            mimic=mimic,
+            root_joint=root_joint,
+            progress=progress,
+        )
+    if json_ is not None:
+        write_file(json_, (json.dumps(report.as_dict(), allow_nan=False) + "\n").encode())
+    _print(report, cases=cases)
+    context.exit(report.exit_code)
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
+    """A bar on stderr where that is a terminal, nothing in a pipe."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn  # noqa: PLC0415
+
+    screen = console(err=True)
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
+    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda done, total, label: bar.update(task, completed=done, total=total, description=label)
+
+
+def _print(report: ValidationReport, *, cases: bool) -> None:
+    from urdfkin.validation.report import Verdict  # noqa: PLC0415
+    from urdfkin.verification.bounds import Quantity  # noqa: PLC0415
+
+    quantities = list(Quantity)
+    out = console()
+    out.print("worst disagreement with Pinocchio in eps*scale, for each quantity", style="bold")
+    columns = ["robot", "joints", "frames", "results", *_SHORT.values(), "verdict"]
+    rows = (
+        [*_counts(robot), *(_number(robot.worst(q)) for q in quantities), robot.verdict.value]
+        for robot in report.robots
+    )
+    out.print(make_table(columns, rows))
+    for robot in report.robots:
+        if robot.reason:
+            out.print(f"{robot.source}: {robot.verdict.value}: {robot.reason}")
+        if robot.verdict is Verdict.DISAGREES or cases:
+            _print_cases(robot, cases=cases)
+    results = sum(robot.results for robot in report.robots)
+    failed = sum(robot.failed for robot in report.robots)
+    state = "interrupted: " if report.interrupted else ""
+    out.print(
+        f"{state}{len(report.robots)} robots, {results:,} results compared, {failed:,} outside their bound,"
+        f" {report.seconds:.1f} s, seed {report.seed}",
+        style="bold green" if report.passed else "bold red",
+    )
+
+
+#: Column heads short enough for 100 columns.
+_SHORT = {
+    "placement": "place",
+    "velocity": "vel",
+    "jacobian": "J frame",
+    "acceleration": "acc",
+    "joint jacobian": "J joint",
+    "screws": "data.J",
+}
+
+
+def _counts(robot: RobotReport) -> list[str]:
+    return [robot.source, str(len(robot.joints)), str(len(robot.frames)), f"{robot.results:,}"]
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}" if value < 1000 else f"{value:.2g}"
+
+
+def _print_cases(robot: RobotReport, *, cases: bool) -> None:
+    for key, tally in robot.tallies.items():
+        if tally.case is not None and (cases or tally.failed):
+            quantity, reference = key
+            click.echo(
+                f"  {quantity} {reference}: {tally.failed} of {tally.results} outside the bound,"
+                f" worst {tally.worst:.3g} eps*scale, {tally.share:.1%} of the bound"
+            )
+            click.echo(f"    {robot.replay(key)}")
