@@ -1,13 +1,11 @@
 """Moving points and frames against positions written down at 60 digits and differentiated there."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.high_precision import (
-    about,
     angular_acceleration,
     angular_velocity,
     array,
@@ -16,6 +14,7 @@ from tests.high_precision import (
     rate,
     second_rate,
 )
+from tests.moving import ORIENTATIONS, ORIGINS, T, frame, point
 from tests.rotation.strategies import ROUNDING
 from urdfkin.errors import InputError
 from urdfkin.motion import (
@@ -29,36 +28,6 @@ from urdfkin.motion import (
     point_position,
     point_velocity,
 )
-
-T = 0.7
-
-ORIENTATIONS: tuple[Callable[[Any], Any], ...] = (
-    lambda t: about(column(1, 2, 3), mp.sin(t)) * about(column(-1, 0, 2), t * t),
-    lambda t: about(column(0, 1, -1), mp.exp(t) / 2),
-    lambda t: about(column(2, 0, 1), 3 * t) * about(column(0, 1, 0), mp.cos(t)),
-)
-ORIGINS: tuple[Callable[[Any], Any], ...] = (
-    lambda t: column(mp.cos(t), t**3, 1 + t),
-    lambda t: column(t, 2 * mp.sin(3 * t), t * t),
-    lambda t: column(0, mp.exp(-t), mp.mpf(1) / 3),
-)
-
-
-def point(t: Any) -> Any:
-    """A point on its way through the last frame."""
-    return column(mp.sin(5 * t), t * t, 1 - t)
-
-
-def frame(i: int) -> MovingFrame:
-    R, d = ORIENTATIONS[i], ORIGINS[i]
-    return MovingFrame(
-        array(R(mp.mpf(T))),
-        array(d(mp.mpf(T))),
-        array(angular_velocity(R, T)),
-        array(rate(d, T)),
-        array(angular_acceleration(R, T)),
-        array(second_rate(d, T)),
-    )
 
 
 def test_a_moving_point_in_a_moving_frame_has_the_derivatives_of_its_position() -> None:

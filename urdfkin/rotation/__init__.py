@@ -5,6 +5,7 @@ Section 7.2 of the text, equations 7.11 to 7.57. Every function takes any leadin
 
 from urdfkin.rotation.aligning import axis_aligning
 from urdfkin.rotation.axis_angle import (
+    angular_velocity_about,
     axis_angle_of,
     circular_velocity,
     exp_rotation,
@@ -40,6 +41,7 @@ from urdfkin.rotation.skew import rotate_skew, skew, unskew
 __all__ = [
     "SEQUENCES",
     "add_angular_velocities",
+    "angular_velocity_about",
     "angular_velocity_from_euler_rates",
     "angular_velocity_from_quaternion_rates",
     "angular_velocity_of",
