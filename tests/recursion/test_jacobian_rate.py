@@ -4,51 +4,21 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from tests.odd_tree import odd_tree, pose, state
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.evaluate import accelerations, jacobian_rates, jacobians, velocities
 from urdfkin.recursion.plan import make_plan
 from urdfkin.reference import Reference
 from urdfkin.rotation import exp_rotation, multiply, quaternion_of, rotation_of, skew
 from urdfkin.rotation.arrays import FloatArray
-from urdfkin.tree import Joint, JointKind, KinematicTree, Mimic, build_tree
+from urdfkin.tree import JointKind, KinematicTree
 
 EPS = np.finfo(np.float64).eps
 
 
-def pose(generator: np.random.Generator) -> FloatArray:
-    T = np.eye(4)
-    T[:3, :3] = exp_rotation(generator.normal(size=3))
-    T[:3, 3] = generator.uniform(-0.5, 0.5, 3)
-    return T
-
-
 @pytest.fixture(scope="module")
 def odd() -> KinematicTree:
-    """Every kind of joint, a branch, a fixed joint in the middle and a follower, all askew."""
-    generator = np.random.default_rng(7)
-
-    def joint(name: str, kind: JointKind, mimic: Mimic | None = None) -> Joint:
-        axis = generator.normal(size=3)
-        return Joint(name, kind, 0, pose(generator), axis / np.linalg.norm(axis), mimic=mimic)
-
-    rows = [
-        (joint("free", JointKind.FLOATING), "base", "body"),
-        (joint("arm", JointKind.REVOLUTE), "body", "upper"),
-        (joint("slide", JointKind.PRISMATIC), "upper", "lower"),
-        (joint("bolt", JointKind.FIXED), "lower", "plate"),
-        (joint("follower", JointKind.REVOLUTE, Mimic("arm", -0.7, 0.2)), "plate", "wrist"),
-        (joint("table", JointKind.PLANAR), "body", "cart"),
-        (joint("wheel", JointKind.CONTINUOUS), "cart", "tyre"),
-    ]
-    return build_tree("odd", "base", rows)
-
-
-def state(tree: KinematicTree, n: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    generator = np.random.default_rng(seed)
-    q = generator.uniform(-2.0, 2.0, (n, tree.nq))
-    at = tree.q_index[tree.joint_index("free")] + 3
-    q[:, at : at + 4] = quaternion_of(exp_rotation(generator.normal(size=(n, 3))))
-    return q, generator.normal(size=(n, tree.nv)), generator.normal(size=(n, tree.nv))
+    return odd_tree()
 
 
 def moved(tree: KinematicTree, q: FloatArray, v: FloatArray, t: float) -> FloatArray:
