@@ -62,6 +62,11 @@ class Call:
         return np.ascontiguousarray(np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width))
 
     @property
+    def results(self) -> int:
+        """How many results the call hands out."""
+        return self.n * len(self.links)
+
+    @property
     def flat_base(self) -> BaseMotion | None:
         """The base with one flat batch axis, for the oracle."""
         if self.base is None or not self.base.batch_shape:

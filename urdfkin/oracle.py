@@ -88,7 +88,10 @@ class Oracle:
         return self._local.data
 
     def _frame(self, link: int) -> int:
-        return int(self._model.getFrameId(self._tree.links[link], self._pin.FrameType.BODY))
+        name = self._tree.links[link]
+        if link == 0 and name == "universe":  # Pinocchio's own root, which is no body
+            return 0
+        return int(self._model.getFrameId(name, self._pin.FrameType.BODY))
 
     # -- quantities ----------------------------------------------------------------------------------
 
@@ -163,6 +166,43 @@ class Oracle:
             for f, frame in enumerate(frames):
                 for r, reference in enumerate(wanted):
                     full[k, f, r] = pin.getFrameJacobian(model, data, frame, reference)
+        return self._layout.couple(full)
+
+    def jacobian_rates(
+        self,
+        q: FloatArray,
+        v: FloatArray,
+        links: Sequence[int],
+        references: Sequence[Reference],
+        base: BaseMotion | None = None,
+    ) -> FloatArray:
+        """(n, links, references, 6, nv): `getFrameJacobianTimeVariation`."""
+        pin, model, data = self._pin, self._model, self._data
+        frames = [self._frame(link) for link in links]
+        wanted = [self._references[reference] for reference in references]
+        full = np.empty((len(q), len(frames), len(wanted), 6, model.nv))
+        v_full = self.rates(v, base)
+        for k, q_k in enumerate(self.configurations(q, base)):
+            pin.computeJointJacobiansTimeVariation(model, data, q_k, v_full[k])
+            for f, frame in enumerate(frames):
+                for r, reference in enumerate(wanted):
+                    full[k, f, r] = pin.getFrameJacobianTimeVariation(model, data, frame, reference)
+        return self._layout.couple(full)
+
+    def joint_jacobian_rates(
+        self, q: FloatArray, v: FloatArray, references: Sequence[Reference]
+    ) -> FloatArray:
+        """(n, joints, references, 6, nv): `getJointJacobianTimeVariation` of every moving joint."""
+        pin, model, data = self._pin, self._model, self._data
+        wanted = [self._references[reference] for reference in references]
+        joints = self._layout.joint_ids
+        full = np.empty((len(q), len(joints), len(wanted), 6, model.nv))
+        v_full = self.rates(v)
+        for k, q_k in enumerate(self.configurations(q, None)):
+            pin.computeJointJacobiansTimeVariation(model, data, q_k, v_full[k])
+            for j, joint in enumerate(joints):
+                for r, reference in enumerate(wanted):
+                    full[k, j, r] = pin.getJointJacobianTimeVariation(model, data, joint, reference)
         return self._layout.couple(full)
 
     def joint_jacobians(self, q: FloatArray, references: Sequence[Reference]) -> FloatArray:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from urdfkin import configuration
 from urdfkin.call import Call
 from urdfkin.errors import InputError
+from urdfkin.manipulator import Manipulator
 from urdfkin.oracle import Oracle, OracleError, version
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import BaseMotion
@@ -33,7 +34,7 @@ class NotVerifiedWarning(UserWarning):
     """Results are handed out that Pinocchio could not check; the message says why."""
 
 
-class Robot:
+class Robot(Manipulator):
     """A robot that was loaded; make one with `urdfkin.load`.
 
     Configurations `q` are (..., nq), rates `v` and `a` (..., nv), with any leading batch shape; the three
@@ -96,6 +97,11 @@ class Robot:
     def joint_names(self) -> tuple[str, ...]:
         """Moving joints in Pinocchio's order, followers too."""
         return tuple(joint.name for joint in self.tree.joints if joint.kind.nv)
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Every link, root first, in the order in which all frames are handed out."""
+        return self.tree.links
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -267,13 +273,14 @@ class Robot:
         return plan
 
     def oracle(self, base: BaseMotion | None) -> Oracle:
+        """Pinocchio's model of the robot, made once; on a free-flyer if the base moves."""
         moving = base is not None
         if moving not in self._oracles:
             self._oracles[moving] = Oracle(self.urdf, self.tree, moving_base=moving)
         return self._oracles[moving]
 
     def wants(self, verify: bool | None, quantity: Quantity, n: int, base: BaseMotion | None) -> bool:
-        """Whether to check; if not, the ledger is told why."""
+        """Whether to check `n` results; if not, the ledger is told why."""
         if not (self.verify if verify is None else verify):
             self.ledger.unchecked(quantity, n, "verify=False was asked for")
             return False
