@@ -100,7 +100,10 @@ def test_7_70_and_7_71_recursively_it_is_that_of_the_link_before_and_the_joints_
 def test_7_72_the_axis_turns_with_the_link_before_and_the_normal_with_the_link(i: int) -> None:
     row = ELBOW.rows[i - 1]
     along, normal = float(row.d) * ELBOW.axis(i), float(row.a) * ELBOW.x(i)
-    assert close(np.cross(ELBOW.w(i - 1), along) + np.cross(ELBOW.w(i), normal), ELBOW.between_rate(i))
+    parts = np.cross(ELBOW.w(i - 1), along) + np.cross(ELBOW.w(i), normal)
+    assert close(parts, ELBOW.between_rate(i))
+    whole = interorigin_velocity(ELBOW.w(i), along + normal, ELBOW.axis(i), ELBOW.v[i - 1], turns=True)
+    assert close(whole, parts)
 
 
 @pytest.mark.parametrize("i", range(1, 7))

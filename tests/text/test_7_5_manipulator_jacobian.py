@@ -36,7 +36,8 @@ def pose(moving: Motion, t: Any) -> Any:
 def derivative_by_joint(j: int) -> FloatArray:
     """Column j of the derivative of f: the rates of x with joint j alone moving, by its rate."""
     alone = only(MOVING, j)
-    return array(rate(lambda t: pose(alone, t), 0.0)) / alone.v[j - 1]
+    slope: FloatArray = array(rate(lambda t: pose(alone, t), 0.0)) / alone.v[j - 1]
+    return slope
 
 
 def velocity() -> FloatArray:
