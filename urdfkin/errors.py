@@ -81,3 +81,27 @@ class UnknownNameError(UrdfkinError, LookupError):
 
 class SourceError(UrdfkinError, OSError):
     """A file that cannot be read or written."""
+
+
+class RepresentationSingularityError(InputError):
+    """Angles at which an orientation's rates cannot be had: the text's representational singularity.
+
+    Nothing is wrong with the motion, only with its description (7.56).
+
+    Attributes:
+        sequence: The Euler sequence.
+        distance: How far the middle angle is from the singularity, radians.
+        sample: Index of the worst member of the batch, () for a single one.
+    """
+
+    def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:
+        super().__init__(
+            f"the Euler angles {sequence} are at their representational singularity: "
+            "some angular velocities have no rates there",
+            where=f"sample {list(sample)}" if sample else None,
+            found=f"a middle angle {distance:.3g} rad from it",
+            remedy="describe the orientation by another sequence or by a quaternion",
+        )
+        self.sequence = sequence
+        self.distance = distance
+        self.sample = sample

@@ -37,8 +37,9 @@ def load(
         UnknownNameError: no file and no robot of that name; the nearest names are offered.
 
     >>> robot = load("panda")
-    >>> robot.nq, robot.placement(robot.neutral(), "panda_hand")[:3, 3].round(4).tolist()
-    (8, [0.088, 0.0, 0.926])
+    >>> height = robot.placement(robot.neutral(), "panda_hand")[2, 3]
+    >>> robot.nq, round(float(height), 4)
+    (8, 0.926)
     """
     text = read_source(source)
     words, given_mimic = _words(text, mimic, root_joint), mimic

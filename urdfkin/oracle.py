@@ -99,6 +99,8 @@ class Oracle:
         types, tree = self._pin.FrameType, self._tree
         link = tree.frame_link(name)
         own, kind = tree.links[link], types.BODY
+        if link == 0 and own == "universe":  # Pinocchio's own root, which is no body
+            return 0
         if link > 0 and name not in (own, f"link:{own}"):
             joint = tree.joints[link - 1]
             own, kind = joint.name, types.JOINT if joint.kind.nv else types.FIXED_JOINT
@@ -180,6 +182,43 @@ class Oracle:
             for f, frame in enumerate(ids):
                 for r, reference in enumerate(wanted):
                     full[k, f, r] = pin.getFrameJacobian(model, data, frame, reference)
+        return self._layout.couple(full)
+
+    def jacobian_rates(
+        self,
+        q: FloatArray,
+        v: FloatArray,
+        frames: Sequence[str],
+        references: Sequence[Reference],
+        base: BaseMotion | None = None,
+    ) -> FloatArray:
+        """(n, frames, references, 6, nv): `getFrameJacobianTimeVariation`."""
+        pin, model, data = self._pin, self._model, self._data
+        ids = [self._frame(frame) for frame in frames]
+        wanted = [self._references[reference] for reference in references]
+        full = np.empty((len(q), len(ids), len(wanted), 6, model.nv))
+        v_full = self.rates(v, base)
+        for k, q_k in self._moving(q, base):
+            pin.computeJointJacobiansTimeVariation(model, data, q_k, v_full[k])
+            for f, frame in enumerate(ids):
+                for r, reference in enumerate(wanted):
+                    full[k, f, r] = pin.getFrameJacobianTimeVariation(model, data, frame, reference)
+        return self._layout.couple(full)
+
+    def joint_jacobian_rates(
+        self, q: FloatArray, v: FloatArray, references: Sequence[Reference]
+    ) -> FloatArray:
+        """(n, joints, references, 6, nv): `getJointJacobianTimeVariation` of every moving joint."""
+        pin, model, data = self._pin, self._model, self._data
+        wanted = [self._references[reference] for reference in references]
+        joints = self._layout.joint_ids
+        full = np.empty((len(q), len(joints), len(wanted), 6, model.nv))
+        v_full = self.rates(v)
+        for k, q_k in enumerate(self.configurations(q, None)):
+            pin.computeJointJacobiansTimeVariation(model, data, q_k, v_full[k])
+            for j, joint in enumerate(joints):
+                for r, reference in enumerate(wanted):
+                    full[k, j, r] = pin.getJointJacobianTimeVariation(model, data, joint, reference)
         return self._layout.couple(full)
 
     def joint_jacobians(self, q: FloatArray, references: Sequence[Reference]) -> FloatArray:

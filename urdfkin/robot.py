@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import shlex
 import warnings
 from collections.abc import Sequence
 from typing import Any
@@ -14,18 +13,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin import configuration
+from urdfkin.call import Call
 from urdfkin.diagnostics import Finding
 from urdfkin.errors import InputError
+from urdfkin.manipulator import Manipulator
 from urdfkin.oracle import Oracle, OracleError, version
 from urdfkin.recursion import evaluate
-from urdfkin.recursion.base import STILL_STATE, BaseMotion
+from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import Plan, make_plan
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray, KinematicTree
 from urdfkin.verification import bounds
-from urdfkin.verification.bounds import Bound, Quantity
-from urdfkin.verification.certificate import Certificate, Ledger, VerificationError, compare
-from urdfkin.verification.magnitudes import magnitudes
+from urdfkin.verification.bounds import Quantity
+from urdfkin.verification.certificate import Certificate, Ledger
 from urdfkin.verification.sampling import sample
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
@@ -35,7 +35,7 @@ class NotVerifiedWarning(UserWarning):
     """Results are handed out that Pinocchio could not check; the message says why."""
 
 
-class Robot:
+class Robot(Manipulator):
     """A robot that was loaded; make one with `urdfkin.load`.
 
     Configurations `q` are (..., nq), rates `v` and `a` (..., nv), with any leading batch shape; the three
@@ -77,7 +77,7 @@ class Robot:
         self.base_frame = base_frame or tree.links[0]
         self._tip_frame = tip_frame
         self.unverifiable = unverifiable
-        self._ledger = Ledger()
+        self.ledger = Ledger()
         self._plans: dict[tuple[int, ...], Plan] = {}
         self._oracles: dict[bool, Oracle] = {}
 
@@ -109,6 +109,11 @@ class Robot:
     def joint_names(self) -> tuple[str, ...]:
         """Moving joints in Pinocchio's order, followers too."""
         return tuple(joint.name for joint in self.tree.joints if joint.kind.nv)
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Every link, root first, in the order in which all frames are handed out."""
+        return self.tree.links
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -151,11 +156,11 @@ class Robot:
 
     def limit_violations(self, q: ArrayLike) -> list[str]:
         """One line for each joint that leaves its bounds somewhere in `q` (..., nq)."""
-        return configuration.limit_violations(self.tree, self._checked(q, "q"))
+        return configuration.limit_violations(self.tree, self.checked(q, "q"))
 
     def to_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """(..., nq) to the configuration of `pinocchio.buildModelFromUrdf(path, mimic=mimic)`."""
-        return configuration.to_pinocchio(self.tree, self._checked(q, "q"), mimic=mimic)
+        return configuration.to_pinocchio(self.tree, self.checked(q, "q"), mimic=mimic)
 
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """The inverse of `to_pinocchio`; angles of continuous joints come back in (-pi, pi]."""
@@ -186,12 +191,12 @@ class Robot:
             UnknownNameError: no such frame.
             VerificationError: Pinocchio computes something else.
         """
-        call = _Call(self, frame, _ALIGNED, base, q)
-        result = evaluate.placements(call.plan, call.q, base=call.state, out=call.flat(out, 4, 4))[:, 0]
-        if self._wants(verify, Quantity.PLACEMENT, call.n, base):
-            theirs = self._oracle(base).placements(call.q, call.frames, call.flat_base)[:, 0]
+        call = Call(self, (frame,), _ALIGNED, base, q)
+        result = evaluate.placements(call.plan, call.q, base=call.state, out=call.flat(out, 4, 4))
+        if self.wants(verify, Quantity.PLACEMENT, call.n, base):
+            theirs = self.oracle(base).placements(call.q, call.frames, call.flat_base)
             call.check(Quantity.PLACEMENT, result, theirs, bounds.placement_bound(call.size()))
-        return call.shaped(result, out)
+        return call.one(result, out)
 
     def velocity(
         self,
@@ -205,16 +210,16 @@ class Robot:
         verify: bool | None = None,
     ) -> FloatArray:
         """(..., 6) [linear; angular] m/s, rad/s: eq. 7.127, 7.128. Arguments and errors as `placement`."""
-        call = _Call(self, frame, reference, base, q, v)
+        call = Call(self, (frame,), reference, base, q, v)
         result = evaluate.velocities(
             call.plan, call.q, call.v, call.reference, base=call.state, out=call.flat(out, 6)
-        )[:, 0]
-        if self._wants(verify, Quantity.VELOCITY, call.n, base):
-            theirs = self._oracle(base).velocities(
+        )
+        if self.wants(verify, Quantity.VELOCITY, call.n, base):
+            theirs = self.oracle(base).velocities(
                 call.q, call.v, call.frames, [call.reference], call.flat_base
-            )[:, 0, 0]
+            )[:, :, 0]
             call.check(Quantity.VELOCITY, result, theirs, bounds.velocity_bound(call.size(), call.reference))
-        return call.shaped(result, out)
+        return call.one(result, out)
 
     def jacobian(
         self,
@@ -230,17 +235,17 @@ class Robot:
 
         Column i is the frame's velocity [linear; angular] for a unit rate of `rate_names[i]` alone.
         """
-        call = _Call(self, frame, reference, base, q)
+        call = Call(self, (frame,), reference, base, q)
         result = evaluate.jacobians(
             call.plan, call.q, call.reference, base=call.state, out=call.flat(out, 6, self.nv)
-        )[:, 0]
-        if self._wants(verify, Quantity.JACOBIAN, call.n, base):
-            theirs = self._oracle(base).jacobians(call.q, call.frames, [call.reference], call.flat_base)[
-                :, 0, 0
+        )
+        if self.wants(verify, Quantity.JACOBIAN, call.n, base):
+            theirs = self.oracle(base).jacobians(call.q, call.frames, [call.reference], call.flat_base)[
+                :, :, 0
             ]
             bound = bounds.jacobian_bound(call.plan, call.size(), call.reference)
             call.check(Quantity.JACOBIAN, result, theirs, bound)
-        return call.shaped(result, out)
+        return call.one(result, out)
 
     def acceleration(
         self,
@@ -258,23 +263,23 @@ class Robot:
 
         Gravity is not in it. Arguments and errors as `placement`.
         """
-        call = _Call(self, frame, reference, base, q, v, a)
+        call = Call(self, (frame,), reference, base, q, v, a)
         result = evaluate.accelerations(
             call.plan, call.q, call.v, call.a, call.reference, base=call.state, out=call.flat(out, 6)
-        )[:, 0]
-        if self._wants(verify, Quantity.ACCELERATION, call.n, base):
-            theirs = self._oracle(base).accelerations(
+        )
+        if self.wants(verify, Quantity.ACCELERATION, call.n, base):
+            theirs = self.oracle(base).accelerations(
                 call.q, call.v, call.a, call.frames, [call.reference], call.flat_base
-            )[:, 0, 0]
+            )[:, :, 0]
             bound = bounds.acceleration_bound(call.size(), call.reference)
             call.check(Quantity.ACCELERATION, result, theirs, bound)
-        return call.shaped(result, out)
+        return call.one(result, out)
 
     # -- what it is worth ----------------------------------------------------------------------------
 
     def certificate(self) -> Certificate:
         """What was checked so far, how closely it agreed, by which Pinocchio, and what was not checked."""
-        return self._ledger.certificate(self.name, version())
+        return self.ledger.certificate(self.name, version())
 
     # -- inside --------------------------------------------------------------------------------------
 
@@ -285,29 +290,30 @@ class Robot:
             plan = self._plans[key] = make_plan(self.tree, key)
         return plan
 
-    def _oracle(self, base: BaseMotion | None) -> Oracle:
+    def oracle(self, base: BaseMotion | None) -> Oracle:
+        """Pinocchio's model of the robot, made once; on a free-flyer if the base moves."""
         moving = base is not None
         if moving not in self._oracles:
             self._oracles[moving] = Oracle(self.urdf, self.tree, moving_base=moving)
         return self._oracles[moving]
 
-    def _wants(self, verify: bool | None, quantity: Quantity, n: int, base: BaseMotion | None) -> bool:
-        """Whether to check; if not, the ledger is told why."""
+    def wants(self, verify: bool | None, quantity: Quantity, n: int, base: BaseMotion | None) -> bool:
+        """Whether to check `n` results; if not, the ledger is told why."""
         if not (self.verify if verify is None else verify):
-            self._ledger.unchecked(quantity, n, "verify=False was asked for")
+            self.ledger.unchecked(quantity, n, "verify=False was asked for")
             return False
         if self.unverifiable is None:
             try:
-                self._oracle(base)
+                self.oracle(base)
             except OracleError as error:
                 self.unverifiable = str(error)
         if self.unverifiable is not None:
             warnings.warn(f"not verified: {self.unverifiable}", NotVerifiedWarning, stacklevel=3)
-            self._ledger.unchecked(quantity, n, self.unverifiable)
+            self.ledger.unchecked(quantity, n, self.unverifiable)
             return False
         return True
 
-    def _checked(self, value: ArrayLike, what: str) -> FloatArray:
+    def checked(self, value: ArrayLike, what: str) -> FloatArray:
         """`value` as float64 with the right last axis and finite numbers."""
         array = np.asarray(value, dtype=np.float64)
         width, names = (self.nq, self.coordinate_names) if what == "q" else (self.nv, self.rate_names)
@@ -320,104 +326,3 @@ class Robot:
             where = np.argwhere(~np.isfinite(array))[0]
             raise InputError(f"{what} must be finite", where=names[where[-1]], found=str(array[tuple(where)]))
         return configuration.with_unit_quaternions(self.tree, array) if what == "q" else array
-
-
-class _Call:
-    """One call's inputs as flat batches, and the way back to the caller's shape."""
-
-    def __init__(
-        self,
-        robot: Robot,
-        frame: str,
-        reference: Reference | str,
-        base: BaseMotion | None,
-        q: ArrayLike,
-        v: ArrayLike | None = None,
-        a: ArrayLike | None = None,
-    ) -> None:
-        self.robot, self.frame, self.base = robot, frame, base
-        self.reference = Reference.of(reference)
-        self.frames = (frame,)
-        self.plan = robot.plan((robot.tree.frame_link(frame),))
-        given = [robot._checked(x, name) for x, name in ((q, "q"), (v, "v"), (a, "a")) if x is not None]
-        self.shape = self._batch_shape(given)
-        self.n = int(np.prod(self.shape))
-        flat = [self._flat_input(array) for array in given]
-        still = np.zeros((self.n, robot.nv)) if len(flat) < 3 else flat[-1]
-        self.q, self.v, self.a = (*flat, still, still)[:3]
-        self.state = STILL_STATE if base is None else base.state(self.shape)
-        self.given = len(given)
-
-    def _batch_shape(self, given: list[FloatArray]) -> tuple[int, ...]:
-        shapes = [array.shape[:-1] for array in given]
-        if self.base is not None:
-            shapes.append(self.base.batch_shape)
-        try:
-            return np.broadcast_shapes(*shapes)
-        except ValueError:
-            found = ", ".join(str(shape) for shape in shapes)
-            raise InputError("the batch shapes of q, v, a and base do not fit", found=found) from None
-
-    def _flat_input(self, array: FloatArray) -> FloatArray:
-        width = array.shape[-1]
-        return np.ascontiguousarray(np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width))
-
-    @property
-    def flat_base(self) -> BaseMotion | None:
-        """The base with one flat batch axis, for the oracle."""
-        if self.base is None or not self.base.batch_shape:
-            return self.base
-        fields = (self.base.placement, 2), (self.base.velocity, 1), (self.base.acceleration, 1)
-        return BaseMotion(
-            *(
-                np.broadcast_to(x, (*self.shape, *x.shape[-own:])).reshape(self.n, *x.shape[-own:])
-                for x, own in fields
-            )
-        )
-
-    def flat(self, out: FloatArray | None, *own: int) -> FloatArray | None:
-        """`out` as the kernels write it: (n, 1, ...)."""
-        if out is None:
-            return None
-        good = isinstance(out, np.ndarray) and out.dtype == np.float64 and out.flags.c_contiguous
-        if not good or out.shape != (*self.shape, *own) or not out.flags.writeable:
-            raise InputError(
-                f"out must be a writable C-contiguous float64 array of shape {(*self.shape, *own)}",
-                found=f"{getattr(out, 'dtype', type(out).__name__)} {getattr(out, 'shape', '')}",
-            )
-        return out.reshape(self.n, 1, *own)
-
-    def shaped(self, result: FloatArray, out: FloatArray | None) -> FloatArray:
-        """The result in the caller's batch shape."""
-        return result.reshape(*self.shape, *result.shape[1:]) if out is None else out
-
-    def size(self) -> Any:
-        """How large the terms are that the results are summed from."""
-        return magnitudes(self.plan, self.q, self.v, self.a, self.state)
-
-    def check(self, quantity: Quantity, ours: FloatArray, theirs: FloatArray, bound: Bound) -> None:
-        """Enter the comparison in the ledger, or raise VerificationError."""
-        comparison = compare(ours[:, None], theirs[:, None], bound, 2)
-        if comparison.agrees:
-            self.robot._ledger.checked(quantity, comparison)
-            return
-        k = comparison.index[0]
-        raise VerificationError(
-            quantity,
-            self.frame,
-            self.reference.name,
-            index=tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else (),
-            ours=ours[k],
-            theirs=theirs[k],
-            bound=np.broadcast_to(bounds.EPS * bound.k * bound.scale, (self.n, 1, *ours.shape[1:]))[k, 0],
-            units=comparison.worst,
-            reproduce=self._replay(quantity, k),
-        )
-
-    def _replay(self, quantity: Quantity, k: int) -> str:
-        words = ["urdfkin", str(quantity), self.robot.source, "--frame", shlex.quote(self.frame)]
-        if quantity is not Quantity.PLACEMENT:
-            words += ["--reference", self.reference.name.lower()]
-        for name, array in zip("qva", (self.q, self.v, self.a)[: self.given], strict=False):
-            words += [f"--{name}", ",".join(repr(float(x)) for x in array[k])]
-        return " ".join(words)

@@ -118,3 +118,37 @@ def jacobians(
         _scratch(plan),
     )
     return out
+
+
+def jacobian_rates(
+    plan: Plan,
+    q: FloatArray,
+    v: FloatArray,
+    reference: Reference = _ALIGNED,
+    *,
+    base: FloatArray = STILL_STATE,
+    out: FloatArray | None = None,
+) -> FloatArray:
+    """(n, frames, 6, nv) time derivatives of the velocity Jacobians: the J-dot of 7.126."""
+    if out is None:
+        out = np.empty((len(q), len(plan.frames), 6, plan.nv))
+    from urdfkin.recursion import jacobian_rate_kernel as compiled  # noqa: PLC0415  compiled when first needed
+
+    compiled.jacobian_rate(
+        int(reference),
+        plan.steps,
+        plan.geometry,
+        plan.slots,
+        plan.frames,
+        plan.offsets,
+        plan.columns,
+        plan.multipliers,
+        plan.uses,
+        plan.idle,
+        base,
+        q,
+        v,
+        out,
+        np.empty(compiled.scratch_rows(plan.slots, len(plan.columns)) * LANES),
+    )
+    return out

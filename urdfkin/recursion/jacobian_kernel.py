@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numba import types
 
+from urdfkin.recursion.columns import clear_idle, put_column
 from urdfkin.recursion.lanes import LANES, copy_rows, cross, lane_function, load, minus, rotate_back, store
 from urdfkin.recursion.steps import FRAME, STATE_ROWS, P, R
 from urdfkin.recursion.walk import (
@@ -58,21 +59,10 @@ def _write_jacobian(m, s, b, f, place, reference, first, columns, multipliers, u
             continue
         copy_rows(m, s, first + 6 * c, _Z, 6)
         _jacobian_column(m, s, columns[c, 2] == 1, reference)
-        at, factor, adds = columns[c, 3], multipliers[c], uses[f, c] == 2
-        for k in range(m):
-            for row in range(3):
-                lin = factor * s[(_LINEAR + row) * LANES + k]
-                ang = factor * s[(_Z + row) * LANES + k]
-                if adds:
-                    lin += out[b + k, place, row, at]
-                    ang += out[b + k, place, 3 + row, at]
-                out[b + k, place, row, at] = lin
-                out[b + k, place, 3 + row, at] = ang
-    for at in range(idle.shape[1]):
-        if idle[f, at]:
-            for k in range(m):
-                for row in range(6):
-                    out[b + k, place, row, at] = 0.0
+        put_column(
+            m, s, b, place, _LINEAR, _Z, columns[c, 3], multipliers[c], uses[f, c] == 2, out
+        )  # fmt: skip
+    clear_idle(m, b, f, place, idle, out)
 
 
 @lane_function

@@ -56,6 +56,23 @@ def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
     return skew(axis) @ rotation_about(axis, angle)
 
 
+def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
+    """The angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34).
+
+    Args:
+        axis: (..., 3) unit axis k.
+        rate: (...) phi-dot in rad/s.
+
+    Returns:
+        (..., 3) rad/s, in the frame of `axis`.
+
+    Raises:
+        InputError: a shape, or an axis that is not of unit length.
+    """
+    w: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(axis, "axis")
+    return w
+
+
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
     """phi-dot k x p: the velocity of the tip of p, which turns about k (7.21).
 
@@ -70,8 +87,7 @@ def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatAr
     Raises:
         InputError: a shape, or an axis that is not of unit length.
     """
-    w = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(axis, "axis")
-    return np.cross(w, vectors(p, "p"))
+    return np.cross(angular_velocity_about(axis, rate), vectors(p, "p"))
 
 
 def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -25,8 +25,8 @@ more than there is covers the frame's own offset and the first of these sums, an
 
 A quantity is multilinear in rotated vectors, each a *factor* that may be off by as much: a position has one
 in each term (R d), a velocity two (w and d), an acceleration three (w, w, d, or v z, w, d), a Jacobian's
-linear rows two (z and d); seeing it in the frame's own axes is one factor more, seeing it from the world's
-origin crosses it with p and is one more.
+linear rows two (z and d), its rate's three (w, z and d); seeing it in the frame's own axes is one factor
+more, seeing it from the world's origin crosses it with p and is one more.
 
 The bound is a worst case; rounding seldom conspires. What is measured is a fraction of an eps for each
 joint, and reports give the disagreement itself, in multiples of eps * scale, so that it can be compared
@@ -56,6 +56,7 @@ class Quantity(StrEnum):
     PLACEMENT = "placement"
     VELOCITY = "velocity"
     JACOBIAN = "jacobian"
+    JACOBIAN_RATE = "jacobian rate"
     ACCELERATION = "acceleration"
     JOINT_JACOBIAN = "joint jacobian"
     SCREWS = "screws"
@@ -66,6 +67,7 @@ _FACTORS = {
     Quantity.PLACEMENT: 1,
     Quantity.VELOCITY: 2,
     Quantity.JACOBIAN: 2,
+    Quantity.JACOBIAN_RATE: 3,
     Quantity.ACCELERATION: 3,
     Quantity.JOINT_JACOBIAN: 2,
     Quantity.SCREWS: 2,
@@ -126,6 +128,20 @@ def jacobian_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
     linear = turning * size.p[..., None] + sliding
     scale = np.repeat(np.stack((linear, np.broadcast_to(turning, linear.shape)), axis=-2), 3, axis=-2)
     return Bound(scale, roundings(Quantity.JACOBIAN, reference, size.joints)[..., None, None])
+
+
+def jacobian_rate_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
+    """For (n, frames, 6, nv).
+
+    Turning columns have z-dot x d and z x d-dot, sliding ones z-dot; in the frame's own axes w x column is
+    subtracted, which is as large again.
+    """
+    turning, sliding = column_weights(plan)
+    again = 2.0 if reference is Reference.LOCAL else 1.0
+    linear = turning * (again * size.w * size.p + size.vel)[..., None] + sliding * (again * size.w)[..., None]
+    angular = turning * (again * size.w)[..., None]
+    scale = np.repeat(np.stack((linear, angular), axis=-2), 3, axis=-2)
+    return Bound(scale, roundings(Quantity.JACOBIAN_RATE, reference, size.joints)[..., None, None])
 
 
 def column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,50 @@
+"""Three frames and a point that move in some smooth way, written down at 60 digits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from tests.high_precision import (
+    about,
+    angular_acceleration,
+    angular_velocity,
+    array,
+    column,
+    mp,
+    rate,
+    second_rate,
+)
+from urdfkin.motion import MovingFrame
+
+#: The moment at which the tests look.
+T = 0.7
+
+ORIENTATIONS: tuple[Callable[[Any], Any], ...] = (
+    lambda t: about(column(1, 2, 3), mp.sin(t)) * about(column(-1, 0, 2), t * t),
+    lambda t: about(column(0, 1, -1), mp.exp(t) / 2),
+    lambda t: about(column(2, 0, 1), 3 * t) * about(column(0, 1, 0), mp.cos(t)),
+)
+ORIGINS: tuple[Callable[[Any], Any], ...] = (
+    lambda t: column(mp.cos(t), t**3, 1 + t),
+    lambda t: column(t, 2 * mp.sin(3 * t), t * t),
+    lambda t: column(0, mp.exp(-t), mp.mpf(1) / 3),
+)
+
+
+def point(t: Any) -> Any:
+    """A point on its way through the last frame."""
+    return column(mp.sin(5 * t), t * t, 1 - t)
+
+
+def frame(i: int) -> MovingFrame:
+    """Frame i + 1 in frame i at that moment, its rates differentiated at 60 digits."""
+    R, d = ORIENTATIONS[i], ORIGINS[i]
+    return MovingFrame(
+        array(R(mp.mpf(T))),
+        array(d(mp.mpf(T))),
+        array(angular_velocity(R, T)),
+        array(rate(d, T)),
+        array(angular_acceleration(R, T)),
+        array(second_rate(d, T)),
+    )

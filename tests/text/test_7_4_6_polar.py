@@ -1,0 +1,53 @@
+"""Section 7.4.6: the polar robot of figure 7.15, equations 7.101 to 7.108."""
+
+import numpy as np
+
+from tests.text.robots import close, motion, robot
+from urdfkin.motion import interorigin_vector, interorigin_velocity, joint_angular_velocity
+from urdfkin.rotation.arrays import FloatArray
+
+MOVING = motion("polar", 4)
+Q, V = MOVING.q, MOVING.v
+D2 = Q[1]
+Z0 = np.array([0.0, 0.0, 1.0])
+X1, Z1 = MOVING.x(1), MOVING.axis(2)
+
+
+def velocities() -> FloatArray:
+    return robot("polar").velocities(Q, V, ["arm", "slider"])
+
+
+def test_7_101_link_1_turns_about_z0() -> None:
+    assert close(velocities()[0, 3:], V[0] * Z0)
+
+
+def test_7_102_the_slide_turns_nothing() -> None:
+    assert close(joint_angular_velocity(Z1, V[1], turns=False), 0.0)
+    assert close(velocities()[1, 3:] - velocities()[0, 3:], 0.0)
+
+
+def test_7_103_so_link_2_turns_with_link_1() -> None:
+    assert close(velocities()[1, 3:], V[0] * Z0)
+    assert close(velocities()[1, 3:], MOVING.w(2))
+
+
+def test_7_104_and_7_106_the_first_two_origins_coincide_and_stay() -> None:
+    assert not robot("polar").placement(Q, "arm")[:3, 3].any()
+    assert not velocities()[0, :3].any()
+
+
+def test_7_105_the_second_interorigin_vector_lies_along_the_slide() -> None:
+    vector = interorigin_vector(D2, Z1, 0.0, X1)
+    assert close(robot("polar").placement(Q, "slider")[:3, 3], D2 * Z1)
+    assert close(vector, D2 * Z1)
+
+
+def test_7_107_its_rate_has_a_part_across_and_a_part_along() -> None:
+    found = interorigin_velocity(V[0] * Z0, D2 * Z1, Z1, V[1], turns=False)
+    assert close(found, -V[0] * D2 * X1 + V[1] * Z1)
+    assert close(found, MOVING.between_rate(2))
+
+
+def test_7_108_and_that_is_the_endpoints_velocity() -> None:
+    assert close(velocities()[1, :3], -V[0] * D2 * X1 + V[1] * Z1)
+    assert close(velocities()[1, :3], MOVING.vel(2))

@@ -1,0 +1,140 @@
+"""Section 7.4.7: the elbow robot of figure 7.16, equations 7.109 to 7.114, and what they save.
+
+d1 = 0.6 m, a2 = 0.5 m, d4 = 0.45 m, as in robots/elbow.urdf.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tests.text.robots import close, motion, robot
+from urdfkin.motion import interorigin_vector
+from urdfkin.rotation.arrays import FloatArray
+
+D1, A2, D4 = 0.6, 0.5, 0.45
+MOVING = motion("elbow", 5)
+Z = [MOVING.axis(i) for i in range(1, 7)]
+X2 = MOVING.x(2)
+
+
+def jacobian() -> FloatArray:
+    return robot("elbow").jacobian(MOVING.q, "wrist")
+
+
+def arm(i: int) -> FloatArray:
+    """d_i6 by the recursion of 7.110, from the wrist inwards."""
+    vector = np.zeros(3)
+    for k in range(6, i, -1):
+        row = MOVING.rows[k - 1]
+        vector = interorigin_vector(float(row.d), MOVING.axis(k), float(row.a), MOVING.x(k)) + vector
+    return vector
+
+
+def test_7_109_the_upper_right_block_is_zero_and_the_lower_rows_are_the_axes() -> None:
+    J = jacobian()
+    assert np.abs(J[:3, 3:]).max() <= 4 * np.finfo(np.float64).eps
+    assert close(J[3:], np.stack(Z, axis=-1))
+    for i in range(3):
+        assert close(J[:3, i], np.cross(Z[i], MOVING.origin(6) - MOVING.origin(i)))
+
+
+def test_7_110_moment_arms_follow_recursively_from_the_wrist() -> None:
+    for i in range(6):
+        assert close(arm(i), MOVING.origin(6) - MOVING.origin(i))
+    assert not arm(4).any()
+    assert not arm(5).any()
+    assert close(np.cross(arm(3), Z[3]), 0.0)
+
+
+def test_7_111_the_arm_from_the_elbow_is_the_forearm() -> None:
+    assert close(arm(2), D4 * Z[3])
+
+
+def test_7_112_the_arm_from_the_shoulder_is_both_links() -> None:
+    assert close(arm(1), A2 * X2 + D4 * Z[3])
+
+
+def test_7_113_the_arm_from_the_base_adds_the_trunk() -> None:
+    assert close(arm(0), D1 * Z[0] + A2 * X2 + D4 * Z[3])
+
+
+def test_7_114_the_jacobian_with_the_shortened_moment_arms_is_the_same() -> None:
+    both = A2 * X2 + D4 * Z[3]
+    linear = [np.cross(Z[0], both), np.cross(Z[1], both), np.cross(Z[2], D4 * Z[3]), *np.zeros((3, 3))]
+    J = np.vstack((np.stack(linear, axis=-1), np.stack(Z, axis=-1)))
+    assert close(jacobian(), J)
+
+
+# -- what the substitution saves ---------------------------------------------------------------------
+
+
+class Counted:
+    """A number that counts multiplications."""
+
+    multiplications = 0
+
+    def __init__(self, value: float) -> None:
+        self.value = value
+
+    def __mul__(self, other: Counted) -> Counted:
+        Counted.multiplications += 1
+        return Counted(self.value * other.value)
+
+    def __add__(self, other: Counted) -> Counted:
+        return Counted(self.value + other.value)
+
+    def __sub__(self, other: Counted) -> Counted:
+        return Counted(self.value - other.value)
+
+
+def counted(vector: Any) -> list[Counted]:
+    return [Counted(float(x)) for x in vector]
+
+
+def scaled(factor: float, vector: list[Counted]) -> list[Counted]:
+    return [Counted(factor) * x for x in vector]
+
+
+def added(x: list[Counted], y: list[Counted]) -> list[Counted]:
+    return [a + b for a, b in zip(x, y, strict=True)]
+
+
+def crossed(x: list[Counted], y: list[Counted]) -> list[Counted]:
+    return [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+
+
+def values(columns: list[list[Counted]]) -> FloatArray:
+    return np.array([[x.value for x in column] for column in columns]).T
+
+
+def linear_rows_by_7_110(nonzero: int) -> tuple[FloatArray, int]:
+    """Linear rows with every arm by 7.110; columns beyond `nonzero` are known to vanish (7.109)."""
+    Counted.multiplications = 0
+    z, vector, columns = [counted(axis) for axis in Z], counted(np.zeros(3)), []
+    for k in range(6, 0, -1):
+        row = MOVING.rows[k - 1]
+        own = added(scaled(float(row.d), z[k - 1]), scaled(float(row.a), counted(MOVING.x(k))))
+        vector = added(own, vector)
+        columns.append(crossed(z[k - 1], vector) if k <= nonzero else counted(np.zeros(3)))
+    return values(columns[::-1]), Counted.multiplications
+
+
+def linear_rows_by_7_114() -> tuple[FloatArray, int]:
+    Counted.multiplications = 0
+    z = [counted(axis) for axis in Z]
+    forearm = scaled(D4, z[3])
+    both = added(scaled(A2, counted(X2)), forearm)
+    columns = [crossed(z[0], both), crossed(z[1], both), crossed(z[2], forearm)]
+    columns += [counted(np.zeros(3)) for _ in range(3)]
+    return values(columns), Counted.multiplications
+
+
+def test_the_substitution_saves_two_thirds_of_the_multiplications() -> None:
+    (full, all_of_them), (shorter, with_zeros) = linear_rows_by_7_110(6), linear_rows_by_7_110(3)
+    shortest, substituted = linear_rows_by_7_114()
+    for rows in (full, shorter, shortest):
+        assert close(rows, jacobian()[:3])
+    # Six for each cross product and interorigin vector; substituted: three crosses and two scaled axes.
+    assert (all_of_them, with_zeros, substituted) == (72, 54, 24)

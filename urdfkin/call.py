@@ -1,0 +1,132 @@
+"""One call's inputs as flat batches, its check, and the way back to the caller's shape."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.errors import InputError
+from urdfkin.recursion.base import STILL_STATE, BaseMotion
+from urdfkin.reference import Reference
+from urdfkin.tree import FloatArray
+from urdfkin.verification import bounds
+from urdfkin.verification.bounds import Bound, Quantity
+from urdfkin.verification.certificate import VerificationError, compare
+from urdfkin.verification.magnitudes import magnitudes
+
+if TYPE_CHECKING:
+    from urdfkin.robot import Robot
+
+
+class Call:
+    """One call's inputs as flat batches, and the way back to the caller's shape."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        frames: Sequence[str],
+        reference: Reference | str,
+        base: BaseMotion | None,
+        q: ArrayLike,
+        v: ArrayLike | None = None,
+        a: ArrayLike | None = None,
+    ) -> None:
+        self.robot, self.frames, self.base = robot, tuple(frames), base
+        self.reference = Reference.of(reference)
+        self.links = tuple(robot.tree.frame_link(frame) for frame in self.frames)
+        self.plan = robot.plan(self.links)
+        given = [robot.checked(x, name) for x, name in ((q, "q"), (v, "v"), (a, "a")) if x is not None]
+        self.shape = self._batch_shape(given)
+        self.n = int(np.prod(self.shape))
+        flat = [self._flat_input(array) for array in given]
+        still = np.zeros((self.n, robot.nv)) if len(flat) < 3 else flat[-1]
+        self.q, self.v, self.a = (*flat, still, still)[:3]
+        self.state = STILL_STATE if base is None else base.state(self.shape)
+        self.given = len(given)
+
+    def _batch_shape(self, given: list[FloatArray]) -> tuple[int, ...]:
+        shapes = [array.shape[:-1] for array in given]
+        if self.base is not None:
+            shapes.append(self.base.batch_shape)
+        try:
+            return np.broadcast_shapes(*shapes)
+        except ValueError:
+            found = ", ".join(str(shape) for shape in shapes)
+            raise InputError("the batch shapes of q, v, a and base do not fit", found=found) from None
+
+    def _flat_input(self, array: FloatArray) -> FloatArray:
+        width = array.shape[-1]
+        return np.ascontiguousarray(np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width))
+
+    @property
+    def results(self) -> int:
+        """How many results the call hands out."""
+        return self.n * len(self.links)
+
+    @property
+    def flat_base(self) -> BaseMotion | None:
+        """The base with one flat batch axis, for the oracle."""
+        if self.base is None or not self.base.batch_shape:
+            return self.base
+        fields = (self.base.placement, 2), (self.base.velocity, 1), (self.base.acceleration, 1)
+        return BaseMotion(
+            *(
+                np.broadcast_to(x, (*self.shape, *x.shape[-own:])).reshape(self.n, *x.shape[-own:])
+                for x, own in fields
+            )
+        )
+
+    def flat(self, out: FloatArray | None, *own: int) -> FloatArray | None:
+        """`out`, for one frame, as the kernels write it: (n, 1, ...)."""
+        if out is None:
+            return None
+        good = isinstance(out, np.ndarray) and out.dtype == np.float64 and out.flags.c_contiguous
+        if not good or out.shape != (*self.shape, *own) or not out.flags.writeable:
+            raise InputError(
+                f"out must be a writable C-contiguous float64 array of shape {(*self.shape, *own)}",
+                found=f"{getattr(out, 'dtype', type(out).__name__)} {getattr(out, 'shape', '')}",
+            )
+        return out.reshape(self.n, 1, *own)
+
+    def one(self, result: FloatArray, out: FloatArray | None) -> FloatArray:
+        """The (n, 1, ...) result of a call for one frame, in the caller's batch shape."""
+        return result.reshape(*self.shape, *result.shape[2:]) if out is None else out
+
+    def every(self, result: FloatArray) -> FloatArray:
+        """The (n, frames, ...) result of a call for several, in the caller's batch shape."""
+        return result.reshape(*self.shape, *result.shape[1:])
+
+    def size(self) -> Any:
+        """How large the terms are that the results are summed from."""
+        return magnitudes(self.plan, self.q, self.v, self.a, self.state)
+
+    def check(self, quantity: Quantity, ours: FloatArray, theirs: FloatArray, bound: Bound) -> None:
+        """Enter the comparison of (n, frames, ...) results in the ledger, or raise VerificationError."""
+        comparison = compare(ours, theirs, bound, 2)
+        if comparison.agrees:
+            self.robot.ledger.checked(quantity, comparison)
+            return
+        k, f = comparison.index
+        raise VerificationError(
+            quantity,
+            self.frames[f],
+            self.reference.name,
+            index=tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else (),
+            ours=ours[k, f],
+            theirs=theirs[k, f],
+            bound=np.broadcast_to(bounds.EPS * bound.k * bound.scale, ours.shape)[k, f],
+            units=comparison.worst,
+            reproduce=self._replay(quantity, k, self.frames[f]),
+        )
+
+    def _replay(self, quantity: Quantity, k: int, frame: str) -> str:
+        words = ["urdfkin", str(quantity), self.robot.source, "--frame", shlex.quote(frame)]
+        if quantity is not Quantity.PLACEMENT:
+            words += ["--reference", self.reference.name.lower()]
+        for name, array in zip("qva", (self.q, self.v, self.a)[: self.given], strict=False):
+            words += [f"--{name}", ",".join(repr(float(x)) for x in array[k])]
+        return " ".join(words)

@@ -1,0 +1,256 @@
+"""What the chapter computes beyond one frame's four quantities: all frames at once, J-dot, J, and parts.
+
+Sections 7.4.3, 7.5 and 7.7. `Robot` is a `Manipulator`; every method checks its result as `Robot` does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.call import Call
+from urdfkin.motion.representation import analytical_jacobian
+from urdfkin.recursion import evaluate
+from urdfkin.recursion.base import BaseMotion
+from urdfkin.recursion.breakdown import AccelerationBreakdown, acceleration_breakdown
+from urdfkin.reference import Reference
+from urdfkin.rotation.euler_rates import NEAREST
+from urdfkin.tree import FloatArray
+from urdfkin.verification import bounds
+from urdfkin.verification.bounds import Quantity
+
+if TYPE_CHECKING:
+    from urdfkin.robot import Robot
+
+_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+
+
+class Manipulator:
+    """The part of `Robot` that stands in this file."""
+
+    def placements(
+        self,
+        q: ArrayLike,
+        frames: Sequence[str] | None = None,
+        *,
+        base: BaseMotion | None = None,
+        verify: bool | None = None,
+    ) -> FloatArray:
+        """(..., frames, 4, 4) T_world_frame of several frames in one pass (7.77).
+
+        Args:
+            q: (..., nq) rad, m.
+            frames: Names of links or joints; None means every link, in the order of `link_names`.
+            base: How the root link moves; None if it stands at the world's origin.
+            verify: Whether Pinocchio checks this call; None leaves it to the robot.
+
+        Raises:
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
+            UnknownNameError: no such frame.
+            VerificationError: Pinocchio computes something else.
+        """
+        robot = _robot(self)
+        call = Call(robot, _names(robot, frames), _ALIGNED, base, q)
+        result = evaluate.placements(call.plan, call.q, base=call.state)
+        if robot.wants(verify, Quantity.PLACEMENT, call.results, base):
+            theirs = robot.oracle(base).placements(call.q, call.frames, call.flat_base)
+            call.check(Quantity.PLACEMENT, result, theirs, bounds.placement_bound(call.size()))
+        return call.every(result)
+
+    def velocities(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        frames: Sequence[str] | None = None,
+        reference: Reference | str = _ALIGNED,
+        *,
+        base: BaseMotion | None = None,
+        verify: bool | None = None,
+    ) -> FloatArray:
+        """(..., frames, 6) [linear; angular] of several frames in one pass (7.75 to 7.79 by 7.127, 7.128).
+
+        Arguments and errors as `placements`.
+        """
+        robot = _robot(self)
+        call = Call(robot, _names(robot, frames), reference, base, q, v)
+        result = evaluate.velocities(call.plan, call.q, call.v, call.reference, base=call.state)
+        if robot.wants(verify, Quantity.VELOCITY, call.results, base):
+            theirs = robot.oracle(base).velocities(
+                call.q, call.v, call.frames, [call.reference], call.flat_base
+            )[:, :, 0]
+            call.check(Quantity.VELOCITY, result, theirs, bounds.velocity_bound(call.size(), call.reference))
+        return call.every(result)
+
+    def jacobians(
+        self,
+        q: ArrayLike,
+        frames: Sequence[str] | None = None,
+        reference: Reference | str = _ALIGNED,
+        *,
+        base: BaseMotion | None = None,
+        verify: bool | None = None,
+    ) -> FloatArray:
+        """(..., frames, 6, nv) velocity Jacobians of several frames in one pass (7.85).
+
+        Arguments and errors as `placements`.
+        """
+        robot = _robot(self)
+        call = Call(robot, _names(robot, frames), reference, base, q)
+        result = evaluate.jacobians(call.plan, call.q, call.reference, base=call.state)
+        if robot.wants(verify, Quantity.JACOBIAN, call.results, base):
+            theirs = robot.oracle(base).jacobians(call.q, call.frames, [call.reference], call.flat_base)
+            bound = bounds.jacobian_bound(call.plan, call.size(), call.reference)
+            call.check(Quantity.JACOBIAN, result, theirs[:, :, 0], bound)
+        return call.every(result)
+
+    def accelerations(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        frames: Sequence[str] | None = None,
+        reference: Reference | str = _ALIGNED,
+        *,
+        base: BaseMotion | None = None,
+        verify: bool | None = None,
+    ) -> FloatArray:
+        """(..., frames, 6) classical accelerations of several frames in one pass (7.129, 7.130).
+
+        Arguments and errors as `placements`.
+        """
+        robot = _robot(self)
+        call = Call(robot, _names(robot, frames), reference, base, q, v, a)
+        result = evaluate.accelerations(call.plan, call.q, call.v, call.a, call.reference, base=call.state)
+        if robot.wants(verify, Quantity.ACCELERATION, call.results, base):
+            theirs = robot.oracle(base).accelerations(
+                call.q, call.v, call.a, call.frames, [call.reference], call.flat_base
+            )
+            bound = bounds.acceleration_bound(call.size(), call.reference)
+            call.check(Quantity.ACCELERATION, result, theirs[:, :, 0], bound)
+        return call.every(result)
+
+    def jacobian_rate(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        frame: str,
+        reference: Reference | str = _ALIGNED,
+        *,
+        base: BaseMotion | None = None,
+        out: FloatArray | None = None,
+        verify: bool | None = None,
+    ) -> FloatArray:
+        """(..., 6, nv) J-dot, the time derivative of `jacobian` along the motion (7.126).
+
+        In LOCAL_WORLD_ALIGNED, J a + J-dot v is the acceleration of the text and of `acceleration`. In LOCAL
+        and WORLD it is the *spatial* acceleration, which differs by w x vel: there the point, or the axes,
+        that the rows speak of move themselves. On a moving base, what the base does comes on top.
+
+        Args:
+            q: (..., nq) rad, m.
+            v: (..., nv) rad/s, m/s.
+            frame: A link's or joint's name.
+            reference: For which point and in which axes.
+            base: How the root link moves; None if it stands at the world's origin.
+            out: C-contiguous float64 array of the result's shape to write into.
+            verify: Whether Pinocchio checks this call; None leaves it to the robot.
+
+        Raises:
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
+            UnknownNameError: no such frame.
+            VerificationError: Pinocchio computes something else.
+        """
+        robot = _robot(self)
+        call = Call(robot, (frame,), reference, base, q, v)
+        result = evaluate.jacobian_rates(
+            call.plan, call.q, call.v, call.reference, base=call.state, out=call.flat(out, 6, robot.nv)
+        )
+        if robot.wants(verify, Quantity.JACOBIAN_RATE, call.n, base):
+            theirs = robot.oracle(base).jacobian_rates(
+                call.q, call.v, call.frames, [call.reference], call.flat_base
+            )
+            bound = bounds.jacobian_rate_bound(call.plan, call.size(), call.reference)
+            call.check(Quantity.JACOBIAN_RATE, result, theirs[:, :, 0], bound)
+        return call.one(result, out)
+
+    def analytical_jacobian(
+        self,
+        q: ArrayLike,
+        frame: str,
+        representation: str = "ZYZ",
+        *,
+        nearest: float = NEAREST,
+        base: BaseMotion | None = None,
+        verify: bool | None = None,
+    ) -> FloatArray:
+        """The manipulator Jacobian J = C^-1 J_v (7.122): derivatives of position and orientation by q.
+
+        J_v and the orientation are checked against Pinocchio; C^-1 is the closed form of
+        `urdfkin.motion.representation_inverse`.
+
+        Args:
+            q: (..., nq) rad, m.
+            frame: A link's or joint's name.
+            representation: Euler sequence by SciPy's name ("ZYZ" is the text's, "xyz" is rpy), or
+                "quaternion".
+            nearest: How near the representational singularity may be, radians.
+            base: How the root link stands; None if at the world's origin.
+            verify: Whether Pinocchio checks this call; None leaves it to the robot.
+
+        Returns:
+            (..., 6, nv), or (..., 7, nv) for a quaternion.
+
+        Raises:
+            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`; the
+                error says how near. A quaternion has none.
+            UnknownNameError: no such frame or representation.
+            InputError: as `placements`.
+            VerificationError: Pinocchio computes something else.
+        """
+        robot = _robot(self)
+        T_world_frame = robot.placement(q, frame, base=base, verify=verify)
+        J_v = robot.jacobian(q, frame, base=base, verify=verify)
+        return analytical_jacobian(representation, T_world_frame[..., :3, :3], J_v, nearest)
+
+    def acceleration_breakdown(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        frame: str,
+        reference: Reference | str = _ALIGNED,
+        *,
+        base: BaseMotion | None = None,
+        verify: bool | None = None,
+    ) -> AccelerationBreakdown:
+        """`acceleration`, as a sum over joints and kinds: transverse, centripetal, Coriolis, sliding.
+
+        The sum is checked against Pinocchio's acceleration. Arguments and errors as `jacobian_rate`.
+
+        Returns:
+            The parts, with the caller's batch shape in front.
+        """
+        robot = _robot(self)
+        call = Call(robot, (frame,), reference, base, q, v, a)
+        parts = acceleration_breakdown(
+            robot.tree, call.links[0], call.q, call.v, call.a, call.reference, call.state
+        )
+        if robot.wants(verify, Quantity.ACCELERATION, call.n, base):
+            theirs = robot.oracle(base).accelerations(
+                call.q, call.v, call.a, call.frames, [call.reference], call.flat_base
+            )
+            bound = bounds.acceleration_bound(call.size(), call.reference)
+            call.check(Quantity.ACCELERATION, parts.total[:, np.newaxis], theirs[:, :, 0], bound)
+        return AccelerationBreakdown(parts.joints, call.every(parts.base), call.every(parts.terms))
+
+
+def _robot(manipulator: Manipulator) -> Robot:
+    # The only subclass is Robot, which lives below and cannot be imported here.
+    return cast("Robot", manipulator)
+
+
+def _names(robot: Robot, frames: Sequence[str] | None) -> Sequence[str]:
+    return robot.link_names if frames is None else frames

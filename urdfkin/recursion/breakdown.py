@@ -1,0 +1,153 @@
+"""Whose doing a frame's acceleration is: each joint's, part by part.
+
+Sections 7.6 and 7.7. Seen from link k-1, the frame moves about or along the axis of joint k, with velocity
+u_k = v_k z x d (or v_k z), while link k-1 itself turns with w_{k-1}. That is a moving point in a moving
+frame, and 7.125 names its terms; applied joint by joint from the last inwards they add up to 7.130:
+
+    transverse   a_k z x d              a rotary joint speeds up
+    centripetal  v_k z x (v_k z x d)    it turns
+    coriolis     2 w_{k-1} x u_k        what it does while the joints before it turn the link it sits on
+    sliding      a_k z                  a prismatic joint speeds up
+
+with d from the joint's origin to the frame. The angular rows are those of 7.129: a_k z, and v_k w_{k-1} x z
+under coriolis. A planar or floating joint slides and turns at once, along axes that turn with it: its
+sliding velocity s then adds o x s, with o its own angular velocity, under coriolis too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from urdfkin.recursion.base import STILL_STATE
+from urdfkin.recursion.evaluate import placements, velocities
+from urdfkin.recursion.plan import make_plan
+from urdfkin.reference import Reference
+from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree
+
+#: The kinds of contribution, in the order in which they are kept.
+KINDS = ("transverse", "centripetal", "coriolis", "sliding")
+
+
+@dataclass(frozen=True, eq=False)
+class AccelerationBreakdown:
+    """A frame's acceleration as a sum over joints and kinds.
+
+    Attributes:
+        joints: Moving joints from the base to the frame.
+        base: (..., 6) what a moving base contributes, as if all joints stood still.
+        terms: (..., joints, 4, 6) contributions, kinds in the order of `KINDS`, [linear; angular].
+    """
+
+    joints: tuple[str, ...]
+    base: FloatArray
+    terms: FloatArray
+
+    @cached_property
+    def total(self) -> FloatArray:
+        """(..., 6) the acceleration: the sum of everything else here."""
+        total: FloatArray = self.base + self.by_joint.sum(axis=-2)
+        return total
+
+    @cached_property
+    def by_joint(self) -> FloatArray:
+        """(..., joints, 6) what each joint contributes."""
+        summed: FloatArray = self.terms.sum(axis=-2)
+        return summed
+
+    @cached_property
+    def by_kind(self) -> FloatArray:
+        """(..., 4, 6) what the joints contribute in each kind."""
+        summed: FloatArray = self.terms.sum(axis=-3)
+        return summed
+
+
+class _Moves(NamedTuple):
+    """Sliding and turning of the moved frame relative to the link before it, in world axes: (n, 3) each."""
+
+    slide: FloatArray
+    turn: FloatArray
+
+
+def acceleration_breakdown(
+    tree: KinematicTree,
+    link: int,
+    q: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+    reference: Reference = Reference.LOCAL_WORLD_ALIGNED,
+    base: FloatArray = STILL_STATE,
+) -> AccelerationBreakdown:
+    """The contributions to the classical acceleration of a link's frame.
+
+    Args:
+        tree: The robot.
+        link: Index of the link that carries the frame.
+        q: (n, nq).
+        v: (n, nv).
+        a: (n, nv).
+        reference: For which point and in which axes.
+        base: (1 or n, 24) state of the base, see `BaseMotion.state`.
+
+    Returns:
+        Contributions with one leading axis n.
+    """
+    path = [i for i in tree.path(link) if tree.joints[i].kind.nv]
+    plan = make_plan(tree, [0, link, *(i + 1 for i in path), *(tree.joints[i].parent for i in path)])
+    Ts, velocity = placements(plan, q, base=base), velocities(plan, q, v, base=base)
+    end = np.zeros((len(q), 3)) if reference is Reference.WORLD else Ts[:, 1, :3, 3]
+    terms = np.empty((len(q), len(path), len(KINDS), 6))
+    for k, i in enumerate(path):
+        R, d = Ts[:, 2 + k, :3, :3], end - Ts[:, 2 + k, :3, 3]
+        w_before = velocity[:, 2 + len(path) + k, 3:]
+        joint, at = tree.joints[i], tree.v_index[i]
+        terms[:, k] = _terms(_moves(joint, v[:, at:], R), _moves(joint, a[:, at:], R), w_before, d)
+    base_part = _rigid(base, end - Ts[:, 0, :3, 3])
+    if reference is Reference.LOCAL:
+        back = Ts[:, 1, :3, :3].swapaxes(-1, -2)
+        base_part = _turned(back, base_part)
+        terms = _turned(back[:, np.newaxis, np.newaxis], terms)
+    return AccelerationBreakdown(tuple(tree.joints[i].name for i in path), base_part, terms)
+
+
+def _terms(rate: _Moves, rate_2: _Moves, w_before: FloatArray, d: FloatArray) -> FloatArray:
+    """(n, 4, 6) what one joint contributes."""
+    nothing = np.zeros_like(d)
+    turning = np.cross(rate.turn, d)
+    twice = 2.0 * np.cross(w_before, turning + rate.slide) + np.cross(rate.turn, rate.slide)
+    kinds = (
+        (np.cross(rate_2.turn, d), rate_2.turn),
+        (np.cross(rate.turn, turning), nothing),
+        (twice, np.cross(w_before, rate.turn)),
+        (rate_2.slide, nothing),
+    )
+    return np.stack([np.concatenate(pair, axis=-1) for pair in kinds], axis=-2)
+
+
+def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
+    """Rates, or their rates, of one joint as vectors in world axes."""
+    slide, turn = np.zeros((len(x), 3)), np.zeros((len(x), 3))
+    if joint.kind is JointKind.PLANAR:
+        slide[:, :2], turn[:, 2] = x[:, :2], x[:, 2]
+    elif joint.kind is JointKind.FLOATING:
+        slide[:], turn[:] = x[:, :3], x[:, 3:6]
+    else:
+        factor = joint.mimic.multiplier if joint.mimic else 1.0
+        (turn if joint.kind.turns else slide)[:] = factor * x[:, :1] * joint.axis
+    return _Moves((R @ slide[..., np.newaxis])[..., 0], (R @ turn[..., np.newaxis])[..., 0])
+
+
+def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
+    """The acceleration of a point that rides on the base, d from its origin (7.123)."""
+    w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
+    linear = a + np.cross(alpha, d) + np.cross(w, np.cross(w, d))
+    return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)
+
+
+def _turned(R: FloatArray, six: FloatArray) -> FloatArray:
+    pairs = six.reshape(*six.shape[:-1], 2, 3)
+    turned: FloatArray = (R[..., np.newaxis, :, :] @ pairs[..., np.newaxis])[..., 0]
+    return turned.reshape(six.shape)
