@@ -1,0 +1,9 @@
+#!/bin/sh
+# Set everything up and pass the tests: format, lint, types, then the whole suite.
+. "$(dirname "$0")/environment.sh"
+make_environment "[test]"
+set -e
+ruff format --check .
+ruff check .
+mypy
+exec pytest -n 2 "$@"
