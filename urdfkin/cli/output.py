@@ -12,7 +12,7 @@ import threading
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -228,9 +228,10 @@ def make_table(columns: Sequence[str], rows: Iterable[Sequence[str | float]], *,
     from rich import box  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, header_style="bold")
     for i, column in enumerate(columns):
-        table.add_column(column, justify="left" if i < words else "right", overflow="fold")
+        justify: Literal["left", "right"] = "left" if i < words else "right"
+        table.add_column(column, justify=justify, overflow="fold", no_wrap=i >= words)
     cells = [list(row) for row in rows]
     largest = max((abs(cell) for row in cells for cell in row if not isinstance(cell, str)), default=0.0)
     for row in cells:

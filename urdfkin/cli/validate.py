@@ -90,7 +90,7 @@ def _print(report: ValidationReport, *, cases: bool) -> None:
     quantities = list(Quantity)
     out = console()
     out.print("worst disagreement with Pinocchio in eps*scale, for each quantity", style="bold")
-    columns = ["robot", "joints", "frames", "results", *_SHORT.values(), "verdict"]
+    columns = ["robot", "joints", "frames", "results", *(_SHORT[q] for q in quantities), "verdict"]
     rows = (
         [*_counts(robot), *(_number(robot.worst(q)) for q in quantities), robot.verdict.value]
         for robot in report.robots
@@ -115,9 +115,10 @@ def _print(report: ValidationReport, *, cases: bool) -> None:
 _SHORT = {
     "placement": "place",
     "velocity": "vel",
-    "jacobian": "J frame",
+    "jacobian": "J",
+    "jacobian rate": "dJ/dt",
     "acceleration": "acc",
-    "joint jacobian": "J joint",
+    "joint jacobian": "joint J",
     "screws": "data.J",
 }
 

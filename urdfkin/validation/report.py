@@ -123,9 +123,17 @@ class RobotReport:
         }
 
 
+#: The command that computes a quantity; the Jacobian's for what has none of its own.
+_COMMANDS = {
+    Quantity.PLACEMENT: "placement",
+    Quantity.VELOCITY: "velocity",
+    Quantity.ACCELERATION: "acceleration",
+}
+
+
 def replay(source: str, quantity: Quantity, reference: str, case: WorstCase) -> str:
     """The command for one case; numbers are written so that they read back exactly."""
-    command = {Quantity.JOINT_JACOBIAN: "jacobian", Quantity.SCREWS: "jacobian"}.get(quantity, quantity.value)
+    command = _COMMANDS.get(quantity, "jacobian")
     words = ["urdfkin", command, source, "--frame", _quoted(case.frame)]
     if reference:
         words += ["--reference", reference]
