@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+import warnings
 from typing import cast
 
 import click
@@ -57,6 +58,8 @@ def main() -> None:
 
     Exit 0: verified. 1: a disagreement. 2: bad input or usage. 3: computed, but Pinocchio did not check it.
     """
+    # The line under a result says that it was not verified, and why; once is enough.
+    warnings.filterwarnings("ignore", message="not verified")
     try:
         cli(standalone_mode=True)
     except UrdfkinError as error:
