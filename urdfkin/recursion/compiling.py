@@ -17,6 +17,8 @@ import numba
 import platformdirs
 from numba import types
 
+from urdfkin.recursion.lanes import COMPILED
+
 _config: Any = numba.config  # settings that numba sets at run time
 
 # Inputs may be read-only; a writable array converts without a copy. One signature, compiled once.
@@ -35,10 +37,9 @@ def kernel(*arguments: Any) -> Callable[[Callable[..., None]], Any]:
         with _numba_cache(folder):
             return numba.njit(
                 [types.void(*arguments)],
-                fastmath={"contract"},
-                error_model="numpy",
                 nogil=True,
                 cache=folder is not None,
+                **COMPILED,
             )(function)
 
     return compile_

@@ -29,8 +29,7 @@ _Z, _O, _LINEAR = COLUMN, COLUMN + 3, COLUMN + 6
 def _remember_column(m, s, at, axis):
     """Keep the axis z_{i-1} and the origin O_{i-1} of a rate: what 7.85 needs."""
     for r in range(3):
-        for k in range(m):
-            s[(at + r) * LANES + k] = s[(R + 3 * r + axis) * LANES + k]
+        copy_rows(m, s, R + 3 * r + axis, at + r, 1)
     copy_rows(m, s, P, at + 3, 3)
 
 
@@ -80,7 +79,7 @@ def _jacobian_block(
                 _remember_column(m, s, first + 6 * c, columns[c, 1])
                 c += 1
         while f < frames.shape[0] and frames[f, 0] == i:
-            frame_state(m, s, offsets, f, order, rows)
+            frame_state(m, s, offsets, f, order, rows, reference == _LOCAL)
             _write_jacobian(m, s, b, f, frames[f, 1], reference, first, columns, multipliers, uses, idle, out)
             f += 1
 

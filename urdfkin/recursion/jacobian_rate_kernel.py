@@ -61,8 +61,7 @@ def scratch_rows(slots: int, columns: int) -> int:
 def _remember_column(m, s, at, axis):
     """Keep z, O, and w and vel of link i; `w_i x z` and `w_{i-1} x z` are the same."""
     for r in range(3):
-        for k in range(m):
-            s[(at + r) * LANES + k] = s[(R + 3 * r + axis) * LANES + k]
+        copy_rows(m, s, R + 3 * r + axis, at + r, 1)
     copy_rows(m, s, P, at + 3, 3)
     copy_rows(m, s, W, at + 6, 3)
     copy_rows(m, s, V, at + 9, 3)
@@ -117,7 +116,7 @@ def _rate_block(
                 _remember_column(m, s, first + _KEPT * c, columns[c, 1])
                 c += 1
         while f < frames.shape[0] and frames[f, 0] == i:
-            frame_state(m, s, offsets, f, order, rows)
+            frame_state(m, s, offsets, f, order, rows, reference == _LOCAL)
             _write_rates(m, s, b, f, frames[f, 1], reference, first, columns, multipliers, uses, idle, out)
             f += 1
 

@@ -12,7 +12,9 @@ import math
 from typing import Any
 
 import numba
-import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
 
 #: Configurations side by side. Two AVX-512 or four AVX2 registers a row: enough to hide latencies, and a
 #: chain of a hundred joints still fits the second-level cache.
@@ -21,9 +23,28 @@ LANES = 16
 #: A vector as the compiler sees it: three numbers of one lane.
 Vec = tuple[float, float, float]
 
-#: Fused multiply-adds are allowed (they round once instead of twice); nothing else is reordered.
-#: Division by zero gives inf as in C, so that no loop carries a branch that raises.
-lane_function: Any = numba.njit(fastmath={"contract"}, forceinline=True, error_model="numpy")
+#: How every function here and in the kernels is compiled. Fused multiply-adds are allowed (they round once
+#: instead of twice), nothing else is reordered. Division by zero gives inf as in C, so that no loop carries
+#: a branch that raises. Nothing is allocated, so that arrays need no reference counts: counting them took
+#: half of the time.
+COMPILED: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "_nrt": False}
+lane_function: Any = numba.njit(forceinline=True, **COMPILED)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def pointer_to(context: Any, array: Any) -> Any:
+    """The numbers of an array without its shape: no test for a negative index for each of them."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return context.make_array(signature.args[0])(context, builder, arguments[0]).data
+
+    return types.CPointer(array.dtype)(array), generate
+
+
+@lane_function
+def entry(x, row, number):
+    """`x[row, number]` of a table, read through its pointer."""
+    return pointer_to(x)[row * x.shape[1] + number]
 
 
 @lane_function
@@ -91,18 +112,42 @@ def rotate_back(s, row, x, k):
     return dot(column(s, row, 0, k), x), dot(column(s, row, 1, k), x), dot(column(s, row, 2, k), x)
 
 
+@intrinsic  # type: ignore[untyped-decorator]
+def _copy_whole_row(context: Any, s: Any, source: Any, target: Any) -> Any:
+    """All lanes of a row at once.
+
+    Where a row's number is not a constant, the compiler cannot see that two rows are apart and would copy
+    number by number.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        row = ir.VectorType(ir.DoubleType(), LANES).as_pointer()
+        at, to = (
+            builder.bitcast(builder.gep(array.data, [builder.mul(number, number.type(LANES))]), row)
+            for number in arguments[1:]
+        )
+        builder.store(builder.load(at, align=8), to, align=8)
+        return context.get_dummy_value()
+
+    return types.void(s, types.intp, types.intp), generate
+
+
 @lane_function
 def copy_rows(m, s, source, target, count):
-    """Copy `count` rows."""
+    """Copy `count` rows; the one place where rows are met by a number that is not a constant."""
     for r in range(count):
-        for k in range(m):
-            s[(target + r) * LANES + k] = s[(source + r) * LANES + k]
+        if m == LANES:
+            _copy_whole_row(s, source + r, target + r)
+        else:
+            for k in range(m):
+                s[(target + r) * LANES + k] = s[(source + r) * LANES + k]
 
 
 # Sine and cosine of a whole block: Cody and Waite's reduction to [-pi/4, pi/4] with pi/2 in three parts,
 # then the polynomials of fdlibm (Sun Microsystems, k_sin.c and k_cos.c). The first two parts have 33 bits,
 # so that n * part is exact while n < 2^20; beyond that the block takes the library's functions.
-_LARGEST_REDUCED = 2.0**20
+_LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _PI_2_PARTS = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 _S = (
     -1.66666666666666324348e-01,
@@ -124,30 +169,40 @@ _P1, _P2, _P3 = _PI_2_PARTS
 _S1, _S2, _S3, _S4, _S5, _S6 = _S
 _C1, _C2, _C3, _C4, _C5, _C6 = _C
 _2_PI = 2.0 / math.pi
+_NO_FRACTION = 1.5 * 2.0**52
+
+
+@lane_function
+def _nearest(x):
+    """The nearest whole number, for |x| < 2^51: adding 1.5 * 2^52 leaves no room for a fraction.
+
+    `floor` would be a call out of the loop for each lane.
+    """
+    return (x + _NO_FRACTION) - _NO_FRACTION
 
 
 @lane_function
 def sine_cosine(m, s, angle, sine, cosine):
     """Rows `sine` and `cosine` from row `angle`, to the last digit, without a branch in the loop."""
-    largest = 0.0
+    large = 0
     for k in range(m):
-        largest = max(largest, abs(s[angle * LANES + k]))
-    if largest * _2_PI >= _LARGEST_REDUCED:
+        large |= int(abs(s[angle * LANES + k]) >= _LARGEST_ANGLE)
+    if large:
         for k in range(m):
             s[sine * LANES + k] = math.sin(s[angle * LANES + k])
             s[cosine * LANES + k] = math.cos(s[angle * LANES + k])
         return
     for k in range(m):
         x = s[angle * LANES + k]
-        n = np.floor(x * _2_PI + 0.5)
+        n = _nearest(x * _2_PI)
         r = ((x - n * _P1) - n * _P2) - n * _P3
         z = r * r
         sin_r = r + r * z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))))
         cos_r = 1.0 - (0.5 * z - z * z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6))))))
         # Quarter turns: an odd n swaps the two, n mod 4 in {2, 3} changes the sine's sign and
         # n mod 4 in {1, 2} the cosine's.
-        half = np.floor(0.5 * n)
+        half = _nearest(0.5 * n - 0.25)
         odd = n - 2.0 * half
-        sign = 1.0 - 2.0 * (half - 2.0 * np.floor(0.5 * half))
+        sign = 1.0 - 2.0 * (half - 2.0 * _nearest(0.5 * half - 0.25))
         s[sine * LANES + k] = sign * (cos_r if odd > 0.5 else sin_r)
         s[cosine * LANES + k] = sign * (1.0 - 2.0 * odd) * (sin_r if odd > 0.5 else cos_r)

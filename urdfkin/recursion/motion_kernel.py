@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numba import types
 
-from urdfkin.recursion.lanes import LANES, cross, lane_function, load, minus, plus, rotate_back
+from urdfkin.recursion.lanes import LANES, cross, lane_function, load, minus, plus, pointer_to, rotate_back
 from urdfkin.recursion.steps import ALPHA, FRAME, A, P, R, V, W
 from urdfkin.recursion.walk import INT, ROWS, SCRATCH, WHOLE, advance, frame_state, kernel, start
 
@@ -14,14 +14,16 @@ _LOCAL, _WORLD = 0, 1
 @lane_function
 def _write_motion(m, s, b, place, order, reference, out):
     """Six numbers [linear; angular], or for order 0 the 4 by 4 pose row by row."""
+    frames, to = out.shape[1], pointer_to(out)
     if order == 0:
         for k in range(m):
+            here = ((b + k) * frames + place) * 16
             for row in range(3):
                 for c in range(3):
-                    out[b + k, place, 4 * row + c] = s[(FRAME + R + 3 * row + c) * LANES + k]
-                out[b + k, place, 4 * row + 3] = s[(FRAME + P + row) * LANES + k]
-                out[b + k, place, 12 + row] = 0.0
-            out[b + k, place, 15] = 1.0
+                    to[here + 4 * row + c] = s[(FRAME + R + 3 * row + c) * LANES + k]
+                to[here + 4 * row + 3] = s[(FRAME + P + row) * LANES + k]
+                to[here + 12 + row] = 0.0
+            to[here + 15] = 1.0
         return
     angular = FRAME + (W if order == 1 else ALPHA)
     linear = FRAME + (V if order == 1 else A)
@@ -38,9 +40,10 @@ def _write_motion(m, s, b, place, order, reference, out):
             lin = plus(lin, shifted)
         elif reference == _LOCAL:
             lin, ang = rotate_back(s, FRAME + R, lin, k), rotate_back(s, FRAME + R, ang, k)
+        here = ((b + k) * frames + place) * 6
         for row in range(3):
-            out[b + k, place, row] = lin[row]
-            out[b + k, place, 3 + row] = ang[row]
+            to[here + row] = lin[row]
+            to[here + 3 + row] = ang[row]
 
 
 @lane_function
@@ -51,7 +54,7 @@ def _motion_block(m, b, order, reference, steps, g, frames, offsets, base, q, v,
         if i >= 0:
             advance(m, s, b, i, steps, g, q, v, a, order, rows)
         while f < frames.shape[0] and frames[f, 0] == i:
-            frame_state(m, s, offsets, f, order, rows)
+            frame_state(m, s, offsets, f, order, rows, order == 0 or reference == _LOCAL)
             _write_motion(m, s, b, frames[f, 1], order, reference, out)
             f += 1
 

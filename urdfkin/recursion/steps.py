@@ -28,6 +28,7 @@ from urdfkin.recursion.lanes import (
     column,
     cross,
     dot,
+    entry,
     lane_function,
     load,
     plus,
@@ -82,7 +83,12 @@ def turn_about_z(m, s):
 def turn_by_quaternion(m, s, q, b, at):
     """R <- R R(quat) for the unit quaternion (x, y, z, w) in columns `at` to `at + 3` of `q`."""
     for k in range(m):
-        x, y, z, w = q[b + k, at], q[b + k, at + 1], q[b + k, at + 2], q[b + k, at + 3]
+        x, y, z, w = (
+            entry(q, b + k, at),
+            entry(q, b + k, at + 1),
+            entry(q, b + k, at + 2),
+            entry(q, b + k, at + 3),
+        )
         e = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y))
         f = (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x))
         g = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
@@ -184,13 +190,13 @@ def gather_joint(m, s, b, i, steps, g, q, v, a, order):
     at, rate_at = steps[i, 3], steps[i, 4]
     multiplier, constant = g[i, _MULTIPLIER], g[i, _CONSTANT]
     for k in range(m):
-        s[ANGLE * LANES + k] = multiplier * q[b + k, at] + constant
+        s[ANGLE * LANES + k] = multiplier * entry(q, b + k, at) + constant
     if order >= 1:
         for k in range(m):
-            s[RATE * LANES + k] = multiplier * v[b + k, rate_at]
+            s[RATE * LANES + k] = multiplier * entry(v, b + k, rate_at)
     if order >= 2:
         for k in range(m):
-            s[RATE_2 * LANES + k] = multiplier * a[b + k, rate_at]
+            s[RATE_2 * LANES + k] = multiplier * entry(a, b + k, rate_at)
 
 
 @lane_function
@@ -198,11 +204,25 @@ def gather_free(m, s, b, at, planar, x, slide, turn):
     """Rates of a planar (x, y, about z) or floating (three and three) joint into two vectors."""
     for k in range(m):
         if planar:
-            store(s, slide, k, (x[b + k, at], x[b + k, at + 1], 0.0))
-            store(s, turn, k, (0.0, 0.0, x[b + k, at + 2]))
+            store(s, slide, k, (entry(x, b + k, at), entry(x, b + k, at + 1), 0.0))
+            store(s, turn, k, (0.0, 0.0, entry(x, b + k, at + 2)))
         else:
-            store(s, slide, k, (x[b + k, at], x[b + k, at + 1], x[b + k, at + 2]))
-            store(s, turn, k, (x[b + k, at + 3], x[b + k, at + 4], x[b + k, at + 5]))
+            store(
+                s,
+                slide,
+                k,
+                (entry(x, b + k, at), entry(x, b + k, at + 1), entry(x, b + k, at + 2)),
+            )
+            store(
+                s,
+                turn,
+                k,
+                (
+                    entry(x, b + k, at + 3),
+                    entry(x, b + k, at + 4),
+                    entry(x, b + k, at + 5),
+                ),
+            )
 
 
 @lane_function
@@ -210,13 +230,13 @@ def step_free(m, s, b, i, steps, q, v, a, order):
     """A planar or floating joint, after R <- R G and d = R p."""
     at, rate_at, planar = steps[i, 3], steps[i, 4], steps[i, 0] == _PLANAR
     for k in range(m):
-        z = 0.0 if planar else q[b + k, at + 2]
-        store(s, SLIDE, k, (q[b + k, at], q[b + k, at + 1], z))
+        z = 0.0 if planar else entry(q, b + k, at + 2)
+        store(s, SLIDE, k, (entry(q, b + k, at), entry(q, b + k, at + 1), z))
     add_slide(m, s)
     carry(m, s, 0, order)
     if planar:
         for k in range(m):
-            s[ANGLE * LANES + k] = q[b + k, at + 2]
+            s[ANGLE * LANES + k] = entry(q, b + k, at + 2)
         sine_cosine(m, s, ANGLE, SINE, COSINE)
         turn_about_z(m, s)
     else:

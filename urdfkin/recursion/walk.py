@@ -48,12 +48,13 @@ def start(m, s, b, base, order):
 
 
 @lane_function
-def frame_state(m, s, offsets, f, order, rows):
-    """The state of a frame that is fixed to the present link."""
+def frame_state(m, s, offsets, f, order, rows, turned):
+    """The state of a frame that is fixed to the present link; its rotation only where it is `turned`."""
     copy_rows(m, s, 0, FRAME, rows)
-    turn_by_constant(m, s, FRAME, offsets, f)
-    interorigin(m, s, FRAME, offsets, f)
+    interorigin(m, s, 0, offsets, f)
     carry(m, s, FRAME, order)
+    if turned:
+        turn_by_constant(m, s, FRAME, offsets, f)
 
 
 @lane_function
