@@ -31,7 +31,7 @@ COMPILED: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "_
 lane_function: Any = numba.njit(forceinline=True, **COMPILED)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def pointer_to(context: Any, array: Any) -> Any:
     """The numbers of an array without its shape: no test for a negative index for each of them."""
 
@@ -112,7 +112,7 @@ def rotate_back(s, row, x, k):
     return dot(column(s, row, 0, k), x), dot(column(s, row, 1, k), x), dot(column(s, row, 2, k), x)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def _copy_whole_row(context: Any, s: Any, source: Any, target: Any) -> Any:
     """All lanes of a row at once.
 
