@@ -14,6 +14,9 @@ from urdfkin.errors import InputError, SourceError, UnknownNameError
 #: What `load` and `check` take.
 Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
 
+#: Bytes that are read unless a caller allows more; the checks refuse more than this too.
+MOST = 100_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class Text:
@@ -32,10 +35,15 @@ class Text:
     entry: Entry | None = None
 
 
-def read_source(source: Source) -> Text:
+def read_source(source: Source, most: int = MOST) -> Text:
     """The bytes of a URDF, wherever it is.
 
     A catalogue name comes before a file of the same name without a folder; write `./panda` for the file.
+
+    Args:
+        source: Any of the above.
+        most: Bytes (characters, for text files) after which reading ends, with one more, so that the checks
+            see that there are too many: a device may never end.
 
     Raises:
         SourceError: the file cannot be read.
@@ -45,29 +53,29 @@ def read_source(source: Source) -> Text:
     if isinstance(source, bytes):
         return Text(source, "<bytes>", "<bytes>")
     if isinstance(source, os.PathLike):
-        return _read_file(Path(source))
+        return _read_file(Path(source), most)
     if isinstance(source, str):
-        return _read_word(source)
+        return _read_word(source, most)
     if hasattr(source, "read"):
         label = str(getattr(source, "name", "<file>"))
-        return _encoded(source.read(), label, label)
+        return _encoded(source.read(most + 1), label, label)
     raise InputError(
         "a robot comes from a path, a catalogue name, URDF text, bytes or an open file",
         found=type(source).__name__,
     )
 
 
-def _read_word(word: str) -> Text:
+def _read_word(word: str, most: int) -> Text:
     if word == "-":
-        return Text(sys.stdin.buffer.read(), "<stdin>", "-")
+        return Text(sys.stdin.buffer.read(most + 1), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):
         return _encoded(word, "<text>", "<text>")
     if (entry := catalogue().get(word)) is not None:
-        read = _read_file(entry.path)
+        read = _read_file(entry.path, most)
         return Text(read.data, read.label, word, entry)
     path = Path(word).expanduser()
     if path.exists() or os.sep in word or path.suffix:
-        return _read_file(path)
+        return _read_file(path, most)
     raise UnknownNameError("robot", word, catalogue(), where="neither a file nor in the catalogue")
 
 
@@ -77,9 +85,10 @@ def _encoded(content: str | bytes, label: str, source: str) -> Text:
     return Text(data, label, source)
 
 
-def _read_file(path: Path) -> Text:
+def _read_file(path: Path, most: int) -> Text:
     try:
-        return Text(path.read_bytes(), str(path), str(path))
+        with path.open("rb") as file:
+            return Text(file.read(most + 1), str(path), str(path))
     except FileNotFoundError:
         raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
     except IsADirectoryError:

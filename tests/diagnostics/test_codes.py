@@ -5,7 +5,8 @@ import re
 import pytest
 
 from tests.diagnostics.others import ask
-from urdfkin.diagnostics import DEFAULT_LIMITS, Limits, check
+from urdfkin.checking import check
+from urdfkin.diagnostics import DEFAULT_LIMITS, Limits
 from urdfkin.diagnostics.codes import REGISTRY
 from urdfkin.diagnostics.codes.base import Code
 from urdfkin.diagnostics.explain import find_code, page

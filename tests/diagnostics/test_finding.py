@@ -5,7 +5,8 @@ import pickle
 
 import pytest
 
-from urdfkin.diagnostics import Finding, Oracle, Severity, UrdfError, check, check_text
+from urdfkin.checking import check
+from urdfkin.diagnostics import Finding, Oracle, Severity, UrdfError, check_text
 from urdfkin.errors import UrdfkinError
 
 FINDING = Finding(

@@ -8,7 +8,8 @@ import jsonschema
 import pytest
 
 from tests.diagnostics.cases import CASES
-from urdfkin.diagnostics import Finding, Severity, check
+from urdfkin.checking import check
+from urdfkin.diagnostics import Finding, Severity
 from urdfkin.diagnostics.codes import REGISTRY
 from urdfkin.diagnostics.formats import as_github, as_json, summary
 from urdfkin.diagnostics.sarif import as_sarif

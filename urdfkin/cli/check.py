@@ -10,12 +10,13 @@ from dataclasses import replace
 
 import click
 
-from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Limits, Severity, check
+from urdfkin.checking import check
+from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Limits, Severity
 from urdfkin.diagnostics.codes import REGISTRY
 from urdfkin.diagnostics.explain import find_code
 from urdfkin.diagnostics.formats import as_github, as_json, summary
 from urdfkin.diagnostics.sarif import as_sarif
-from urdfkin.errors import SourceError, UnknownNameError
+from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}
 
@@ -34,7 +35,7 @@ _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "b
 @click.option("--ignore", multiple=True, metavar="CODE", help="Leave out a code; may be repeated, or a,b,c.")
 @click.option("--each", is_flag=True, help="Print each place instead of folding many of a kind into one.")
 @click.option("--no-notes", is_flag=True, help="Leave out notes.")
-@click.option("--mimic/--no-mimic", default=True, help="Whether mimic joints follow.  [default: they do]")
+@click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow.  [default: they do]")
 @click.option(
     "--root-joint", type=click.Choice(["floating", "planar"]), help="Check the names this joint needs, too."
 )
@@ -48,7 +49,7 @@ def command(
     ignore: Sequence[str],
     each: bool,
     no_notes: bool,
-    mimic: bool,
+    mimic: bool | None,
     root_joint: str | None,
     max_bytes: int,
     max_depth: int,
@@ -69,11 +70,11 @@ def command(
     limits = Limits(max_bytes, max_depth, max_elements)
     fold = style == "terminal" and not each
     findings: list[Finding] = []
-    unreadable: list[SourceError] = []
+    unreadable: list[UrdfkinError] = []
     for file in files:
         try:
             found = check(_as_path(file), limits=limits, mimic=mimic, root_joint=root_joint, fold=fold)
-        except SourceError as error:
+        except (SourceError, UnknownNameError) as error:
             unreadable.append(error)
             continue
         findings += [_judged(f, strict) for f in found if _wanted(f, ignored, no_notes)]

@@ -2,7 +2,6 @@
 
 from urdfkin.diagnostics.check import check_text
 from urdfkin.diagnostics.document import DEFAULT_LIMITS, Limits
-from urdfkin.diagnostics.face import check
 from urdfkin.diagnostics.finding import Finding, Oracle, Severity, UrdfError, UrdfWarning
 
 __all__ = [
@@ -13,6 +12,5 @@ __all__ = [
     "Severity",
     "UrdfError",
     "UrdfWarning",
-    "check",
     "check_text",
 ]

@@ -133,12 +133,14 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
             severity=Severity.ERROR,
         )
         return
+    foreign = element.tag in _FOREIGN
+    remedy = f"write {_EXAMPLES['origin']}" if foreign else f"did you mean <{close}>?" if close else None
     report.add(
         codes.UNKNOWN_ELEMENT,
         f"<{element.tag}> means nothing in <{parent.tag if parent else ''}> and is skipped",
         element,
-        remedy=f"did you mean <{close}>?" if close else None,
-        severity=Severity.WARNING if close or element.tag in _FOREIGN else Severity.NOTE,
+        remedy=remedy,
+        severity=Severity.WARNING if close or foreign else Severity.NOTE,
     )
 
 
