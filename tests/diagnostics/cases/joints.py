@@ -111,6 +111,12 @@ def joints_cases() -> list[Case]:
             arm(second='type="prismatic"', follow='<mimic joint="j1"/>'),
             ACCEPT,
         ),
+        Case(
+            "mimic-huge",
+            arm(follow='<mimic joint="j1" multiplier="1e300"/>'),
+            WARN,
+            [("URDF526", 7)],
+        ),
         Case("mimic-nan", arm(follow='<mimic joint="j1" multiplier="nan"/>'), REJECT, [("URDF301", 7)]),
         Case("mimic-twice", arm(follow='<mimic joint="j1"/><mimic joint="j1"/>'), WARN, [("URDF209", 7)]),
     ]
