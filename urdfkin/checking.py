@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Limits
@@ -17,6 +18,7 @@ def check(
     limits: Limits = DEFAULT_LIMITS,
     mimic: bool | None = None,
     root_joint: str | None = None,
+    xacro_args: Mapping[str, object] | None = None,
     fold: bool = False,
 ) -> list[Finding]:
     """Findings about a URDF, by line.
@@ -30,6 +32,7 @@ def check(
         mimic: Whether mimic joints are to follow; without, what is wrong with them is a note. None: True,
             except for the robots whose catalogue entry says that theirs cannot work.
         root_joint: `"floating"` or `"planar"` when the robot will hang from such a joint.
+        xacro_args: Arguments for a .xacro file, which is expanded first; lines are those of the result.
         fold: Whether many warnings of one kind are folded into one that lists the lines.
 
     Returns:
@@ -44,7 +47,7 @@ def check(
     ...     print(finding)  # doctest: +ELLIPSIS
     <text>:1:42: URDF411 error: link 'stray': the link has no parent, and neither has "base"; ...
     """
-    text = read_source(source, limits.bytes)
+    text = read_source(source, limits.bytes, xacro_args)
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data)
@@ -56,5 +59,5 @@ def check(
 
 def _file(text: Text) -> Path | None:
     """The file a text was read from, which tells where its packages may lie."""
-    path = Path(text.label)
-    return None if text.label.startswith("<") or not path.is_file() else path
+    path = Path(text.source if text.entry is None else text.label)
+    return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path

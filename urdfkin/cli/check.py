@@ -11,12 +11,14 @@ from dataclasses import replace
 import click
 
 from urdfkin.checking import check
+from urdfkin.cli.arguments import xacro_args, xacro_option
 from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Limits, Severity
 from urdfkin.diagnostics.codes import REGISTRY
 from urdfkin.diagnostics.explain import find_code
 from urdfkin.diagnostics.formats import as_github, as_json, summary
 from urdfkin.diagnostics.sarif import as_sarif
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
+from urdfkin.urdf.xacro import XacroError
 
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}
 
@@ -39,6 +41,7 @@ _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "b
 @click.option(
     "--root-joint", type=click.Choice(["floating", "planar"]), help="Check the names this joint needs, too."
 )
+@xacro_option
 @click.option("--max-bytes", type=click.IntRange(1), default=DEFAULT_LIMITS.bytes, show_default=True)
 @click.option("--max-depth", type=click.IntRange(1), default=DEFAULT_LIMITS.depth, show_default=True)
 @click.option("--max-elements", type=click.IntRange(1), default=DEFAULT_LIMITS.elements, show_default=True)
@@ -73,8 +76,15 @@ def command(
     unreadable: list[UrdfkinError] = []
     for file in files:
         try:
-            found = check(_as_path(file), limits=limits, mimic=mimic, root_joint=root_joint, fold=fold)
-        except (SourceError, UnknownNameError) as error:
+            found = check(
+                _as_path(file),
+                limits=limits,
+                mimic=mimic,
+                root_joint=root_joint,
+                xacro_args=xacro_args(),
+                fold=fold,
+            )
+        except (SourceError, UnknownNameError, XacroError) as error:
             unreadable.append(error)
             continue
         findings += [_judged(f, strict) for f in found if _wanted(f, ignored, no_notes)]

@@ -5,14 +5,21 @@ In this order, the first folder that exists wins:
 1. `ROS_PACKAGE_PATH`: each entry that is called `name`, holds a folder `name`, or holds one one level down
    (as in `src/repository/name`);
 2. `AMENT_PREFIX_PATH`: `share/name` below each entry;
-3. the folders above the file: one that is called `name`, or holds a folder `name`.
+3. the folders above the file: one that is called `name`, whose `package.xml` says so, or that holds a
+   folder `name`.
 """
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+
+#: The environment's search paths.
+VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
+
+_NAME = re.compile(rb"<name>([^<]*)</name>")
 
 #: Schemes that name a package and a path inside it.
 SCHEMES = ("package://", "model://")
@@ -56,9 +63,18 @@ def _candidates(name: str, beside: Path | None, environ: Mapping[str, str]) -> I
         yield entry / "share" / name
     if beside is not None:
         for folder in beside.absolute().parents:
-            if folder.name == name:
+            if folder.name == name or _declares(folder / "package.xml", name):
                 yield folder
             yield folder / name
+
+
+def _declares(manifest: Path, name: str) -> bool:
+    """Whether a package's manifest gives it this name."""
+    try:
+        match = _NAME.search(manifest.read_bytes()[:100_000])
+    except OSError:
+        return False
+    return match is not None and match[1].decode("utf-8", "replace").strip() == name
 
 
 def _entries(variable: str | None) -> list[Path]:
