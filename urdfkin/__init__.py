@@ -13,6 +13,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from urdfkin.checking import check
     from urdfkin.diagnostics import Finding, UrdfError, UrdfWarning
     from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
     from urdfkin.loading import load
@@ -37,6 +38,7 @@ _HOMES = {
     "UrdfWarning": "urdfkin.diagnostics",
     "UrdfkinError": "urdfkin.errors",
     "VerificationError": "urdfkin.verification.certificate",
+    "check": "urdfkin.checking",
     "load": "urdfkin.loading",
     "validate": "urdfkin.validation.campaign",
 }
@@ -55,6 +57,7 @@ __all__ = [
     "UrdfWarning",
     "UrdfkinError",
     "VerificationError",
+    "check",
     "load",
     "validate",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import warnings
+from collections.abc import Mapping
 
 from urdfkin.diagnostics import Finding, Oracle, Severity, UrdfError, UrdfWarning, check_text
 from urdfkin.robot import Robot
@@ -17,16 +18,18 @@ def load(
     verify: bool = True,
     mimic: bool | None = None,
     root_joint: str | None = None,
+    xacro_args: Mapping[str, object] | None = None,
 ) -> Robot:
     """A robot from a URDF, checked before it is read.
 
     Args:
-        source: A path, a name of the catalogue (`urdfkin robots` lists them), URDF text, bytes, an open
-            file, or `-` for standard input.
+        source: A path (.urdf or .xacro), a name of the catalogue (`urdfkin robots` lists them), URDF text,
+            bytes, an open file, or `-` for standard input.
         verify: Whether every result is held against Pinocchio's.
         mimic: Whether mimic joints follow their leaders, as the URDF says; False lets each move freely.
             None: True, except for the robots whose catalogue entry says that theirs cannot work.
         root_joint: `"floating"` or `"planar"` hangs the root link from a moving joint.
+        xacro_args: Arguments for a .xacro file, which is expanded first (needs the extra `xacro`).
 
     Returns:
         The robot. Its findings are warned of (`UrdfWarning`), except for robots of the catalogue.
@@ -41,7 +44,7 @@ def load(
     >>> robot.nq, round(float(height), 4)
     (8, 0.926)
     """
-    text = read_source(source)
+    text = read_source(source, xacro_args=xacro_args)
     words, given_mimic = _words(text, mimic, root_joint), mimic
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
@@ -68,7 +71,7 @@ def load(
 
 def _words(text: Text, mimic: bool | None, root_joint: str | None) -> str:
     """What to write on a command line to get the same robot."""
-    words = [shlex.quote(text.source)]
+    words = [shlex.quote(text.source) + text.options]
     if mimic is False:
         words.append("--no-mimic")
     if root_joint is not None:

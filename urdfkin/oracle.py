@@ -181,7 +181,7 @@ class Oracle:
             pin.computeJointJacobians(model, data, q_k)
             for f, frame in enumerate(ids):
                 for r, reference in enumerate(wanted):
-                    full[k, f, r] = pin.getFrameJacobian(model, data, frame, reference)
+                    full[k, f, r] = _columns(pin.getFrameJacobian(model, data, frame, reference))
         return self._layout.couple(full)
 
     def jacobian_rates(
@@ -202,7 +202,7 @@ class Oracle:
             pin.computeJointJacobiansTimeVariation(model, data, q_k, v_full[k])
             for f, frame in enumerate(ids):
                 for r, reference in enumerate(wanted):
-                    full[k, f, r] = pin.getFrameJacobianTimeVariation(model, data, frame, reference)
+                    full[k, f, r] = _columns(pin.getFrameJacobianTimeVariation(model, data, frame, reference))
         return self._layout.couple(full)
 
     def joint_jacobian_rates(
@@ -218,7 +218,7 @@ class Oracle:
             pin.computeJointJacobiansTimeVariation(model, data, q_k, v_full[k])
             for j, joint in enumerate(joints):
                 for r, reference in enumerate(wanted):
-                    full[k, j, r] = pin.getJointJacobianTimeVariation(model, data, joint, reference)
+                    full[k, j, r] = _columns(pin.getJointJacobianTimeVariation(model, data, joint, reference))
         return self._layout.couple(full)
 
     def joint_jacobians(self, q: FloatArray, references: Sequence[Reference]) -> FloatArray:
@@ -231,14 +231,14 @@ class Oracle:
             pin.computeJointJacobians(model, data, q_k)
             for j, joint in enumerate(joints):
                 for r, reference in enumerate(wanted):
-                    full[k, j, r] = pin.getJointJacobian(model, data, joint, reference)
+                    full[k, j, r] = _columns(pin.getJointJacobian(model, data, joint, reference))
         return self._layout.couple(full)
 
     def screws(self, q: FloatArray) -> FloatArray:
         """(n, 6, rates): the whole `data.J` of `computeJointJacobians`, one column a rate, followers too."""
         out = np.empty((len(q), 6, len(self._layout.rate_columns)))
         for k, q_k in self._moving(q, None):
-            J = self._pin.computeJointJacobians(self._model, self._data, q_k)
+            J = _columns(self._pin.computeJointJacobians(self._model, self._data, q_k))
             out[k] = J[:, self._layout.rate_columns]
         return out
 
@@ -280,6 +280,11 @@ def _in_own_axes(base: BaseMotion, six: FloatArray, n: int) -> FloatArray:
     pairs = np.broadcast_to(six, (n, 6)).reshape(n, 2, 3)
     turned: FloatArray = np.einsum("nji,npj->npi", R, pairs).reshape(n, 6)
     return turned
+
+
+def _columns(J: FloatArray) -> FloatArray:
+    """(6, nv), also for a robot of one rate, whose single column Pinocchio hands out as a plain vector."""
+    return J.reshape(6, -1)
 
 
 class _Layout:

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, TypeGuard
 
 from urdfkin.catalogue import Entry, catalogue
 from urdfkin.errors import InputError, SourceError, UnknownNameError
 
 #: What `load` and `check` take.
 Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
+
+#: Bytes that are read unless a caller allows more; the checks refuse more than this too.
+MOST = 100_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,50 +29,81 @@ class Text:
         label: What to call it in messages: the path, `<text>`, `<stdin>`.
         source: What to write on a command line to get it again.
         entry: The catalogue's entry, if that is where it came from.
+        options: What must follow `source` on a command line, with a leading space: xacro arguments.
     """
 
     data: bytes
     label: str
     source: str
     entry: Entry | None = None
+    options: str = ""
 
 
-def read_source(source: Source) -> Text:
+def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, object] | None = None) -> Text:
     """The bytes of a URDF, wherever it is.
 
     A catalogue name comes before a file of the same name without a folder; write `./panda` for the file.
+
+    Args:
+        source: Any of the above.
+        most: Bytes (characters, for text files) after which reading ends, with one more, so that the checks
+            see that there are too many: a device may never end.
+        xacro_args: Arguments for a .xacro file, which is expanded.
 
     Raises:
         SourceError: the file cannot be read.
         UnknownNameError: neither a file nor a name of the catalogue; the nearest names are offered.
         InputError: something else than a source.
     """
+    if is_xacro(source):
+        return _expanded(Path(source).expanduser(), xacro_args or {})
+    if xacro_args:
+        raise InputError("xacro_args go with the path of a .xacro file", found=", ".join(xacro_args))
     if isinstance(source, bytes):
         return Text(source, "<bytes>", "<bytes>")
     if isinstance(source, os.PathLike):
-        return _read_file(Path(source))
+        return _read_file(Path(source), most)
     if isinstance(source, str):
-        return _read_word(source)
+        return _read_word(source, most)
     if hasattr(source, "read"):
         label = str(getattr(source, "name", "<file>"))
-        return _encoded(source.read(), label, label)
+        return _encoded(source.read(most + 1), label, label)
     raise InputError(
         "a robot comes from a path, a catalogue name, URDF text, bytes or an open file",
         found=type(source).__name__,
     )
 
 
-def _read_word(word: str) -> Text:
+def is_xacro(source: object) -> TypeGuard[str | os.PathLike[str]]:
+    """Whether a source is the path of a xacro file, by its name.
+
+    >>> is_xacro("arm.urdf.xacro"), is_xacro("arm.urdf"), is_xacro("<robot/>")
+    (True, False, False)
+    """
+    if isinstance(source, str) and source.lstrip().startswith("<"):
+        return False
+    return isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == ".xacro"
+
+
+def _expanded(path: Path, arguments: Mapping[str, object]) -> Text:
+    from urdfkin.urdf.xacro import expand  # noqa: PLC0415  only for those who pass xacro
+
+    words = {name: str(value) for name, value in arguments.items()}
+    options = "".join(f" --xacro-arg {shlex.quote(f'{name}:={value}')}" for name, value in words.items())
+    return Text(expand(path, words), f"{path} (expanded)", str(path), options=options)
+
+
+def _read_word(word: str, most: int) -> Text:
     if word == "-":
-        return Text(sys.stdin.buffer.read(), "<stdin>", "-")
+        return Text(sys.stdin.buffer.read(most + 1), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):
         return _encoded(word, "<text>", "<text>")
     if (entry := catalogue().get(word)) is not None:
-        read = _read_file(entry.path)
+        read = _read_file(entry.path, most)
         return Text(read.data, read.label, word, entry)
     path = Path(word).expanduser()
     if path.exists() or os.sep in word or path.suffix:
-        return _read_file(path)
+        return _read_file(path, most)
     raise UnknownNameError("robot", word, catalogue(), where="neither a file nor in the catalogue")
 
 
@@ -77,9 +113,10 @@ def _encoded(content: str | bytes, label: str, source: str) -> Text:
     return Text(data, label, source)
 
 
-def _read_file(path: Path) -> Text:
+def _read_file(path: Path, most: int) -> Text:
     try:
-        return Text(path.read_bytes(), str(path), str(path))
+        with path.open("rb") as file:
+            return Text(file.read(most + 1), str(path), str(path))
     except FileNotFoundError:
         raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
     except IsADirectoryError:

@@ -38,6 +38,35 @@ def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
     return decorate
 
 
+def _remember_xacro_args(context: click.Context, _: click.Parameter, words: Sequence[str]) -> None:
+    """Keep xacro arguments for `xacro_args`, so that no command has to hand them on."""
+    arguments = {}
+    for word in words:
+        name, colon, value = word.partition(":=")
+        if not colon or not name:
+            raise click.BadParameter(f"{word!r} is not NAME:=VALUE")
+        arguments[name] = value
+    context.meta[_XACRO] = arguments
+
+
+_XACRO = "urdfkin.xacro_args"
+
+xacro_option = click.option(
+    "--xacro-arg",
+    multiple=True,
+    metavar="NAME:=VALUE",
+    expose_value=False,
+    callback=_remember_xacro_args,
+    help="An argument of a .xacro file; may be repeated.",
+)
+
+
+def xacro_args() -> dict[str, str]:
+    """What the running command was given as --xacro-arg."""
+    given: dict[str, str] = click.get_current_context().meta.get(_XACRO, {})
+    return given
+
+
 robot_argument = together(
     click.argument("robot", metavar="ROBOT"),
     click.option(
@@ -50,6 +79,7 @@ robot_argument = together(
         type=click.Choice(["floating", "planar"]),
         help="Hang the root link from a moving joint.",
     ),
+    xacro_option,
 )
 
 frame_option = click.option("--frame", metavar="NAME", help="A link or joint. Default: the robot's tip.")
@@ -89,7 +119,7 @@ def load_robot(source: str, mimic: bool | None, root_joint: str | None, *, verif
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        robot = load(source, mimic=mimic, root_joint=root_joint, verify=verify)
+        robot = load(source, mimic=mimic, root_joint=root_joint, xacro_args=xacro_args(), verify=verify)
     for warning in caught:
         click.echo(str(warning.message), err=True)
     return robot

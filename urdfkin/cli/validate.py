@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.catalogue import examples
+from urdfkin.cli.arguments import xacro_args, xacro_option
 from urdfkin.cli.output import compiling, console, make_table, write_file
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Local processes.")
 @click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow (the default).")
 @click.option("--root-joint", type=click.Choice(["floating", "planar"]), help="Hang the root from a joint.")
+@xacro_option
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as data.")
 @click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case.")
 @click.pass_context
@@ -63,6 +65,7 @@ def command(
             jobs=jobs,
             mimic=mimic,
             root_joint=root_joint,
+            xacro_args=xacro_args(),
             progress=progress,
         )
     if json_ is not None:

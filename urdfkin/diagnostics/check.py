@@ -11,7 +11,7 @@ from urdfkin.diagnostics.finding import Finding
 from urdfkin.diagnostics.joints import check_joints
 from urdfkin.diagnostics.mimic import check_mimic
 from urdfkin.diagnostics.names import check_names
-from urdfkin.diagnostics.records import read_robot
+from urdfkin.diagnostics.records import RobotRecord, read_robot
 from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.diagnostics.structure import check_structure
 from urdfkin.diagnostics.suspicious import check_suspicious
@@ -42,8 +42,19 @@ def check_text(
 
     Returns:
         Findings, sorted by line; empty for a file nothing can be said against.
+
+    >>> [finding.code for finding in check_text(b"<robot name='r'><link name='base'/></robot>")]
+    []
     """
     report = Reporter(file, data)
+    root = read_document(report, data, limits)
+    if root is not None:
+        check_robot(report, root, mimic=mimic, root_joint=root_joint)
+    return report.findings(fold=fold)
+
+
+def read_document(report: Reporter, data: bytes, limits: Limits) -> Element | None:
+    """The root element of a file, or None after the finding that says why there is none."""
     if len(data) > limits.bytes:
         report.add(
             codes.TOO_LARGE,
@@ -51,20 +62,21 @@ def check_text(
             found=f"{len(data)} bytes, more than {limits.bytes}",
             remedy="raise the limit with --max-bytes if the file is right",
         )
-        return report.findings(fold=fold)
+        return None
     text = utf8_bytes(report, data)
-    if text is not None:
-        report.data = text
-        root = parse(report, text, limits)
-        if root is not None:
-            _check_robot(report, root, mimic=mimic, root_joint=root_joint)
-    return report.findings(fold=fold)
+    if text is None:
+        return None
+    report.data = text
+    return parse(report, text, limits)
 
 
-def _check_robot(report: Reporter, root: Element, *, mimic: bool, root_joint: str | None) -> None:
+def check_robot(
+    report: Reporter, root: Element, *, mimic: bool = True, root_joint: str | None = None
+) -> RobotRecord | None:
+    """What the document says, with findings about it; None when it is no URDF."""
     version = check_dialect(report, root)
     if version is None:
-        return
+        return None
     check_vocabulary(report, root)
     robot = read_robot(report, root, version)
     check_names(report, robot, root_joint)
@@ -73,3 +85,4 @@ def _check_robot(report: Reporter, root: Element, *, mimic: bool, root_joint: st
     check_mimic(report, robot, obeyed=mimic)
     check_suspicious(report, robot, sound=sound)
     check_extras(report, robot)
+    return robot

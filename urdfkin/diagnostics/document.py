@@ -7,6 +7,7 @@ with content stops it before the first entity could be expanded.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
@@ -22,7 +23,7 @@ class Limits:
 
     Attributes:
         bytes: Size of the file.
-        depth: How deep elements may be nested. urdfdom's parser refuses more than 500.
+        depth: How deep elements may be nested; urdfdom's parser refuses more than 500.
         elements: How many elements there may be.
     """
 
@@ -33,8 +34,12 @@ class Limits:
 
 DEFAULT_LIMITS = Limits()
 
-#: libxml2, and with it everything built on lxml, refuses deeper nesting unless told otherwise.
+#: libxml2 refused deeper nesting for many years, and with it everything built on it.
 COMMON_DEPTH = 256
+_COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
+
+#: urdfdom's XML parser, and with it Pinocchio, refuses deeper nesting.
+ORACLE_DEPTH = 500
 
 
 @dataclass(slots=True, eq=False)
@@ -107,11 +112,13 @@ def parse(report: Reporter, data: bytes, limits: Limits = DEFAULT_LIMITS) -> Ele
         builder.syntax_error(error)
         return None
     if builder.deepest > COMMON_DEPTH:
+        refused = builder.deepest > ORACLE_DEPTH
+        reader, most = ("urdfdom refuses", ORACLE_DEPTH) if refused else _COMMON
         report.add(
-            codes.DEEP_NESTING,
+            codes.TOO_DEEP_FOR_ORACLE if refused else codes.DEEP_NESTING,
             f"elements are nested {builder.deepest} deep",
             builder.deepest_element,
-            remedy=f"readers built on libxml2 refuse more than {COMMON_DEPTH}",
+            remedy=f"{reader} more than {most}",
         )
     return builder.root
 
@@ -213,7 +220,7 @@ class _Builder:
         """Say what expat found in the words of the file."""
         reason = expat.errors.messages[error.code]
         if reason == expat.errors.XML_ERROR_UNDEFINED_ENTITY:
-            self.undefined_entity(None)
+            self.undefined_entity(self._entity_name())
             return
         innermost = self.open[-1] if self.open else None
         message, remedy = _REASONS.get(reason, (reason, None))
@@ -232,6 +239,11 @@ class _Builder:
             position=(error.lineno, error.offset + 1),
         )
 
+    def _entity_name(self) -> str | None:
+        """The first entity after the place of an error that XML itself does not define."""
+        names = _ENTITY.findall(self.report.data, self.parser.ErrorByteIndex)
+        return next((name.decode() for name in names if name not in _PREDEFINED), None)
+
     def _around(self, error: expat.ExpatError) -> str | None:
         """The text at the place of an error."""
         line = self.report.data.splitlines()[error.lineno - 1 : error.lineno]
@@ -239,13 +251,16 @@ class _Builder:
         return quoted(text) if text.strip() else None
 
 
+_ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
+_PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
+
 #: expat's reasons that deserve better words, and what to do about them.
 _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text where an element should begin", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
     expat.errors.XML_ERROR_BAD_CHAR_REF: ("a character that XML does not allow", None),
     expat.errors.XML_ERROR_TAG_MISMATCH: ("a closing tag does not match the element that is open", None),
-    expat.errors.XML_ERROR_NO_ELEMENTS: ("there is no element in the file", None),
+    expat.errors.XML_ERROR_NO_ELEMENTS: ("there is no element in the file", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_DUPLICATE_ATTRIBUTE: ("an attribute is given twice", "remove one of the two"),
     expat.errors.XML_ERROR_MISPLACED_XML_PI: (
         "the XML declaration is not at the very beginning of the file",

@@ -37,7 +37,8 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
         data: The file.
     """
     if not data.strip():
-        report.add(codes.EMPTY, "the file is empty" if not data else "the file holds only blanks")
+        what = "the file is empty" if not data else "the file holds only blanks"
+        report.add(codes.EMPTY, what, remedy="look at what should have written it")
         return None
     wide = next((name for mark, name in (*_MARKS, *_WIDE) if data.startswith(mark)), None)
     if wide is not None:
@@ -49,7 +50,9 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
     if not (_is_utf8(report, text, declared) and _agrees(report, text, declared)):
         return None
     if marked:
-        report.add(codes.BYTE_ORDER_MARK, "a byte order mark stands before the text")
+        report.add(
+            codes.BYTE_ORDER_MARK, "a byte order mark stands before the text", remedy="remove it if you can"
+        )
     return text
 
 

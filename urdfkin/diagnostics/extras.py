@@ -158,12 +158,12 @@ def _check_shape(report: Reporter, owner: Element, numbers: NumberReader) -> Non
         numbers.vector(origin, "rpy")
     shape = geometry.children[0] if geometry is not None and geometry.children else None
     if shape is None or shape.tag not in _SHAPES:
-        lacks = "<geometry>" if geometry is None else "a shape"
+        lacks = "no <geometry>" if geometry is None else "an empty <geometry>"
         report.add(
             codes.GEOMETRY,
             f"the {owner.tag} has no shape that URDF knows",
             geometry or owner,
-            found=f"no {lacks}" if shape is None else f"<{shape.tag}>",
+            found=lacks if shape is None else f"<{shape.tag}>",
             remedy="shapes are box, cylinder, sphere and mesh",
         )
         return

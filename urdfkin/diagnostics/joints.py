@@ -51,7 +51,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
         unit = " ".join(repr(x / length) for x in joint.axis)
         report.add(
             codes.AXIS_LENGTH,
-            f"the axis has length {length:.6g} and is normalised",
+            f"the axis has length {length:.9g} and is normalised",
             joint.axis_element,
             attribute="xyz",
             found=_written(joint),

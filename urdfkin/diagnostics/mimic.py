@@ -9,6 +9,9 @@ from urdfkin.diagnostics.finding import Severity
 from urdfkin.diagnostics.records import AXIAL, JointRecord, MimicRecord, RobotRecord
 from urdfkin.diagnostics.reporter import Reporter
 
+#: Largest multiplier, and offset in rad or m, that is taken for real.
+LARGEST = 1e6
+
 
 def check_mimic(report: Reporter, robot: RobotRecord, *, obeyed: bool) -> None:
     """What is wrong with mimic joints.
@@ -79,7 +82,7 @@ class _Judge:
         nearest = self.report.nearest(mimic.leader, self.joints)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.obeyed:
-            remedy += " With mimic off (--no-mimic) the joint moves freely"
+            remedy += " (with mimic off the joint moves freely)"
         self.add(codes.MIMIC_UNKNOWN, "the joint to follow does not exist", mimic, "joint", remedy)
 
     def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
@@ -92,6 +95,10 @@ class _Judge:
                 "multiplier",
                 "write the ratio, or make the joint fixed",
             )
+        for attribute, value in (("multiplier", mimic.multiplier), ("offset", mimic.offset)):
+            if abs(value) > LARGEST:
+                message = f"the {attribute} is out of all proportion"
+                self.add(codes.MIMIC_SCALE, message, mimic, attribute, "check the exponent")
         if joint.kind == "continuous":
             self.add(
                 codes.MIMIC_CONTINUOUS,

@@ -72,20 +72,19 @@ def _check_blanks(report: Reporter, element: Element) -> None:
 
 
 def _check_reserved(report: Reporter, name: str, element: Element, root_joint: str | None) -> None:
-    if name == "universe":
-        needed = root_joint is not None and element.tag == "link"
+    if name == "universe" and element.tag == "joint":
         report.add(
             codes.UNIVERSE,
-            "Pinocchio calls the world by this name",
+            "Pinocchio calls the world by this name and does not find the joint",
             element,
             attribute="name",
             remedy="rename it",
-            severity=Severity.ERROR if needed else None,
         )
-    elif name == "root_joint" and element.tag == "joint":
+    elif (element.tag, name) in (("link", "universe"), ("joint", "root_joint")):
+        what = "the world" if name == "universe" else "the joint of a free or planar base"
         report.add(
             codes.RESERVED_NAME,
-            "a free or planar base is called by this name",
+            f"{what} is called by this name",
             element,
             attribute="name",
             remedy="rename it" if root_joint else "rename it, or load without root_joint",

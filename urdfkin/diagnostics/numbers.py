@@ -86,15 +86,14 @@ class NumberReader:
                     remedy="check the exponent",
                 )
             return value
+        what = attribute if element.tag in _PLAIN else f"{attribute} of <{element.tag}>"
         if value is not None:
             message, remedy = "is too large for a double", "check the exponent"
         else:
             message, remedy = "is not a number", _remedy(piece)
         self.report.add(
             self.bad_number,
-            f"{attribute} {message}"
-            if piece == element.attributes[attribute]
-            else f"a part of {attribute} {message}",
+            f"{what} {message}" if piece == element.attributes[attribute] else f"a part of {what} {message}",
             element,
             attribute=attribute,
             found=quoted(piece),
@@ -126,6 +125,9 @@ class NumberReader:
 
 _NOT_ZERO = "123456789"
 
+#: Elements whose attributes need no further words.
+_PLAIN = ("origin", "axis", "limit")
+
 #: Longest number that is read; Python's conversion takes time quadratic in the length of absurd ones.
 _LONGEST = 2000
 
@@ -133,13 +135,15 @@ _LONGEST = 2000
 #: What a piece of text looks like -> what to do about it; the first that matches.
 _REMEDIES = (
     (r"[+-]?(nan|inf|infinity)", "only finite numbers have a meaning here"),
+    (r".*\$[({].*", "expand the xacro first"),
     (r".*,.*", "separate numbers by spaces and write decimals with a point"),
     (r"[+-]?0x.*", "write it in decimal digits"),
     (r"[+-]?[0-9.]+d[+-]?[0-9]+", "write the exponent with e"),
     (r".*[^\x00-\x7f].*", "write ASCII digits"),
     (r".*_.*", "write the digits without underscores"),
     (r"[\[({].*|.*[\])}]", "write the numbers without brackets"),
-    (r"[+-]?[0-9.]+[a-z]+", "write metres and radians, without a unit"),
+    (r"[+-]?[0-9.]+e[+-]?", "write digits after the e"),
+    (r"[+-]?[0-9.]+[a-z]+", "write the number without a unit"),
     (r"", "it is empty; write a number, or leave the attribute out"),
 )
 

@@ -240,7 +240,7 @@ class JointReader:
             numbers = NumberReader(self.report, joint_codes.IGNORED, joint_codes.IGNORED)
             numbers.vector(axis, "xyz")
             return
-        if "xyz" not in axis.attributes and not axis.text:
+        if "xyz" not in axis.attributes and not axis.text and not axis.children:
             self.report.add(
                 joint_codes.EMPTY_AXIS,
                 "<axis> without xyz is read as 1 0 0, and by urdfdom as 0 0 0",

@@ -113,8 +113,8 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
         report.add(codes.CYCLE, "no link is a root: every one is the child of a joint", robot.element)
     if len(roots) < 2:
         return len(roots) == 1
-    if None in children:
-        return False  # a joint that names no child has lost one of these; it has been reported
+    if not children <= robot.links.keys():
+        return False  # a joint that names no child, or a wrong one, has lost one of these: reported already
     parents = {joint.parent for joint in robot.joints}
     # The root that carries most is the robot; the others are what fell off.
     main = max(roots, key=lambda link: (link in parents, -list(robot.links).index(link)))

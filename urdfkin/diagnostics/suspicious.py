@@ -24,6 +24,9 @@ DEGREES, ENDLESS = 30.0, 1000.0
 #: By how much a tip may be off, in m, before a rounded pi is a warning.
 NOTICEABLE = 1e-3
 
+#: An angle, in rad, that is off by less was written with all the digits one could want.
+ROUNDING = 1e-10
+
 #: Multiples of pi that people write, and with how many decimals at least they are recognised.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
@@ -115,7 +118,7 @@ def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
         return None
     for multiple, least in _MULTIPLES:
         value = math.copysign(float(multiple) * math.pi, angle)
-        if decimals >= least and 1e-13 < abs(angle - value) < 10.0**-decimals:
+        if decimals >= least and ROUNDING < abs(angle - value) < 10.0**-decimals:
             return multiple, value
     return None
 
@@ -126,10 +129,10 @@ def _as_pi(multiple: Fraction) -> str:
 
 
 def _metres(length: float) -> str:
-    for factor, unit in ((1.0, "m"), (1e3, "mm"), (1e6, "um")):
-        if length * factor >= 1.0:
-            return f"{length * factor:.2g} {unit}"
-    return f"{length * 1e9:.2g} nm"
+    units = ((1.0, "m"), (1e3, "mm"), (1e6, "um"))
+    factor, unit = next((pair for pair in units if length * pair[0] >= 1.0), (1e9, "nm"))
+    # Two digits, and never an exponent.
+    return f"{float(f'{length * factor:.1e}'):g} {unit}"
 
 
 def _check_lengths(report: Reporter, joint: JointRecord) -> None:

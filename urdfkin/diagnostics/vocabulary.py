@@ -65,8 +65,8 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
     "texture": frozenset({"filename"}),
 }
 
-#: Attributes of other formats that are not URDF's and are easily taken for it.
-_FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler"}
+#: Elements and attributes of other formats that say where something is, and are skipped here.
+_FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
 #: Children that may stand once only.
 _ONCE = {
@@ -80,6 +80,9 @@ _ONCE = {
 
 #: Elements whose value would be lost if it stood between the tags.
 _VALUES = {"origin", "axis", "limit", "mimic", "parent", "child"}
+
+#: Elements whose text can only be their value, put in the wrong place.
+_VECTORS = ("origin", "axis")
 
 #: Attributes whose misspelling loses something about motion.
 _KINEMATIC = {"origin", "axis", "limit", "mimic", "parent", "child", "joint", "link", "robot"}
@@ -119,12 +122,25 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
     if parts:
         return
     close = nearest(element.tag, known)
+    parent = element.parent
+    if parent is not None and parent.tag in _VECTORS and element.text and not parent.attributes:
+        report.add(
+            codes.STRAY_TEXT,
+            f"the value inside <{element.tag}> is skipped",
+            element,
+            found=quoted(element.text),
+            remedy=f"write it as an attribute, as in {_EXAMPLES[parent.tag]}",
+            severity=Severity.ERROR,
+        )
+        return
+    foreign = element.tag in _FOREIGN
+    remedy = f"write {_EXAMPLES['origin']}" if foreign else f"did you mean <{close}>?" if close else None
     report.add(
         codes.UNKNOWN_ELEMENT,
-        f"<{element.tag}> means nothing in <{element.parent.tag if element.parent else ''}> and is skipped",
+        f"<{element.tag}> means nothing in <{parent.tag if parent else ''}> and is skipped",
         element,
-        remedy=f"did you mean <{close}>?" if close else None,
-        severity=Severity.WARNING if close else Severity.NOTE,
+        remedy=remedy,
+        severity=Severity.WARNING if close or foreign else Severity.NOTE,
     )
 
 
@@ -178,13 +194,14 @@ def _check_text(report: Reporter, element: Element) -> None:
         return
     if element.tag in ("parent", "child") and "link" not in element.attributes:
         return  # reported as a missing attribute, with this text
-    lost = element.tag in ("origin", "axis") and not element.attributes
+    lost = element.tag in _VECTORS and not element.attributes
+    example = _EXAMPLES.get(element.tag)
     report.add(
         codes.STRAY_TEXT,
         f"text inside <{element.tag}> is skipped",
         element,
         found=quoted(element.text),
-        remedy=f"write it as an attribute, as in {_EXAMPLES.get(element.tag, '<origin xyz=...>')}",
+        remedy=f"write it as an attribute, as in {example}" if example else "remove it",
         severity=Severity.ERROR if lost else None,
     )
 

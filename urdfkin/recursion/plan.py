@@ -7,6 +7,7 @@ frame's ancestors alone; a plan for several frames holds every joint one of them
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from enum import IntEnum
@@ -194,7 +195,8 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: set[int
 
 
 def _length(joint: Joint) -> float:
-    return float(np.linalg.norm(joint.T_parent_joint[:3, 3]))
+    # hypot neither under- nor overflows where squares would: a URDF may hold 1e-200 or 1e200.
+    return math.hypot(*joint.T_parent_joint[:3, 3].tolist())
 
 
 def turned(joint: Joint) -> FloatArray:

@@ -1,7 +1,9 @@
 """URDF text to `KinematicTree`, through yourdfpy; the only module that imports it.
 
-yourdfpy reads the XML; what the URDF specification says beyond it is done here: axes are normalised, chains
-of mimic joints are resolved, joints are put in Pinocchio's order. Meshes are never opened.
+yourdfpy is given the links and joints alone (`urdfkin.urdf.skeleton`): shapes, colours, odd encodings, loose
+ends that its parser would repair, and quaternions that it does not know never reach it. What the URDF
+specification says beyond it is done here: axes are normalised, chains of mimic joints are resolved, joints
+are put in Pinocchio's order. Meshes are never opened.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from urdfkin.tree import (
     build_tree,
     with_root_joint,
 )
+from urdfkin.urdf.skeleton import skeleton
 
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
@@ -57,9 +60,8 @@ def _parse(data: bytes) -> yourdf.Robot:
     # Imported on first use: the meshing library under yourdfpy takes half a second.
     from yourdfpy import URDF  # noqa: PLC0415
 
-    return URDF.load(
-        io.BytesIO(data), build_scene_graph=False, load_meshes=False, filename_handler=lambda name: name
-    ).robot
+    text = io.BytesIO(skeleton(data))
+    return URDF.load(text, build_scene_graph=False, load_meshes=False).robot
 
 
 def _root_kind(word: str) -> JointKind:

@@ -10,13 +10,13 @@ import datetime
 import multiprocessing
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.oracle import OracleError
 from urdfkin.robot import Robot
-from urdfkin.sources import Source, read_source
+from urdfkin.sources import Source, is_xacro, read_source
 from urdfkin.validation.chunk import SPECIAL, Chunk, ChunkResult, Subject, chunks, run_chunk
 from urdfkin.validation.report import RobotReport, ValidationReport, Verdict
 from urdfkin.validation.tally import Key, Tally
@@ -33,6 +33,7 @@ def validate(
     jobs: int = 1,
     mimic: bool | None = None,
     root_joint: str | None = None,
+    xacro_args: Mapping[str, object] | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> ValidationReport:
@@ -46,6 +47,7 @@ def validate(
         jobs: Local processes.
         mimic: As in `load`.
         root_joint: As in `load`.
+        xacro_args: As in `load`, for each .xacro file among the robots.
         executor: Runs the chunks instead of local processes.
         progress: Told after each chunk.
 
@@ -63,7 +65,7 @@ def validate(
     if samples < 0 or jobs < 1:
         raise InputError("validate needs samples >= 0 and jobs >= 1", found=f"{samples} and {jobs}")
     many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
-    subjects = [_subject(robot, mimic, root_joint) for robot in many]
+    subjects = [_subject(robot, mimic, root_joint, xacro_args) for robot in many]
     started, begin = datetime.datetime.now(datetime.UTC), time.perf_counter()
     run = _Run(subjects, samples, seed, progress)
     try:
@@ -87,9 +89,17 @@ def validate(
     )
 
 
-def _subject(robot: Source | Robot, mimic: bool | None, root_joint: str | None) -> Subject:
+def _subject(
+    robot: Source | Robot,
+    mimic: bool | None,
+    root_joint: str | None,
+    xacro_args: Mapping[str, object] | None = None,
+) -> Subject:
     if isinstance(robot, Robot):
         return Subject.of(robot)
+    if is_xacro(robot):
+        text = read_source(robot, xacro_args=xacro_args)  # expanded once, here
+        return Subject(text.data, mimic, root_joint, text.source + text.options)
     if isinstance(robot, os.PathLike):
         return Subject(os.fspath(robot), mimic, root_joint)
     if isinstance(robot, str | bytes):

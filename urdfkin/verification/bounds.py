@@ -46,6 +46,7 @@ from urdfkin.tree import FloatArray
 from urdfkin.verification.magnitudes import Magnitudes
 
 EPS = float(np.finfo(np.float64).eps)
+_SMALLEST = float(np.finfo(np.float64).tiny)
 #: Roundings for each joint and each factor, both computations together; derived above.
 ROUNDINGS = 24.0
 
@@ -160,7 +161,9 @@ def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArr
     A result that is not a number disagrees by inf.
     """
     difference = np.abs(ours - theirs)
+    # Below the smallest normal number rounding is no longer relative: products simply lose their last bits.
+    unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, _SMALLEST), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        units = difference / (EPS * bound.scale)
+        units = difference / unit
     units = np.where(difference == 0.0, 0.0, units)
     return np.where(np.isfinite(difference), units, np.inf)

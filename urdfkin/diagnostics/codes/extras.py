@@ -70,7 +70,7 @@ GEOMETRY = Code(
     why="Kinematics does not need it. urdfdom logs an error and goes on without the element.",
     bad=_visual(""),
     good=_GOOD_VISUAL,
-    others="Pinocchio reads it and drops the shape; yourdfpy reads it.",
+    others="Pinocchio reads it and drops the shape; yourdfpy refuses it.",
 )
 
 MESH_MISSING = Code(

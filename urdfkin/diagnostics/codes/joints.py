@@ -266,3 +266,15 @@ MIMIC_CHAIN = Code(
     good=_GOOD_MIMIC,
     others="Pinocchio reads it without mimic; yourdfpy reads it and follows one step.",
 )
+
+MIMIC_SCALE = Code(
+    "URDF526",
+    "mimic-scale",
+    WARNING,
+    "a mimic joint's multiplier or offset is out of all proportion",
+    why="The follower's rate is the leader's times the multiplier, and accelerations hold its square: beyond"
+    " 1e150 that is more than a double can hold, and long before it nothing else in the robot counts.",
+    bad=_two('  <mimic joint="lead" multiplier="1e300"/>\n'),
+    good=_GOOD_MIMIC,
+    others="Pinocchio reads it; yourdfpy reads it.",
+)

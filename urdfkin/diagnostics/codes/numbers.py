@@ -31,7 +31,7 @@ BAD_VECTOR = Code(
     why="xyz and rpy are three numbers. With fewer or more, nobody can know which one is meant.",
     bad=_origin('xyz="0 1"'),
     good=_origin('xyz="0 1 0"'),
-    others="Pinocchio refuses it; yourdfpy reads it: a missing number may shift the others.",
+    others="Pinocchio refuses it; yourdfpy refuses it: not for every vector, though.",
 )
 
 WHITESPACE = Code(

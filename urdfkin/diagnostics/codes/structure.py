@@ -47,9 +47,9 @@ UNIVERSE = Code(
     "URDF404",
     "name-universe",
     WARNING,
-    "a link or joint is called 'universe', as Pinocchio calls the world",
-    why="Pinocchio finds a frame by its name, and the world comes first: asked for this one it answers with"
-    " the world, and a fixed joint of this name vanishes. Results at it cannot be verified.",
+    "a joint is called 'universe', as Pinocchio calls the world",
+    why="Pinocchio finds a joint by its name, and the world comes first: asked for this one it answers with"
+    " the world, and a fixed joint of this name vanishes. Results of the robot cannot be verified.",
     bad=_fixed("universe", "base", "tip"),
     good=_fixed("mount", "base", "tip"),
     others="Pinocchio reads it: the frame is lost; yourdfpy reads it.",
@@ -114,8 +114,7 @@ SELF_PARENT = Code(
     why="The link would be its own parent: a loop of one.",
     bad=_fixed("j", "base", "tip") + _fixed("k", "tip", "tip"),
     good=_fixed("j", "base", "tip"),
-    others="Pinocchio reads it: urdfdom lets the last joint win, and a loop can kill the process; yourdfpy"
-    " reads it.",
+    others="Pinocchio refuses it: with other names it follows the loop and dies; yourdfpy reads it.",
 )
 
 SEVERAL_PARENTS = Code(

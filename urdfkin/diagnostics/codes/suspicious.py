@@ -89,7 +89,7 @@ OVERFLOW = Code(
     ERROR,
     "lengths along a chain add up to more than a double can hold",
     why="The placement of the chain's end would be infinite.",
-    bad=_joint('  <origin xyz="1e308 1e308 1e308"/>\n'),
+    bad=_joint('  <origin xyz="1.7e308 1.7e308 0"/>\n'),
     good=_joint('  <origin xyz="1 1 1"/>\n'),
     others="Pinocchio reads it and computes infinities; yourdfpy reads it.",
 )

@@ -12,7 +12,7 @@ EMPTY = Code(
     why="There is nothing to read. Usually a failed export, or a pipe whose first command printed nothing.",
     bad="   \n",
     good=_ROBOT,
-    others="Pinocchio refuses it; yourdfpy raises an error of its XML parser.",
+    others="Pinocchio refuses it; yourdfpy refuses it.",
 )
 
 ENCODING = Code(
@@ -25,7 +25,7 @@ ENCODING = Code(
     " the file for some readers and not for others: they would see two different robots.",
     bad='<robot name="example">\n  <link name="base"/>\n</robot>\n\x00<joint name="hidden"/>\n',
     good=_ROBOT,
-    others="Pinocchio stops at a zero byte and reads what stands before it; yourdfpy refuses or repairs.",
+    others="Pinocchio reads it up to the zero byte; yourdfpy reads it: it recovers what it can.",
 )
 
 DECLARED = Code(
@@ -37,7 +37,7 @@ DECLARED = Code(
     " different names.",
     bad='<?xml version="1.0" encoding="UTF-16"?>\n' + _ROBOT,
     good='<?xml version="1.0" encoding="UTF-8"?>\n' + _ROBOT,
-    others="Pinocchio ignores the declaration; yourdfpy obeys it.",
+    others="Pinocchio reads it and ignores the declaration; yourdfpy refuses it.",
 )
 
 DECLARED_ASCII = Code(
@@ -49,7 +49,7 @@ DECLARED_ASCII = Code(
     " urdfdom, which ignores the declaration, and by everyone else.",
     bad='<?xml version="1.0" encoding="ISO-8859-1"?>\n' + _ROBOT,
     good='<?xml version="1.0" encoding="UTF-8"?>\n' + _ROBOT,
-    others="Pinocchio and yourdfpy read it.",
+    others="Pinocchio reads it; yourdfpy reads it.",
 )
 
 SYNTAX = Code(
@@ -61,7 +61,7 @@ SYNTAX = Code(
     " middle may look like a smaller robot. urdfkin never repairs.",
     bad='<robot name="example">\n  <link name="base">\n</robot>\n',
     good=_ROBOT,
-    others="Pinocchio refuses it; yourdfpy falls back to a parser that recovers and returns what it got.",
+    others="Pinocchio refuses it; yourdfpy reads it: a second parser recovers what it can.",
 )
 
 ENTITY = Code(
@@ -74,7 +74,7 @@ ENTITY = Code(
     " the reference as literal text, so even a harmless entity gives two readers two names.",
     bad='<!DOCTYPE robot [<!ENTITY n "tool">]>\n<robot name="example">\n  <link name="&n;"/>\n</robot>\n',
     good='<robot name="example">\n  <link name="tool"/>\n</robot>\n',
-    others="Pinocchio keeps '&n;' as text; yourdfpy expands entities, those that read local files included.",
+    others="Pinocchio reads it and keeps '&n;' as text; yourdfpy reads it and expands the entity.",
 )
 
 DOCTYPE = Code(
@@ -85,7 +85,7 @@ DOCTYPE = Code(
     why="It has no meaning in a URDF and is ignored. With content it would be an error (URDF106).",
     bad="<!DOCTYPE robot>\n" + _ROBOT,
     good=_ROBOT,
-    others="Pinocchio and yourdfpy ignore it.",
+    others="Pinocchio reads it; yourdfpy reads it.",
 )
 
 TOO_LARGE = Code(
@@ -97,7 +97,7 @@ TOO_LARGE = Code(
     " each can be raised: --max-bytes, --max-depth, --max-elements, or `Limits` in the library.",
     bad='<robot name="example">\n  <link name="base"/>\n' + "<a>" * 500 + "</a>" * 500 + "\n</robot>\n",
     good=_ROBOT,
-    others="urdfdom's parser refuses elements nested deeper than 500, libxml2 deeper than 256.",
+    others="Pinocchio refuses it: 500 levels are the most its parser takes; yourdfpy reads it.",
 )
 
 DEEP_NESTING = Code(
@@ -105,11 +105,11 @@ DEEP_NESTING = Code(
     "deep-nesting",
     WARNING,
     "elements are nested deeper than common readers accept",
-    why="The robot can be computed, but programs built on libxml2 (all that use lxml, yourdfpy among them)"
-    " refuse to read such a file.",
+    why="The robot can be computed, but programs built on an older libxml2 refuse more than 256 levels, and"
+    " urdfdom refuses more than 500.",
     bad='<robot name="example">\n  <link name="base"/>\n' + "<a>" * 300 + "</a>" * 300 + "\n</robot>\n",
     good=_ROBOT,
-    others="Pinocchio reads up to 500 levels; yourdfpy up to 256.",
+    others="Pinocchio reads it: up to 500 levels; yourdfpy reads it.",
 )
 
 TOO_DEEP_FOR_ORACLE = Code(
@@ -121,7 +121,7 @@ TOO_DEEP_FOR_ORACLE = Code(
     " so nothing can be verified.",
     bad='<robot name="example">\n  <link name="base"/>\n' + "<a>" * 600 + "</a>" * 600 + "\n</robot>\n",
     good=_ROBOT,
-    others="Pinocchio and yourdfpy refuse it.",
+    others="Pinocchio refuses it; yourdfpy reads it.",
     oracle=REFUSES,
 )
 
@@ -133,7 +133,7 @@ XML_VERSION = Code(
     why="A URDF is XML 1.0. urdfdom does not look; strict XML readers may refuse.",
     bad='<?xml version="1.1"?>\n' + _ROBOT,
     good='<?xml version="1.0"?>\n' + _ROBOT,
-    others="Pinocchio and yourdfpy read it.",
+    others="Pinocchio reads it; yourdfpy reads it.",
 )
 
 INCLUDE = Code(
@@ -146,7 +146,7 @@ INCLUDE = Code(
     bad='<robot name="example" xmlns:xi="http://www.w3.org/2001/XInclude">\n  <link name="base"/>\n'
     '  <xi:include href="arm.urdf"/>\n</robot>\n',
     good=_ROBOT,
-    others="Pinocchio and yourdfpy skip the element: the part is missing without a word.",
+    others="Pinocchio reads it: the part is missing without a word; yourdfpy reads it likewise.",
 )
 
 BYTE_ORDER_MARK = Code(
@@ -157,5 +157,5 @@ BYTE_ORDER_MARK = Code(
     why="Allowed by XML and skipped. Some scripts that look for '<' at the very beginning stumble over it.",
     bad="\ufeff" + _ROBOT,
     good=_ROBOT,
-    others="Pinocchio and yourdfpy skip it.",
+    others="Pinocchio reads it; yourdfpy reads it.",
 )

@@ -1,0 +1,1 @@
+"""What a maintainer runs: fuzzing, and scripts that write generated pages."""

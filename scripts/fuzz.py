@@ -1,0 +1,183 @@
+"""Mutate real URDFs and see that nothing hurts: no crash, no hang, no traceback, no wrong number in silence.
+
+    python scripts/fuzz.py --mutants 20000 --seed 0 --jobs 2
+
+Each mutant goes through `check`, `load` and Pinocchio in a worker process that is restarted when it dies or
+takes too long. Mutant i depends on the seed and on i alone, so `--only i` replays it. What went wrong is kept
+as a file with the mutant's bytes, beside a note that says what happened. Exit 0: nothing did.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import contextlib
+import json
+import queue
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+
+from scripts.fuzzing import GOOD
+from scripts.fuzzing.mutations import LARGEST, mutant
+from urdfkin.catalogue import catalogue
+
+#: What a worker answers when it is ready; the first use compiles, which may take a while.
+READY, FIRST_WAIT = "ready", 300.0
+
+
+def files() -> list[Path]:
+    """The robots that are mutated."""
+    paths = (entry.path for entry in catalogue().values())
+    return [path for path in paths if path.stat().st_size <= LARGEST]
+
+
+class Worker:
+    """A process that judges one mutant after another; it may die."""
+
+    def __init__(self, command: list[str], timeout: float) -> None:
+        self.command, self.timeout = command, timeout
+        self.process: subprocess.Popen[str] | None = None
+        self.listener: threading.Thread | None = None
+        self.lines: queue.Queue[str | None] = queue.Queue()
+
+    def judge(self, number: int) -> tuple[str, str]:
+        """The outcome's word and details; a death and a hang are outcomes, too."""
+        if self.process is None:
+            self.start()
+        assert self.process is not None
+        assert self.process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):  # dead already: the next line says so
+            self.process.stdin.write(f"{number}\n")
+            self.process.stdin.flush()
+        try:
+            line = self.lines.get(timeout=self.timeout)
+        except queue.Empty:
+            self.stop()
+            return "hangs", f"no answer in {self.timeout:g} s"
+        if line is None:
+            return "kills the process", f"exit status {self.stop()}"
+        word, details = json.loads(line)
+        return str(word), str(details)
+
+    def start(self) -> None:
+        """Start the process and wait until it has compiled what it needs."""
+        self.process = subprocess.Popen(
+            self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
+        self.lines = queue.Queue()
+        self.listener = threading.Thread(target=self._listen, args=(self.process, self.lines), daemon=True)
+        self.listener.start()
+        if self.lines.get(timeout=FIRST_WAIT) != READY:
+            raise RuntimeError("the worker does not start")
+
+    @staticmethod
+    def _listen(process: subprocess.Popen[str], lines: queue.Queue[str | None]) -> None:
+        assert process.stdout is not None
+        for line in process.stdout:
+            lines.put(line.strip())
+        lines.put(None)
+
+    def stop(self) -> int | None:
+        """End the process, if it has not ended by itself; its exit status."""
+        if self.process is None:
+            return None
+        process, self.process = self.process, None
+        if process.poll() is None:
+            process.kill()
+        status = process.wait()
+        if self.listener is not None:
+            self.listener.join()
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(BrokenPipeError):
+                    pipe.close()
+        return status
+
+
+def work(seed: int) -> None:
+    """The worker's side: a number in, an outcome out."""
+    from scripts.fuzzing.judge import judge  # noqa: PLC0415  only the worker needs the compiler
+
+    robots = files()
+    answers = sys.stdout
+    sys.stdout = sys.stderr
+    judge(robots[0].read_bytes())
+    print(READY, file=answers, flush=True)
+    for line in sys.stdin:
+        outcome = judge(mutant(seed, int(line), robots)[1])
+        print(json.dumps([outcome.word, outcome.details]), file=answers, flush=True)
+
+
+def fuzz(
+    numbers: Iterable[int], seed: int, jobs: int, timeout: float, keep: Path
+) -> collections.Counter[str]:
+    """Judge mutants by number; keep what went wrong; count the outcomes."""
+    waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
+    for number in numbers:
+        waiting.put(number)
+    counts: collections.Counter[str] = collections.Counter()
+    robots = files()
+
+    def run() -> None:
+        worker = Worker([sys.executable, __file__, "--worker", "--seed", str(seed)], timeout)
+        while True:
+            try:
+                number = waiting.get_nowait()
+            except queue.Empty:
+                worker.stop()
+                return
+            word, details = worker.judge(number)
+            counts[word] += 1
+            if word not in GOOD:
+                what, data = mutant(seed, number, robots)
+                keep.mkdir(parents=True, exist_ok=True)
+                (keep / f"{seed}-{number}.urdf").write_bytes(data)
+                (keep / f"{seed}-{number}.txt").write_text(f"{what}\n{word}\n{details}\n", "utf-8")
+                print(f"mutant {number} ({what}): {word}", flush=True)
+
+    threads = [threading.Thread(target=run) for _ in range(jobs)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return counts
+
+
+def main() -> int:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--mutants", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--timeout", type=float, default=30.0, help="seconds for one mutant")
+    parser.add_argument("--only", type=int, help="judge this mutant alone")
+    parser.add_argument(
+        "--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for what goes wrong"
+    )
+    parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.worker:
+        work(options.seed)
+        return 0
+    numbers = range(options.mutants) if options.only is None else [options.only]
+    start = time.perf_counter()
+    counts = fuzz(numbers, options.seed, options.jobs, options.timeout, options.keep)
+    seconds, total = time.perf_counter() - start, sum(counts.values())
+    print(f"{total} mutants of {len(files())} robots, seed {options.seed}, {seconds:.0f} s")
+    for word, count in counts.most_common():
+        print(f"{count:8d}  {word}")
+    bad = total - sum(counts[word] for word in GOOD)
+    print(f"{bad} went wrong" + (f": see {options.keep}" if bad else ""))
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

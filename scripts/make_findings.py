@@ -1,0 +1,110 @@
+"""Write docs/findings.md: every code, and what the robots of the catalogue are told.
+
+Run it after a code or a robot has changed: `python scripts/make_findings.py`. A test holds the page against
+what this script would write.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from urdfkin.catalogue import catalogue
+from urdfkin.checking import check
+from urdfkin.diagnostics import Finding, Severity
+from urdfkin.diagnostics.codes import REGISTRY
+from urdfkin.diagnostics.escape import shortened
+
+PAGE = Path(__file__).parents[1] / "docs" / "findings.md"
+
+FAMILIES = {
+    "1": "Text and XML",
+    "2": "Dialect, elements and attributes",
+    "3": "Numbers",
+    "4": "Names and structure",
+    "5": "Joints",
+    "6": "Suspicious",
+    "7": "Inertials, geometry and materials",
+}
+
+#: Code -> what the warning means for the robots that have it, in a few words.
+REMARKS = {
+    "URDF405": "A slash in a name is legal; urdfkin never uses names as paths.",
+    "URDF508": "Limits were left out or set to zero, so samples within them leave the joint at rest.",
+    "URDF510": "The value has no effect, and none is expected.",
+    "URDF702": "No body has these moments of inertia; kinematics does not use them.",
+    "URDF706": "The address of the mesh is wrong or points into another machine; kinematics needs no mesh.",
+    "URDF708": "Only a colour is missing.",
+}
+
+HEAD = """\
+# Findings
+
+`urdfkin check FILE` and `urdfkin.check(source)` say what is wrong with a URDF; `urdfkin.load` refuses a file
+with an error and warns of the rest. `urdfkin explain CODE` prints a code's page. This file is written by
+`scripts/make_findings.py`.
+
+- An **error** means that the file has no one meaning: it is refused.
+- A **warning** is legal and almost certainly not meant, or not what every reader makes of it.
+- A **note** is worth knowing.
+
+Codes marked *refuses* or *differs* are legal, but Pinocchio refuses the file or reads another robot from it:
+urdfkin computes the robot and reports every result as **not verified**, with the finding as the reason.
+
+In a repository of robots, use the hook `urdfkin-check` of pre-commit, or in a workflow
+`urdfkin check --format github robots/*.urdf`. `--format sarif` is for code scanning, `--format json` for
+programs. Exit status: 0 no error, 1 an error (with `--strict`, a warning), 2 a file or an option that cannot
+be used.
+
+Limits, which options raise: 100,000,000 bytes (`--max-bytes`), 500 levels of nesting (`--max-depth`),
+2,000,000 elements (`--max-elements`).
+
+## Codes
+"""
+
+ROBOTS = """\
+## What the robots of the catalogue are told
+
+No robot has an error (alex_psyonic_hands is loaded with mimic off, which its catalogue entry says). These are
+the warnings; robots that are not listed have none. Notes, such as rounded multiples of pi, are left out.
+
+| robot | code | where | what | meaning |
+|---|---|---|---|---|
+"""
+
+
+def page() -> str:
+    """The page as it should be."""
+    return HEAD + "".join(_tables()) + "\n" + ROBOTS + "".join(_robots())
+
+
+def _tables() -> Iterator[str]:
+    for digit, family in FAMILIES.items():
+        yield f"\n### {family}\n\n| code | name | severity | finding | Pinocchio |\n|---|---|---|---|---|\n"
+        for code in REGISTRY.values():
+            if code.id[4] == digit:
+                mark = f"*{code.oracle.value}*" if code.oracle else ""
+                title = _cell(code.title)
+                yield f"| {code.id} | {code.slug} | {code.severity.value} | {title} | {mark} |\n"
+
+
+def _robots() -> Iterator[str]:
+    for name in catalogue():
+        for finding in warnings_of(name):
+            lines = f"line {finding.line}" + (f" and {len(finding.also)} more" if finding.also else "")
+            what = _cell(f"{finding.subject}: {finding.message}" if finding.subject else finding.message)
+            yield f"| {name} | {finding.code} | {lines} | {what} | {REMARKS[finding.code]} |\n"
+
+
+def warnings_of(robot: str) -> list[Finding]:
+    """The warnings and errors of a robot of the catalogue."""
+    return [finding for finding in check(robot, fold=True) if finding.severity is not Severity.NOTE]
+
+
+def _cell(text: str) -> str:
+    """Text that cannot break out of a table's cell."""
+    return shortened(text, 200).replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), "utf-8")

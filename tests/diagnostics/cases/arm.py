@@ -1,0 +1,71 @@
+"""A small arm in which one thing can be changed, and what a changed one deserves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+ACCEPT, WARN, REJECT = "accept", "accept-with-warning", "reject"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One document, its verdict, and the findings it must have among others: (code, line)."""
+
+    name: str
+    text: str | bytes
+    verdict: str
+    findings: list[tuple[str, int]] = field(default_factory=list)
+
+    @property
+    def data(self) -> bytes:
+        return self.text if isinstance(self.text, bytes) else self.text.encode()
+
+
+def arm(
+    *,
+    head: str = '<?xml version="1.0"?>',
+    robot: str = 'name="r"',
+    base: str = '<link name="base"/>',
+    attributes: str = 'type="revolute"',
+    origin: str = '<origin xyz="0 0 0.3" rpy="0.1 0.2 0.3"/>',
+    ends: str = '<parent link="base"/><child link="l1"/>',
+    axis: str = '<axis xyz="0 0 1"/>',
+    limit: str = '<limit lower="-2" upper="2" effort="10" velocity="5"/>',
+    inside: str = "",
+    second: str = 'type="revolute"',
+    follow: str = "",
+    more: str = "",
+) -> str:
+    """Line 3 to 5: links; 6: joint j1 with everything that can be changed; 7: joint j2; 8: more."""
+    return f"""{head}
+<robot {robot}>
+  {base}
+  <link name="l1"/>
+  <link name="tool"/>
+  <joint name="j1" {attributes}>{origin}{ends}{axis}{limit}{inside}</joint>
+  <joint name="j2" {second}><parent link="l1"/><child link="tool"/>{LIMIT}{follow}</joint>
+  {more}
+</robot>
+"""
+
+
+LIMIT = '<limit lower="-2" upper="2" effort="10" velocity="5"/>'
+
+
+def xyz(value: str) -> str:
+    return arm(origin=f'<origin xyz="{value}"/>')
+
+
+def axis(value: str, kind: str = "revolute") -> str:
+    return arm(axis=f'<axis xyz="{value}"/>', attributes=f'type="{kind}"')
+
+
+def limit(value: str, kind: str = "revolute") -> str:
+    return arm(limit=f"<limit {value}/>", attributes=f'type="{kind}"')
+
+
+def fixed(name: str, parent: str, child: str) -> str:
+    return f'<joint name="{name}" type="fixed"><parent link="{parent}"/><child link="{child}"/></joint>'
+
+
+SPHERE = '<visual><geometry><sphere radius="1"/></geometry></visual>'

@@ -1,0 +1,67 @@
+"""What Pinocchio and yourdfpy do with a document, asked in processes that may die.
+
+Run as a script it reads a JSON list of documents from standard input and prints a list of verdicts: each is
+asked in a fork of its own, so that a reader that kills its process says so and no more.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+
+#: What a fork's exit status means.
+_VERDICTS = {0: "reads", 1: "refuses"}
+
+
+def ask(documents: Sequence[str]) -> list[dict[str, str]]:
+    """For each document: `{"pinocchio": ..., "yourdfpy": ...}`, each `reads`, `refuses` or `dies`."""
+    done = subprocess.run(
+        [sys.executable, __file__],
+        input=json.dumps(list(documents)).encode(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        check=True,
+        timeout=300,
+    )
+    verdicts: list[dict[str, str]] = json.loads(done.stdout.splitlines()[-1])
+    return verdicts
+
+
+def _in_a_fork(question: Callable[[bytes], object], document: bytes) -> str:
+    child = os.fork()
+    if child == 0:
+        try:
+            question(document)
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    _, status = os.waitpid(child, 0)
+    return _VERDICTS.get(os.waitstatus_to_exitcode(status), "dies")
+
+
+def _main() -> None:
+    import io  # noqa: PLC0415
+
+    import pinocchio as pin  # noqa: PLC0415
+    from yourdfpy import URDF  # noqa: PLC0415
+
+    def yourdfpy(document: bytes) -> None:
+        URDF.load(io.BytesIO(document), build_scene_graph=False, load_meshes=False)
+
+    def pinocchio(document: bytes) -> None:
+        pin.buildModelFromXML(document.decode("utf-8", "surrogateescape"))
+
+    verdicts = []
+    for text in json.load(sys.stdin):
+        document = text.encode()
+        verdicts.append(
+            {"pinocchio": _in_a_fork(pinocchio, document), "yourdfpy": _in_a_fork(yourdfpy, document)}
+        )
+    sys.stdout.write("\n" + json.dumps(verdicts) + "\n")
+
+
+if __name__ == "__main__":
+    _main()

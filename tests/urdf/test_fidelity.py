@@ -1,0 +1,212 @@
+"""Where yourdfpy and Pinocchio read a URDF differently, urdfkin follows the specification and Pinocchio.
+
+Each test writes down one difference and checks urdfkin's side of it, against Pinocchio where it can say.
+"""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.diagnostics.cases.arm import LIMIT, arm, fixed
+from urdfkin.robot import NotVerifiedWarning, Robot
+
+TIP = "link:tool"
+
+
+def load(text: str, **options: object) -> Robot:
+    """A robot whose every result is verified: one that is not raises."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        warnings.simplefilter("error", NotVerifiedWarning)
+        return urdfkin.load(text, **options)  # type: ignore[arg-type]
+
+
+def everything(robot: Robot) -> None:
+    """Ask for each quantity; each is verified on the way."""
+    generator = np.random.default_rng(0)
+    q = robot.sample(3, seed=1)
+    v, a = generator.normal(size=(2, 3, robot.nv))
+    robot.placement(q, TIP)
+    robot.velocity(q, v, TIP)
+    robot.jacobian(q, TIP)
+    robot.acceleration(q, v, a, TIP)
+    assert robot.certificate().verified
+
+
+def test_an_axis_that_is_no_unit_vector_is_normalised() -> None:
+    """Yourdfpy moves a prismatic joint with axis 0 0 2 twice as far."""
+    robot = load(arm(attributes='type="prismatic"', axis='<axis xyz="0 0 2"/>'))
+    everything(robot)
+    T = robot.placement([[0.0, 0.0], [1.0, 0.0]], TIP)
+    assert np.linalg.norm(T[1, :3, 3] - T[0, :3, 3]) == pytest.approx(1.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("axis", ["1e-9 0 0", "0 1e100 0", "3 4 0", "0.577 0.577 0.577"])
+def test_every_axis_with_a_direction_is_a_unit_vector_in_the_tree(axis: str) -> None:
+    robot = load(arm(axis=f'<axis xyz="{axis}"/>'))
+    everything(robot)
+    assert np.linalg.norm(robot.tree.joints[0].axis) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_an_axis_that_is_not_written_is_x() -> None:
+    robot = load(arm(axis=""))
+    everything(robot)
+    assert robot.tree.joints[0].axis.tolist() == [1.0, 0.0, 0.0]
+
+
+def test_an_axis_element_without_xyz_is_x_and_says_that_pinocchio_reads_another_robot() -> None:
+    """Urdfdom takes a zero vector, so that Pinocchio's rotation is none."""
+    with pytest.warns(urdfkin.UrdfWarning, match="URDF504"):
+        robot = urdfkin.load(arm(axis="<axis/>"))
+    assert robot.tree.joints[0].axis.tolist() == [1.0, 0.0, 0.0]
+    with pytest.warns(NotVerifiedWarning, match="URDF504"):
+        robot.placement(robot.neutral(), TIP)
+    assert not robot.certificate().verified
+
+
+def test_joints_stand_depth_first_and_siblings_by_name_not_as_in_the_file() -> None:
+    """Yourdfpy keeps the order of the file."""
+    more = '<link name="x"/><joint name="a0" type="continuous"><parent link="base"/><child link="x"/></joint>'
+    robot = load(arm(more=more))
+    everything(robot)
+    assert robot.joint_names == ("a0", "j1", "j2")
+
+
+def test_a_follower_takes_no_coordinate_and_is_coupled() -> None:
+    """Yourdfpy keeps a coordinate for it in some of its views; Pinocchio throws for some mimic robots."""
+    robot = load(arm(follow='<mimic joint="j1" multiplier="-2" offset="0.1"/>'))
+    everything(robot)
+    assert robot.nq == 1
+    free = load(arm(follow='<mimic joint="j1" multiplier="-2" offset="0.1"/>'), mimic=False)
+    np.testing.assert_allclose(
+        robot.placement([0.3], TIP), free.placement([0.3, -2 * 0.3 + 0.1], TIP), atol=1e-15
+    )
+
+
+def test_a_continuous_follower_is_coupled_although_pinocchio_would_let_it_turn() -> None:
+    robot = load(
+        arm(second='type="continuous"', follow='<mimic joint="j1"/>').replace(LIMIT + "<mimic", "<mimic")
+    )
+    everything(robot)
+    assert robot.nq == 1
+
+
+def test_a_chain_of_followers_is_resolved() -> None:
+    third = (
+        '<link name="x"/><joint name="j3" type="revolute"><parent link="tool"/><child link="x"/>'
+        f'{LIMIT}<mimic joint="j2" multiplier="3" offset="0.5"/></joint>'
+    )
+    robot = load(arm(follow='<mimic joint="j1" multiplier="-2" offset="0.1"/>', more=third))
+    everything(robot)
+    mimic = robot.tree.joints[2].mimic
+    assert mimic is not None
+    assert (mimic.leader, mimic.multiplier) == ("j1", -6.0)
+    assert mimic.offset == pytest.approx(3 * 0.1 + 0.5)
+
+
+def test_a_fixed_followers_mimic_is_ignored() -> None:
+    everything(load(arm(second='type="fixed"', follow='<mimic joint="j1"/>')))
+
+
+@pytest.mark.parametrize("axis", ['<axis xyz="1 0 0"/>', '<axis xyz="0 0 1"/>', ""])
+def test_a_planar_joint_moves_in_its_frames_xy_plane(axis: str) -> None:
+    """Yourdfpy does not move planar joints; the specification's normal is ignored as Pinocchio ignores it."""
+    robot = load(arm(attributes='type="planar"', axis=axis, limit="", origin=""))
+    everything(robot)
+    T = robot.placement([0.3, -0.2, 0.0, 0.0], "link:l1")
+    assert T[:3, 3].tolist() == [0.3, -0.2, 0.0]
+
+
+def test_a_floating_joint_has_seven_coordinates_and_six_rates() -> None:
+    """Yourdfpy does not move floating joints."""
+    robot = load(arm(attributes='type="floating"', axis="", limit=""))
+    everything(robot)
+    assert (robot.nq, robot.nv) == (8, 7)
+
+
+def test_limits_of_a_continuous_joint_are_ignored() -> None:
+    robot = load(arm(attributes='type="continuous"'))
+    everything(robot)
+    limit = robot.tree.joints[0].limit
+    assert limit is not None
+    assert (limit.lower, limit.upper) == (-np.inf, np.inf)
+
+
+def test_a_limit_that_is_not_written_is_zero() -> None:
+    robot = load(arm(limit='<limit upper="1" effort="1" velocity="1"/>'))
+    everything(robot)
+    limit = robot.tree.joints[0].limit
+    assert limit is not None
+    assert (limit.lower, limit.upper) == (0.0, 1.0)
+
+
+def test_a_quaternion_is_obeyed_from_version_1_1_on() -> None:
+    """Yourdfpy ignores it."""
+    turned = '<origin xyz="0 0 1" quat_xyzw="0 0 1 1"/>'
+    old = load(arm(origin=turned))
+    new = load(arm(origin=turned, robot='name="r" version="1.1"'))
+    everything(old)
+    everything(new)
+    np.testing.assert_array_equal(old.placement(old.neutral(), "link:l1")[:3, :3], np.eye(3))
+    R = new.placement(new.neutral(), "link:l1")[:3, :3]
+    np.testing.assert_allclose(R, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        arm(base='<link name="base"><visual><geometry><box size="a b"/></geometry></visual></link>'),
+        arm(base='<link name="base"><inertial><inertia ixx="1"/></inertial></link>'),
+        arm(base='<link name="base"><inertial><mass value="x"/></inertial></link>'),
+        arm(base='<link name="base"><visual/></link>'),
+        arm(robot='name="r" xmlns="http://example.org"'),
+        arm(more="<a>" * 400 + "</a>" * 400),
+        arm(more='<material name="m"><color rgba="1 1"/></material>'),
+        arm(head='<?xml version="1.0"?><!DOCTYPE robot>'),
+        "\ufeff" + arm(),
+        arm(head="<!-- first -->").replace("<parent", "<!-- x --><parent"),
+    ],
+    ids=[
+        "shape",
+        "inertia",
+        "mass",
+        "visual",
+        "namespace",
+        "nesting",
+        "colour",
+        "doctype",
+        "mark",
+        "comments",
+    ],
+)
+def test_what_yourdfpy_stumbles_over_is_read_as_pinocchio_reads_it(text: str) -> None:
+    everything(load(text))
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        (arm(origin='<origin xyz="0\t0 1"/>'), "URDF303"),
+        (arm(limit='<limit lower="-1" upper="1" effort="-1" velocity="1"/>'), "URDF509"),
+        (arm(more='<link name="x"/>' + fixed("universe", "tool", "x")), "URDF404"),
+        (arm(more='<link name="a\nb"/>' + fixed("k", "tool", "a\nb")), "URDF406"),
+    ],
+)
+def test_what_pinocchio_cannot_check_is_computed_and_never_called_verified(text: str, code: str) -> None:
+    with pytest.warns(urdfkin.UrdfWarning, match=code):
+        robot = urdfkin.load(text)
+    with pytest.warns(NotVerifiedWarning, match=code):
+        T = robot.placement(robot.neutral(), TIP)
+    assert np.isfinite(T).all()
+    assert not robot.certificate().verified
+
+
+def test_a_robot_of_one_rate_is_verified_in_every_quantity() -> None:
+    """Pinocchio hands out a single column as a plain vector."""
+    everything(load(arm(second='type="fixed"')))
+
+
+def test_a_robot_as_small_as_a_denormal_number_is_verified() -> None:
+    everything(load(arm(origin='<origin xyz="0 1e-310 3e-167"/>')))

@@ -1,0 +1,172 @@
+"""xacro without ROS: arguments, packages by a documented search, and failures that say what to do."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urdfkin
+from urdfkin.errors import InputError, SourceError
+from urdfkin.sources import read_source
+from urdfkin.urdf import xacro
+from urdfkin.urdf.packages import find_package
+from urdfkin.urdf.xacro import XacroError, expand
+
+NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+ARM = f"""<robot name="arm" {NAMESPACE}>
+  <xacro:arg name="n" default="2"/>
+  <xacro:include filename="part.xacro"/>
+  <xacro:include filename="$(find tools)/urdf/tool.xacro"/>
+  <link name="base"/>
+  <xacro:part name="a" parent="base" h="${{$(arg n) * 0.25}}"/>
+  <xacro:tool parent="a"/>
+</robot>"""
+PART = f"""<robot {NAMESPACE}><xacro:macro name="part" params="name parent h">
+  <link name="${{name}}"/>
+  <joint name="j_${{name}}" type="continuous"><parent link="${{parent}}"/><child link="${{name}}"/>
+    <origin xyz="0 0 ${{h}}"/><axis xyz="0 0 1"/></joint>
+</xacro:macro></robot>"""
+TOOL = f"""<robot {NAMESPACE}><xacro:macro name="tool" params="parent">
+  <link name="tool"/>
+  <joint name="t" type="fixed"><parent link="${{parent}}"/><child link="tool"/></joint>
+</xacro:macro></robot>"""
+
+
+def write(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    write(tmp_path / "ws" / "tools" / "urdf" / "tool.xacro", TOOL)
+    write(tmp_path / "ws" / "my_arm" / "urdf" / "part.xacro", PART)
+    return write(tmp_path / "ws" / "my_arm" / "urdf" / "arm.urdf.xacro", ARM)
+
+
+def test_a_xacro_file_is_loaded_with_its_arguments(arm: Path) -> None:
+    for arguments, height in (({}, 0.5), ({"n": 6}, 1.5)):
+        robot = urdfkin.load(arm, xacro_args=arguments)
+        T = robot.placement(robot.neutral(), "tool")
+        np.testing.assert_array_equal(T[:3, 3], [0.0, 0.0, height])
+        assert robot.certificate().verified
+
+
+def test_the_working_directory_is_left_alone(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(arm.parents[1])
+    assert b'name="tool"' in expand(Path("urdf/arm.urdf.xacro"), {})
+    assert Path.cwd() == arm.parents[1]
+
+
+def test_the_line_that_replays_a_result_names_the_arguments(arm: Path) -> None:
+    assert urdfkin.load(arm, xacro_args={"n": "a b"} | {"n": 3}).source == f"{arm} --xacro-arg n:=3"
+
+
+def test_findings_are_about_the_expanded_text(arm: Path) -> None:
+    write(arm.parent / "part.xacro", PART.replace("continuous", "hinge"))
+    (finding,) = urdfkin.check(arm)
+    assert (finding.code, finding.file) == ("URDF501", f"{arm} (expanded)")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ('<xacro:include filename="$(find nowhere)/x.xacro"/>', "package 'nowhere' is not found"),
+        ('<xacro:include filename="nothing.xacro"/>', "No such file"),
+        ("<xacro:unknown/>", "unknown macro"),
+        ('<link name="${1/0}"/>', "division by zero"),
+        ("<link", "not well-formed|unclosed|invalid"),
+    ],
+)
+def test_what_cannot_be_expanded_says_why_in_one_error(tmp_path: Path, text: str, reason: str) -> None:
+    path = write(tmp_path / "r.xacro", f'<robot name="r" {NAMESPACE}>{text}</robot>')
+    with pytest.raises(XacroError, match=f"(?s)cannot expand the file: found .*({reason})"):
+        urdfkin.load(path)
+
+
+def test_a_macro_without_end_is_given_up(tmp_path: Path) -> None:
+    endless = '<xacro:property name="x" value="${9**9**9**9}"/><link name="${x}"/>'
+    path = write(tmp_path / "r.xacro", f'<robot name="r" {NAMESPACE}>{endless}</robot>')
+    with pytest.raises(XacroError, match="does not come to an end"):
+        expand(path, {}, patience=3.0)
+
+
+def test_a_file_that_does_not_exist_is_no_such_file(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="no such file"):
+        urdfkin.load(tmp_path / "r.xacro")
+
+
+def test_without_the_extra_the_error_says_what_to_install(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(xacro, "find_spec", lambda name: None)
+    with pytest.raises(XacroError, match=r"urdfkin\[xacro\]"):
+        urdfkin.load(arm)
+
+
+def test_arguments_for_a_plain_urdf_are_a_mistake() -> None:
+    with pytest.raises(InputError, match="xacro_args"):
+        read_source("panda", xacro_args={"n": 1})
+
+
+def test_xacro_that_comes_as_text_says_what_to_do() -> None:
+    with pytest.raises(urdfkin.UrdfError, match="expand it first"):
+        urdfkin.load(f'<robot name="r" {NAMESPACE}><link name="a"/><xacro:b/></robot>')
+
+
+def test_the_commands_take_xacro_arguments(arm: Path) -> None:
+    root = Path(__file__).parents[2]
+    for command in (["check", str(arm)], ["placement", str(arm), "--frame", "tool", "--format", "csv"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "urdfkin", *command, "--xacro-arg", "n:=6"],
+            capture_output=True,
+            text=True,
+            check=False,
+            env={**os.environ, "PYTHONPATH": str(root)},
+        )
+        assert done.returncode == 0, done.stderr
+    assert "1.5" in done.stdout
+
+
+def test_validate_expands_once_and_passes(arm: Path) -> None:
+    report = urdfkin.validate([arm], samples=3, xacro_args={"n": 4})
+    assert report.passed
+    assert "--xacro-arg n:=4" in str(report.as_dict())
+
+
+# -- packages ----------------------------------------------------------------------------------------
+
+
+def test_packages_are_found_in_the_documented_order(tmp_path: Path) -> None:
+    ros, deep, ament = tmp_path / "ros" / "pkg", tmp_path / "src" / "repository" / "pkg", tmp_path / "opt"
+    above = tmp_path / "up" / "pkg"
+    for folder in (ros, deep, ament / "share" / "pkg", above / "urdf"):
+        folder.mkdir(parents=True)
+    beside = above / "urdf" / "a.urdf"
+    environ = {
+        "ROS_PACKAGE_PATH": os.pathsep.join((str(tmp_path / "ros"), str(tmp_path / "src"))),
+        "AMENT_PREFIX_PATH": str(ament),
+    }
+    assert find_package("pkg", beside, environ) == ros
+    ros.rmdir()
+    assert find_package("pkg", beside, environ) == deep
+    deep.rmdir()
+    assert find_package("pkg", beside, environ) == ament / "share" / "pkg"
+    (ament / "share" / "pkg").rmdir()
+    assert find_package("pkg", beside, environ) == above
+    assert find_package("other", beside, environ) is None
+
+
+def test_an_entry_may_be_the_package_itself_and_a_manifest_names_a_folder(tmp_path: Path) -> None:
+    clone = tmp_path / "clone-main"
+    write(clone / "package.xml", "<package><name> my_arm </name></package>")
+    (tmp_path / "pkg").mkdir()
+    assert find_package("pkg", None, {"ROS_PACKAGE_PATH": str(tmp_path / "pkg")}) == tmp_path / "pkg"
+    assert find_package("my_arm", clone / "urdf" / "a.urdf", {}) == clone
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "a\0b"])
+def test_a_name_that_is_no_folders_name_is_not_looked_for(name: str, tmp_path: Path) -> None:
+    assert find_package(name, tmp_path / "a.urdf", {}) is None

@@ -1,0 +1,67 @@
+"""A URDF reduced to what kinematics needs, for a reader that stumbles over the rest.
+
+Shapes, materials, inertials and extensions are left out, numbers stand as they were read, and a quaternion of
+URDF 1.1 becomes roll, pitch and yaw. Nothing in the result needs a lenient reader: there is no declaration,
+no comment, no entity, no namespace, and no element twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from urdfkin.diagnostics.dialect import check_dialect
+from urdfkin.diagnostics.document import DEFAULT_LIMITS, Limits, parse
+from urdfkin.diagnostics.encoding import utf8_bytes
+from urdfkin.diagnostics.finding import UrdfError
+from urdfkin.diagnostics.records import JointRecord, LimitRecord, read_robot
+from urdfkin.diagnostics.reporter import Reporter
+from urdfkin.urdf.angles import rpy_from_quaternion
+from urdfkin.urdf.writer import attribute, numbers
+
+
+def skeleton(data: bytes, limits: Limits = DEFAULT_LIMITS) -> bytes:
+    """The links and joints of a URDF as a plain document.
+
+    Args:
+        data: The file's bytes, already found free of errors by `urdfkin.diagnostics`.
+        limits: The limits it was checked with.
+
+    Raises:
+        UrdfError: the file has errors that keep it from being read at all.
+    """
+    report = Reporter("<text>", data)
+    text = utf8_bytes(report, data)
+    report.data = text or b""
+    root = None if text is None else parse(report, text, limits)
+    version = None if root is None else check_dialect(report, root)
+    if root is None or version is None:
+        raise UrdfError(report.findings())
+    robot = read_robot(report, root, version)
+    lines = [f'<robot name="{attribute(root.attributes.get("name", ""))}">']
+    lines += [f'<link name="{attribute(link)}"/>' for link in robot.links]
+    for joint in robot.joints:
+        lines += _joint(joint)
+    lines.append("</robot>")
+    return "\n".join(lines).encode()
+
+
+def _joint(joint: JointRecord) -> Iterable[str]:
+    yield f'<joint name="{attribute(joint.name)}" type="{joint.kind}">'
+    yield f'<parent link="{attribute(joint.parent or "")}"/><child link="{attribute(joint.child or "")}"/>'
+    rpy = joint.rpy if joint.quaternion is None else rpy_from_quaternion(joint.quaternion)
+    yield f'<origin xyz="{numbers(joint.xyz)}" rpy="{numbers(rpy)}"/>'
+    if joint.axis is not None:
+        yield f'<axis xyz="{numbers(joint.axis)}"/>'
+    if joint.limit is not None:
+        yield _limit(joint.limit)
+    if joint.mimic is not None:
+        rule = joint.mimic
+        multiplier, offset = f'multiplier="{rule.multiplier!r}"', f'offset="{rule.offset!r}"'
+        yield f'<mimic joint="{attribute(rule.leader)}" {multiplier} {offset}/>'
+    yield "</joint>"
+
+
+def _limit(limit: LimitRecord) -> str:
+    named = {"lower": limit.lower, "upper": limit.upper, "effort": limit.effort, "velocity": limit.velocity}
+    written = [f'{name}="{value!r}"' for name, value in named.items() if value is not None]
+    return f"<limit {' '.join(written)}/>"
