@@ -15,11 +15,19 @@ from typing import Any
 import numpy as np
 
 from urdfkin.configuration import pinocchio_blocks
+from urdfkin.deep_stack import with_stack
 from urdfkin.errors import UrdfkinError
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import IntArray
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray, JointKind, KinematicTree
+
+#: Pinocchio recurses over links: less than 4 kB of stack for each was measured (4.1.0), room for more.
+_STACK_FOR_A_LINK = 16_384
+#: A chain shorter than this fits any stack.
+_SHALLOW = 100
+#: Pinocchio's workspace takes about 64 bytes times the cube of the rates (4.1.0 measured): at most 2 GB.
+MOST_RATES = 315
 
 
 class OracleError(UrdfkinError):
@@ -61,6 +69,20 @@ class Oracle:
         }
 
     def _build(self, text: str) -> Any:
+        """The model; what would end the process, for want of memory or stack, is refused or avoided."""
+        rates = sum(joint.kind.nv for joint in self._tree.joints)
+        if rates > MOST_RATES:
+            raise OracleError(
+                f"Pinocchio's memory grows with the cube of the rates; urdfkin asks it up to {MOST_RATES}",
+                where=self._tree.name,
+                found=f"{rates}, which would take {64e-9 * rates**3:.0f} GB",
+            )
+        depth = _depth(self._tree)
+        if depth < _SHALLOW:
+            return self._parse(text)
+        return with_stack(depth * _STACK_FOR_A_LINK, lambda: self._parse(text))
+
+    def _parse(self, text: str) -> Any:
         pin, roots = (
             self._pin,
             {JointKind.FLOATING: "JointModelFreeFlyer", JointKind.PLANAR: "JointModelPlanar"},
@@ -273,6 +295,14 @@ class Oracle:
             spatial[..., :3] -= np.cross(base.velocity[..., 3:], base.velocity[..., :3])
             full[:, :6] = _in_own_axes(base, spatial, len(a))
         return full
+
+
+def _depth(tree: KinematicTree) -> int:
+    """How many joints lie one behind the other, at most."""
+    depths = [0]
+    for joint in tree.joints:
+        depths.append(depths[joint.parent] + 1)
+    return max(depths)
 
 
 def _in_own_axes(base: BaseMotion, six: FloatArray, n: int) -> FloatArray:
