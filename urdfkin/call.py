@@ -31,15 +31,15 @@ class Call:
         frames: Sequence[str],
         reference: Reference | str,
         base: BaseMotion | None,
-        q: ArrayLike,
-        v: ArrayLike | None = None,
-        a: ArrayLike | None = None,
+        *inputs: ArrayLike,
     ) -> None:
+        if base is not None and not isinstance(base, BaseMotion):
+            raise InputError("base is a BaseMotion or None", found=type(base).__name__)
         self.robot, self.frames, self.base = robot, tuple(frames), base
         self.reference = Reference.of(reference)
         self.links = tuple(robot.tree.frame_link(frame) for frame in self.frames)
         self.plan = robot.plan(self.links)
-        given = [robot.checked(x, name) for x, name in ((q, "q"), (v, "v"), (a, "a")) if x is not None]
+        given = [robot.checked(x, name) for x, name in zip(inputs, "qva", strict=False)]
         self.shape = self._batch_shape(given)
         self.n = int(np.prod(self.shape))
         flat = [self._flat_input(array) for array in given]

@@ -58,6 +58,10 @@ def read_source(source: Source) -> Text:
 
 
 def _read_word(word: str) -> Text:
+    if not word.strip():
+        raise InputError(
+            "no robot is named", found=repr(word), remedy="a path, a name that 'urdfkin robots' lists, or '-'"
+        )
     if word == "-":
         return Text(sys.stdin.buffer.read(), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):
