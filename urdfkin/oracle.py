@@ -273,7 +273,8 @@ class Oracle:
             motion = base or BaseMotion()
             T = np.broadcast_to(motion.placement, (len(q), 4, 4))
             full[:, :3] = T[:, :3, 3]
-            full[:, 3:7] = [self._pin.Quaternion(np.array(R)).coeffs() for R in T[:, :3, :3]]
+            for k, R in enumerate(T[:, :3, :3]):
+                full[k, 3:7] = self._pin.Quaternion(np.array(R)).coeffs()
         return full
 
     def rates(self, v: FloatArray, base: BaseMotion | None = None) -> FloatArray:

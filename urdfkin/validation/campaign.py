@@ -54,14 +54,15 @@ def validate(
         run and keeps what had finished.
 
     Raises:
-        InputError: a negative number of samples or no job.
+        InputError: a negative number of samples, a negative seed or no job.
 
     >>> report = validate("ur5", samples=10)
     >>> report.passed, report.robots[0].failed
     (True, 0)
     """
-    if samples < 0 or jobs < 1:
-        raise InputError("validate needs samples >= 0 and jobs >= 1", found=f"{samples} and {jobs}")
+    if samples < 0 or jobs < 1 or seed < 0:
+        found = f"{samples}, {jobs} and {seed}"
+        raise InputError("validate needs samples >= 0, jobs >= 1 and seed >= 0", found=found)
     many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     subjects = [_subject(robot, mimic, root_joint) for robot in many]
     started, begin = datetime.datetime.now(datetime.UTC), time.perf_counter()
