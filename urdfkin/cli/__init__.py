@@ -12,7 +12,7 @@ from typing import cast
 
 import click
 
-from urdfkin.errors import UrdfkinError
+from urdfkin.errors import UnknownNameError, UrdfkinError
 
 #: Command name -> (module that holds `command`, one-line summary), in the order of the help page.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -38,6 +38,14 @@ class LazyGroup(click.Group):
         if cmd_name not in COMMANDS:
             return None
         return cast("click.Command", importlib.import_module(COMMANDS[cmd_name][0]).command)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As click does, but an unknown command offers the nearest ones."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            raise UnknownNameError("command", args[0], COMMANDS)
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The table of commands, from the summaries alone."""
