@@ -9,7 +9,6 @@ import json
 import os
 import sys
 import tempfile
-import threading
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,8 +30,6 @@ FORMATS = ("table", "json", "csv", "npy")
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
 #: How many samples of a batch a table shows.
 _SHOWN = 5
-#: Compiling says what it is doing when it takes longer than this, in seconds.
-_PATIENCE = 1.5
 
 format_option = click.option(
     "--format",
@@ -52,15 +49,12 @@ output_option = click.option(
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Say what takes so long when the recursion is compiled on a machine for the first time."""
+    """Say what takes so long when the recursion is compiled, once on a machine."""
+    from urdfkin.recursion.announcing import announced  # noqa: PLC0415  keeps --help fast
+
     message = "urdfkin: compiling the recursion for this machine, once; some ten seconds ..."
-    timer = threading.Timer(_PATIENCE, click.echo, [message], {"err": True})
-    timer.daemon = True
-    timer.start()
-    try:
+    with announced(lambda: click.echo(message, err=True)):
         yield
-    finally:
-        timer.cancel()
 
 
 def console(*, err: bool = False) -> Console:
