@@ -53,10 +53,28 @@ class LazyGroup(click.Group):
             formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
 
 
+def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
+    if not wanted:
+        return
+    from importlib import metadata  # noqa: PLC0415  not needed for --help
+
+    found = []
+    for package in ("urdfkin", "pin"):
+        try:
+            found.append(metadata.version(package))
+        except metadata.PackageNotFoundError:
+            found.append("not installed")
+    click.echo(f"urdfkin {found[0]}, Pinocchio {found[1]}")
+    ctx.exit()
+
+
 @click.group(
     cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
 )
-@click.version_option(package_name="urdfkin")
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_version,
+    help="Show the versions of urdfkin and Pinocchio and exit.",
+)  # fmt: skip
 def cli() -> None:
     """Textbook kinematics from any URDF, every number checked against Pinocchio."""
 
