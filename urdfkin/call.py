@@ -31,15 +31,15 @@ class Call:
         frames: Sequence[str],
         reference: Reference | str,
         base: BaseMotion | None,
-        q: ArrayLike,
-        v: ArrayLike | None = None,
-        a: ArrayLike | None = None,
+        *inputs: ArrayLike,
     ) -> None:
+        if base is not None and not isinstance(base, BaseMotion):
+            raise InputError("base is a BaseMotion or None", found=type(base).__name__)
         self.robot, self.frames, self.base = robot, tuple(frames), base
         self.reference = Reference.of(reference)
         self.links = tuple(robot.tree.frame_link(frame) for frame in self.frames)
         self.plan = robot.plan(self.links)
-        given = [robot.checked(x, name) for x, name in ((q, "q"), (v, "v"), (a, "a")) if x is not None]
+        given = [robot.checked(x, name) for x, name in zip(inputs, "qva", strict=False)]
         self.shape = self._batch_shape(given)
         self.n = int(np.prod(self.shape))
         flat = [self._flat_input(array) for array in given]
@@ -90,6 +90,8 @@ class Call:
                 f"out must be a writable C-contiguous float64 array of shape {(*self.shape, *own)}",
                 found=f"{getattr(out, 'dtype', type(out).__name__)} {getattr(out, 'shape', '')}",
             )
+        if any(np.may_share_memory(out, array) for array in (self.q, self.v, self.a)):
+            raise InputError("out must not share memory with q, v or a: they are read again for the check")
         return out.reshape(self.n, 1, *own)
 
     def one(self, result: FloatArray, out: FloatArray | None) -> FloatArray:
@@ -111,17 +113,28 @@ class Call:
             self.robot.ledger.checked(quantity, comparison)
             return
         k, f = comparison.index
+        bound = Bound(*(np.broadcast_to(x, ours.shape)[k, f] for x in (bound.scale, bound.k)))
+        if not (np.isfinite(bound.scale).all() and np.isfinite(theirs[k, f]).all()):
+            raise InputError(
+                f"the {quantity} of {self.frames[f]} leaves the range of double precision",
+                where=f"sample {list(self._index(k))}" if self.shape else None,
+                remedy="give smaller numbers",
+            )
         raise VerificationError(
             quantity,
             self.frames[f],
             self.reference.name,
-            index=tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else (),
+            index=self._index(k),
             ours=ours[k, f],
             theirs=theirs[k, f],
-            bound=np.broadcast_to(bounds.EPS * bound.k * bound.scale, ours.shape)[k, f],
-            units=comparison.worst,
+            bound=bounds.EPS * bound.k * bound.scale,
+            units=float(bounds.disagreement(ours[k, f], theirs[k, f], bound).max()),
             reproduce=self._replay(quantity, k, self.frames[f]),
         )
+
+    def _index(self, k: int) -> tuple[int, ...]:
+        """Flat sample `k` as an index into the caller's batch."""
+        return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
     def _replay(self, quantity: Quantity, k: int, frame: str) -> str:
         words = ["urdfkin", str(quantity), self.robot.source, "--frame", shlex.quote(frame)]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.call import Call
+from urdfkin.errors import InputError
 from urdfkin.motion.representation import analytical_jacobian
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import BaseMotion
@@ -253,4 +254,6 @@ def _robot(manipulator: Manipulator) -> Robot:
 
 
 def _names(robot: Robot, frames: Sequence[str] | None) -> Sequence[str]:
+    if isinstance(frames, str):
+        raise InputError("frames are a list of names", found=repr(frames), remedy=f"write [{frames!r}]")
     return robot.link_names if frames is None else frames

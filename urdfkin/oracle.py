@@ -15,11 +15,22 @@ from typing import Any
 import numpy as np
 
 from urdfkin.configuration import pinocchio_blocks
+from urdfkin.deep_stack import with_stack
 from urdfkin.errors import UrdfkinError
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import IntArray
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray, JointKind, KinematicTree
+
+#: Pinocchio recurses over links: less than 4 kB of stack for each was measured (4.1.0), room for more.
+_STACK_FOR_A_LINK = 16_384
+#: A chain shorter than this fits any stack.
+_SHALLOW = 100
+#: Pinocchio's workspace takes about 64 bytes times the cube of the rates (4.1.0 measured): at most 2 GB.
+MOST_RATES = 315
+
+#: What carries a robot whose base moves; no URDF joint is called so by accident.
+_BASE = "moving base (urdfkin)"
 
 
 class OracleError(UrdfkinError):
@@ -51,6 +62,7 @@ class Oracle:
         self._pin = pin
         self._tree = tree
         self._moving_base = moving_base
+        self._root = 0  # Pinocchio's index of the frame that the robot stands on
         self._model = self._build(text)
         self._layout = _Layout(self._model, tree, 7 if moving_base else 0, 6 if moving_base else 0)
         self._local = threading.local()
@@ -61,24 +73,40 @@ class Oracle:
         }
 
     def _build(self, text: str) -> Any:
-        pin, roots = (
-            self._pin,
-            {JointKind.FLOATING: "JointModelFreeFlyer", JointKind.PLANAR: "JointModelPlanar"},
-        )
-        hung = (
-            bool(self._tree.joints)
-            and self._tree.joints[0].name == "root_joint"
-            and self._tree.links[0] == "universe"
-        )
+        """The model; what would end the process, for want of memory or stack, is refused or avoided."""
+        rates = sum(joint.kind.nv for joint in self._tree.joints)
+        if rates > MOST_RATES:
+            raise OracleError(
+                f"Pinocchio's memory grows with the cube of the rates; urdfkin asks it up to {MOST_RATES}",
+                where=self._tree.name,
+                found=f"{rates}, which would take {64e-9 * rates**3:.0f} GB",
+            )
+        depth = _depth(self._tree)
+        if depth < _SHALLOW:
+            return self._parse(text)
+        return with_stack(depth * _STACK_FOR_A_LINK, lambda: self._parse(text))
+
+    def _parse(self, text: str) -> Any:
+        pin, tree = self._pin, self._tree
+        roots = {JointKind.FLOATING: pin.JointModelFreeFlyer, JointKind.PLANAR: pin.JointModelPlanar}
         try:
-            if hung or self._moving_base:
-                kind = self._tree.joints[0].kind if hung else JointKind.FLOATING
-                return pin.buildModelFromXML(text, getattr(pin, roots[kind])(), mimic=False)
-            return pin.buildModelFromXML(text, mimic=False)
+            if tree.joints and tree.joints[0].name == "root_joint" and tree.links[0] == "universe":
+                model = pin.buildModelFromXML(text, roots[tree.joints[0].kind](), mimic=False)
+            else:
+                model = pin.buildModelFromXML(text, mimic=False)
         except (ValueError, RuntimeError) as error:
             raise OracleError(
-                "Pinocchio does not accept this robot", where=self._tree.name, found=str(error).strip()
+                "Pinocchio does not accept this robot", where=tree.name, found=str(error).strip()
             ) from error
+        return self._on_free_flyer(model) if self._moving_base else model
+
+    def _on_free_flyer(self, model: Any) -> Any:
+        """The model carried by a joint that can be given the base's motion; a root joint moves on top."""
+        pin, nowhere = self._pin, self._pin.SE3.Identity()
+        carrier = pin.Model()
+        joint = carrier.addJoint(0, pin.JointModelFreeFlyer(), nowhere, _BASE)
+        self._root = carrier.addFrame(pin.Frame(_BASE, joint, 0, nowhere, pin.FrameType.BODY))
+        return pin.appendModel(carrier, model, self._root, nowhere)
 
     @property
     def _data(self) -> Any:
@@ -100,7 +128,7 @@ class Oracle:
         link = tree.frame_link(name)
         own, kind = tree.links[link], types.BODY
         if link == 0 and own == "universe":  # Pinocchio's own root, which is no body
-            return 0
+            return self._root
         if link > 0 and name not in (own, f"link:{own}"):
             joint = tree.joints[link - 1]
             own, kind = joint.name, types.JOINT if joint.kind.nv else types.FIXED_JOINT
@@ -251,7 +279,8 @@ class Oracle:
             motion = base or BaseMotion()
             T = np.broadcast_to(motion.placement, (len(q), 4, 4))
             full[:, :3] = T[:, :3, 3]
-            full[:, 3:7] = [self._pin.Quaternion(np.array(R)).coeffs() for R in T[:, :3, :3]]
+            for k, R in enumerate(T[:, :3, :3]):
+                full[k, 3:7] = self._pin.Quaternion(np.array(R)).coeffs()
         return full
 
     def rates(self, v: FloatArray, base: BaseMotion | None = None) -> FloatArray:
@@ -273,6 +302,14 @@ class Oracle:
             spatial[..., :3] -= np.cross(base.velocity[..., 3:], base.velocity[..., :3])
             full[:, :6] = _in_own_axes(base, spatial, len(a))
         return full
+
+
+def _depth(tree: KinematicTree) -> int:
+    """How many joints lie one behind the other, at most."""
+    depths = [0]
+    for joint in tree.joints:
+        depths.append(depths[joint.parent] + 1)
+    return max(depths)
 
 
 def _in_own_axes(base: BaseMotion, six: FloatArray, n: int) -> FloatArray:

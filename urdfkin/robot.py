@@ -22,6 +22,7 @@ from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import Plan, make_plan
 from urdfkin.reference import Reference
+from urdfkin.rotation.arrays import floats, scalars
 from urdfkin.tree import FloatArray, KinematicTree
 from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Quantity
@@ -151,7 +152,13 @@ class Robot(Manipulator):
         return configuration.neutral(self.tree)
 
     def sample(self, n: int, seed: int = 0) -> FloatArray:
-        """(n, nq) configurations within limits; the same seed gives the same ones."""
+        """(n, nq) configurations within limits; the same seed gives the same ones.
+
+        Raises:
+            InputError: a negative number of samples or a negative seed.
+        """
+        if n < 0 or seed < 0:
+            raise InputError("sample needs n >= 0 and seed >= 0", found=f"{n} and {seed}")
         return sample(self.tree, n, np.random.default_rng(seed))
 
     def limit_violations(self, q: ArrayLike) -> list[str]:
@@ -164,7 +171,7 @@ class Robot(Manipulator):
 
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """The inverse of `to_pinocchio`; angles of continuous joints come back in (-pi, pi]."""
-        return configuration.from_pinocchio(self.tree, np.asarray(q, dtype=np.float64), mimic=mimic)
+        return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=mimic)
 
     # -- what it computes ----------------------------------------------------------------------------
 
@@ -315,7 +322,7 @@ class Robot(Manipulator):
 
     def checked(self, value: ArrayLike, what: str) -> FloatArray:
         """`value` as float64 with the right last axis and finite numbers."""
-        array = np.asarray(value, dtype=np.float64)
+        array = floats(value, what)
         width, names = (self.nq, self.coordinate_names) if what == "q" else (self.nv, self.rate_names)
         if array.shape[-1:] != (width,):
             raise InputError(

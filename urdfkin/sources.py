@@ -94,6 +94,10 @@ def _expanded(path: Path, arguments: Mapping[str, object]) -> Text:
 
 
 def _read_word(word: str, most: int) -> Text:
+    if not word.strip():
+        raise InputError(
+            "no robot is named", found=repr(word), remedy="a path, a name that 'urdfkin robots' lists, or '-'"
+        )
     if word == "-":
         return Text(sys.stdin.buffer.read(most + 1), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):

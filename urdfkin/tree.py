@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.rotation.arrays import FloatArray
+from urdfkin.rotation.arrays import FloatArray, floats
 
 __all__ = [
     "FloatArray",
@@ -33,8 +33,8 @@ __all__ = [
 
 
 def frozen(array: ArrayLike) -> FloatArray:
-    """A read-only, C-contiguous float64 copy of `array`."""
-    copy = np.array(array, dtype=np.float64, order="C")
+    """A read-only, C-contiguous float64 copy of `array`; raises InputError where it is no numbers."""
+    copy = np.array(floats(array, "an array"), dtype=np.float64, order="C")
     copy.setflags(write=False)
     return copy
 
@@ -264,6 +264,8 @@ class KinematicTree:
             UnknownNameError: nothing is called so; the nearest names are offered.
             InputError: a link and a joint elsewhere share the name; say `link:NAME` or `joint:NAME`.
         """
+        if not isinstance(name, str):
+            raise InputError("a frame is the name of a link or joint", where=self.name, found=repr(name)[:60])
         prefix, _, rest = name.partition(":")
         if prefix == "link" and rest in self._link_index:
             return self._link_index[rest]

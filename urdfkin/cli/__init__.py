@@ -12,7 +12,7 @@ from typing import cast
 
 import click
 
-from urdfkin.errors import UrdfkinError
+from urdfkin.errors import UnknownNameError, UrdfkinError
 
 #: Command name -> (module that holds `command`, one-line summary), in the order of the help page.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -41,16 +41,42 @@ class LazyGroup(click.Group):
             return None
         return cast("click.Command", importlib.import_module(COMMANDS[cmd_name][0]).command)
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As click does, but an unknown command offers the nearest ones."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            raise UnknownNameError("command", args[0], COMMANDS)
+        return super().resolve_command(ctx, args)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The table of commands, from the summaries alone."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
 
 
+def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
+    if not wanted:
+        return
+    from importlib import metadata  # noqa: PLC0415  not needed for --help
+
+    found = []
+    for package in ("urdfkin", "pin"):
+        try:
+            found.append(metadata.version(package))
+        except metadata.PackageNotFoundError:
+            found.append("not installed")
+    click.echo(f"urdfkin {found[0]}, Pinocchio {found[1]}")
+    ctx.exit()
+
+
 @click.group(
     cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
 )
-@click.version_option(package_name="urdfkin")
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_version,
+    help="Show the versions of urdfkin and Pinocchio and exit.",
+)  # fmt: skip
 def cli() -> None:
     """Textbook kinematics from any URDF, every number checked against Pinocchio."""
 

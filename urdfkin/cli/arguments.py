@@ -94,7 +94,7 @@ verify_option = click.option(
     "--verify/--no-verify", default=True, help="Whether Pinocchio checks each result (the default)."
 )
 seed_option = click.option(
-    "--seed", type=int, default=0, show_default=True, help="What `random` is drawn from."
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="What `random` is drawn from."
 )
 _VALUES = "Numbers '0,0.5,...', '@FILE.csv' for a batch, 'neutral', 'random' or 'random:N'."
 q_option = click.option("--q", metavar="VALUES", default="neutral", show_default=True, help=_VALUES)
@@ -170,8 +170,8 @@ def _values(robot: Robot, letter: str, text: str, rng: Any) -> FloatArray:
 
 
 def _count(letter: str, text: str) -> int:
-    if not text.isdecimal():
-        raise InputError("random:N wants a whole number", where=f"--{letter}", found=repr(text))
+    if not text.isdecimal() or int(text) < 1:
+        raise InputError("random:N wants a whole number from 1 on", where=f"--{letter}", found=repr(text))
     return int(text)
 
 
@@ -202,8 +202,10 @@ def _read_csv(path: Path, letter: str, names: Sequence[str]) -> FloatArray:
             rows = [
                 (i, row) for i, row in enumerate(csv.reader(stream), 1) if row and not row[0].startswith("#")
             ]
-    except (OSError, UnicodeDecodeError) as error:
-        raise SourceError("cannot be read", where=str(path), found=str(error)) from error
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = "no UTF-8 text" if isinstance(error, UnicodeDecodeError) else str(error)
+        reason = getattr(error, "strerror", None) or reason
+        raise SourceError("cannot be read", where=str(path), found=reason) from error
     order = list(range(len(names)))
     if rows and not _is_number(rows[0][1][0]):
         header = [cell.strip() for cell in rows.pop(0)[1]]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import json
 import os
 import sys
 import tempfile
-import threading
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -30,8 +30,6 @@ FORMATS = ("table", "json", "csv", "npy")
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
 #: How many samples of a batch a table shows.
 _SHOWN = 5
-#: Compiling says what it is doing when it takes longer than this, in seconds.
-_PATIENCE = 1.5
 
 format_option = click.option(
     "--format",
@@ -42,21 +40,21 @@ format_option = click.option(
     help="Output format.",
 )
 output_option = click.option(
-    "--output", "-o", type=click.Path(path_type=Path), help="Write to a file instead of standard output."
+    "--output",
+    "-o",
+    type=click.Path(path_type=Path),
+    help="Write to a file instead of standard output; a table is written as csv.",
 )
 
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Say what takes so long when the recursion is compiled on a machine for the first time."""
+    """Say what takes so long when the recursion is compiled, once on a machine."""
+    from urdfkin.recursion.announcing import announced  # noqa: PLC0415  keeps --help fast
+
     message = "urdfkin: compiling the recursion for this machine, once; some ten seconds ..."
-    timer = threading.Timer(_PATIENCE, click.echo, [message], {"err": True})
-    timer.daemon = True
-    timer.start()
-    try:
+    with announced(lambda: click.echo(message, err=True)):
         yield
-    finally:
-        timer.cancel()
 
 
 def console(*, err: bool = False) -> Console:
@@ -71,22 +69,35 @@ def console(*, err: bool = False) -> Console:
 def write_file(path: Path, data: bytes) -> None:
     """Write beside the target and rename, so that a file is there whole or not at all.
 
+    A link is followed; what is no file (`/dev/null`, a pipe) is written to, never replaced.
+
     Raises:
         SourceError: no permission, no such folder, no room.
     """
     name = ""
     try:
+        if path.exists() and not path.is_file():
+            path.write_bytes(data)
+            return
+        path = path.resolve()
+        if path.exists() and not os.access(path, os.W_OK):  # renaming would not ask
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as stream:
             name = stream.name
             stream.write(data)
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(name).chmod(0o666 & ~mask)
+        Path(name).chmod(mode)
         Path(name).replace(path)
     except OSError as error:
         if name:
             Path(name).unlink(missing_ok=True)
         raise SourceError("cannot be written", where=str(path), found=error.strerror or str(error)) from error
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 def emit(
@@ -99,6 +110,8 @@ def emit(
 ) -> None:
     """Show or write (n, ...) results with their certificate."""
     certificate = inputs.robot.certificate()
+    if output == Path("-"):
+        output = None
     if format_ == "table" and output is None:
         _print_table(inputs, quantity, reference, result, certificate)
         return

@@ -25,7 +25,13 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...")
 @click.option("--all", "all_", is_flag=True, help="Every robot of example-robot-data in the catalogue.")
 @click.option("--samples", type=click.IntRange(0), default=1000, show_default=True, help="For each robot.")
-@click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same numbers.")
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="The same seed gives the same numbers.",
+)
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Local processes.")
 @click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow (the default).")
 @click.option("--root-joint", type=click.Choice(["floating", "planar"]), help="Hang the root from a joint.")

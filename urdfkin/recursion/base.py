@@ -40,6 +40,11 @@ class BaseMotion:
                     found=f"shape {array.shape}" if array.shape[-len(shape) :] != shape else "nan or inf",
                 )
             object.__setattr__(self, name, array)
+        try:
+            _ = self.batch_shape
+        except ValueError:
+            shapes = f"{self.placement.shape}, {self.velocity.shape}, {self.acceleration.shape}"
+            raise InputError("the batch shapes of the base's fields do not fit", found=shapes) from None
         if (self.placement[..., 3, :] != [0.0, 0.0, 0.0, 1.0]).any():
             raise InputError("the last row of the base's placement is 0 0 0 1")
         # Through the quaternion and back: a rotation given to nine digits becomes one to the last digit.

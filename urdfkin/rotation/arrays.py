@@ -15,14 +15,24 @@ FloatArray = NDArray[np.float64]
 #: A direction counts as a unit vector when its norm is one to this. Normalised doubles are within 4e-16;
 #: six typed digits are not, and would give a matrix that is no rotation.
 UNIT_TOLERANCE = 1e-12
+#: NumPy's kinds that would turn into floats without a word: complex, bytes, text, spans and dates.
+_NOT_NUMBERS = "cSUmM"
+
+
+def floats(value: ArrayLike, name: str) -> FloatArray:
+    """`value` as float64 of any shape, nan and inf too; raises InputError where it is no real numbers."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind in _NOT_NUMBERS:
+            raise TypeError(array.dtype)
+        return np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be real numbers", found=repr(value)[:60]) from error
 
 
 def scalars(value: ArrayLike, name: str) -> FloatArray:
     """`value` as finite float64 of any shape; raises InputError naming the argument otherwise."""
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be numbers", found=repr(value)[:60]) from error
+    array = floats(value, name)
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be finite", found=str(array[~np.isfinite(array)][0]))
     return array

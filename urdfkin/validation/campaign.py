@@ -7,14 +7,17 @@ The chunks go through `Executor.map`-like submission only, so that any engine wi
 from __future__ import annotations
 
 import datetime
+import hashlib
 import multiprocessing
 import os
+import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.oracle import OracleError
+from urdfkin.recursion.announcing import load_kernels
 from urdfkin.robot import Robot
 from urdfkin.sources import Source, is_xacro, read_source
 from urdfkin.validation.chunk import SPECIAL, Chunk, ChunkResult, Subject, chunks, run_chunk
@@ -56,14 +59,15 @@ def validate(
         run and keeps what had finished.
 
     Raises:
-        InputError: a negative number of samples or no job.
+        InputError: a negative number of samples, a negative seed or no job.
 
     >>> report = validate("ur5", samples=10)
     >>> report.passed, report.robots[0].failed
     (True, 0)
     """
-    if samples < 0 or jobs < 1:
-        raise InputError("validate needs samples >= 0 and jobs >= 1", found=f"{samples} and {jobs}")
+    if samples < 0 or jobs < 1 or seed < 0:
+        found = f"{samples}, {jobs} and {seed}"
+        raise InputError("validate needs samples >= 0, jobs >= 1 and seed >= 0", found=found)
     many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     subjects = [_subject(robot, mimic, root_joint, xacro_args) for robot in many]
     started, begin = datetime.datetime.now(datetime.UTC), time.perf_counter()
@@ -74,9 +78,7 @@ def validate(
         elif jobs == 1:
             run.here()
         else:
-            context = multiprocessing.get_context("spawn")
-            with ProcessPoolExecutor(max_workers=jobs, mp_context=context) as pool:
-                run.spread(pool)
+            _spread_over_processes(run, jobs)
     except KeyboardInterrupt:
         run.interrupted = True
     return ValidationReport(
@@ -87,6 +89,15 @@ def validate(
         seconds=time.perf_counter() - begin,
         interrupted=run.interrupted,
     )
+
+
+def _spread_over_processes(run: _Run, jobs: int) -> None:
+    """Workers leave an interrupt to this process, which ends the run and keeps what is there."""
+    load_kernels()  # once, here, so that the workers find them on disk
+    context = multiprocessing.get_context("spawn")
+    ignore = (signal.SIGINT, signal.SIG_IGN)
+    with ProcessPoolExecutor(jobs, context, initializer=signal.signal, initargs=ignore) as pool:
+        run.spread(pool)
 
 
 def _subject(
@@ -100,12 +111,21 @@ def _subject(
     if is_xacro(robot):
         text = read_source(robot, xacro_args=xacro_args)  # expanded once, here
         return Subject(text.data, mimic, root_joint, text.source + text.options)
-    if isinstance(robot, os.PathLike):
-        return Subject(os.fspath(robot), mimic, root_joint)
-    if isinstance(robot, str | bytes):
-        return Subject(robot, mimic, root_joint)
-    text = read_source(robot)  # an open file is read once, here
+    source = os.fspath(robot) if isinstance(robot, os.PathLike) else robot
+    if isinstance(source, bytes):
+        return Subject(source, mimic, root_joint)
+    if isinstance(source, str) and source != "-":
+        return Subject(source, mimic, root_joint, stamp=_stamp(source))
+    text = read_source(source)  # an open file, or standard input, is read once, here
     return Subject(text.data, mimic, root_joint, text.source)
+
+
+def _stamp(source: str) -> str:
+    """What tells one state of a file from another, so that no worker goes on with what it read before."""
+    try:
+        return hashlib.sha256(read_source(source).data).hexdigest()
+    except UrdfkinError:
+        return ""  # the chunk reports what is wrong
 
 
 class _Run:
@@ -144,6 +164,10 @@ class _Run:
                     self._enter(i, future.result())
                 except UrdfkinError as error:
                     self._failures[i] = error
+                except BrokenExecutor as error:
+                    self._failures[i] = OracleError(
+                        "the process that was to check it ended", found=str(error)
+                    )
                 self._tell(i)
         except BaseException:
             for _, _, future in futures:

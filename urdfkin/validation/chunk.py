@@ -44,12 +44,14 @@ class Subject:
         mimic: As in `load`.
         root_joint: As in `load`.
         words: What names it on a command line, where `source` is the URDF itself.
+        stamp: Differs between two states of the same file.
     """
 
     source: str | bytes
     mimic: bool | None = None
     root_joint: str | None = None
     words: str | None = None
+    stamp: str = ""
 
     @classmethod
     def of(cls, robot: Robot) -> Subject:

@@ -51,6 +51,10 @@ _SMALLEST = float(np.finfo(np.float64).tiny)
 ROUNDINGS = 24.0
 
 
+#: A scale beyond the range of doubles is inf; `disagreement` accepts nothing there.
+_BEYOND = np.errstate(over="ignore", invalid="ignore")
+
+
 class Quantity(StrEnum):
     """What can be checked."""
 
@@ -103,12 +107,14 @@ def placement_bound(size: Magnitudes) -> Bound:
     return Bound(scale, k[..., None, None])
 
 
+@_BEYOND
 def velocity_bound(size: Magnitudes, reference: Reference) -> Bound:
     """For (n, frames, 6)."""
     linear = size.vel + size.w * size.p if reference is Reference.WORLD else size.vel
     return Bound(_six(linear, size.w), roundings(Quantity.VELOCITY, reference, size.joints)[..., None])
 
 
+@_BEYOND
 def acceleration_bound(size: Magnitudes, reference: Reference) -> Bound:
     """For (n, frames, 6). Pinocchio goes through spatial accelerations, which differ by w x vel."""
     linear = size.acc + size.w * size.vel
@@ -123,6 +129,7 @@ def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
     return np.repeat(np.stack((linear, angular), axis=-1), 3, axis=-1)
 
 
+@_BEYOND
 def jacobian_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
     """For (n, frames, 6, nv): the path's length for turning columns, 1 for sliding ones, 0 for idle ones."""
     turning, sliding = column_weights(plan)
@@ -131,6 +138,7 @@ def jacobian_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
     return Bound(scale, roundings(Quantity.JACOBIAN, reference, size.joints)[..., None, None])
 
 
+@_BEYOND
 def jacobian_rate_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
     """For (n, frames, 6, nv).
 
@@ -158,12 +166,12 @@ def column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
 def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
     """|ours - theirs| in multiples of eps * scale; inf where the scale is 0 and they differ.
 
-    A result that is not a number disagrees by inf.
+    A result that is not finite, or that a scale beyond all numbers would excuse, disagrees by inf.
     """
-    difference = np.abs(ours - theirs)
     # Below the smallest normal number rounding is no longer relative: products simply lose their last bits.
     unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, _SMALLEST), 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
+        difference = np.abs(ours - theirs)
         units = difference / unit
     units = np.where(difference == 0.0, 0.0, units)
-    return np.where(np.isfinite(difference), units, np.inf)
+    return np.where(np.isfinite(difference) & np.isfinite(bound.scale), units, np.inf)

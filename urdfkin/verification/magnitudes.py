@@ -37,6 +37,7 @@ class Magnitudes:
     joints: FloatArray
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def magnitudes(plan: Plan, q: FloatArray, v: FloatArray, a: FloatArray, base: FloatArray) -> Magnitudes:
     """For flat batches q (n, nq), v and a (n, nv) and a base state (1 or n, 24)."""
     n = len(q)
