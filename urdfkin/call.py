@@ -124,7 +124,7 @@ class Call:
         )
 
     def _replay(self, quantity: Quantity, k: int, frame: str) -> str:
-        words = ["urdfkin", str(quantity), self.robot.source, "--frame", shlex.quote(frame)]
+        words = ["urdfkin", str(quantity).replace(" ", "-"), self.robot.source, "--frame", shlex.quote(frame)]
         if quantity is not Quantity.PLACEMENT:
             words += ["--reference", self.reference.name.lower()]
         for name, array in zip("qva", (self.q, self.v, self.a)[: self.given], strict=False):

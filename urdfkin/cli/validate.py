@@ -85,14 +85,16 @@ def _progress() -> Iterator[Progress]:
 
 def _print(report: ValidationReport, *, cases: bool) -> None:
     from urdfkin.validation.report import Verdict  # noqa: PLC0415
-    from urdfkin.verification.bounds import Quantity  # noqa: PLC0415
 
-    quantities = list(Quantity)
     out = console()
     out.print("worst disagreement with Pinocchio in eps*scale, for each quantity", style="bold")
-    columns = ["robot", "joints", "frames", "results", *(_SHORT[q] for q in quantities), "verdict"]
+    columns = ["robot", "joints", "frames", "results", *_COLUMNS, "verdict"]
     rows = (
-        [*_counts(robot), *(_number(robot.worst(q)) for q in quantities), robot.verdict.value]
+        [
+            *_counts(robot),
+            *(_worst(robot, quantities) for quantities in _COLUMNS.values()),
+            robot.verdict.value,
+        ]
         for robot in report.robots
     )
     out.print(make_table(columns, rows))
@@ -111,20 +113,26 @@ def _print(report: ValidationReport, *, cases: bool) -> None:
     )
 
 
-#: Column heads short enough for 100 columns.
-_SHORT = {
-    "placement": "place",
-    "velocity": "vel",
-    "jacobian": "J",
-    "jacobian rate": "dJ/dt",
-    "acceleration": "acc",
-    "joint jacobian": "joint J",
-    "screws": "data.J",
+#: Column heads, and the quantities whose worst stands below them: frames and joints share a column.
+_COLUMNS = {
+    "place": ("placement",),
+    "vel": ("velocity",),
+    "J": ("jacobian", "joint jacobian"),
+    "J'": ("jacobian rate", "joint jacobian rate"),
+    "acc": ("acceleration",),
+    "data.J": ("screws",),
 }
 
 
 def _counts(robot: RobotReport) -> list[str]:
     return [robot.source, str(len(robot.joints)), str(len(robot.frames)), f"{robot.results:,}"]
+
+
+def _worst(robot: RobotReport, quantities: tuple[str, ...]) -> str:
+    from urdfkin.verification.bounds import Quantity  # noqa: PLC0415
+
+    found = [robot.worst(Quantity(quantity)) for quantity in quantities]
+    return _number(max((value for value in found if value is not None), default=None))
 
 
 def _number(value: float | None) -> str:

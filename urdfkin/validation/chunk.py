@@ -167,10 +167,6 @@ class _Work:
         theirs = self.oracle.jacobians(q, frames, [reference])[:, :, 0]
         bound = bounds.jacobian_bound(self.plan, self.size, reference)
         yield self._tally(Quantity.JACOBIAN, reference, ours, theirs, bound, frames)
-        rate = evaluate.jacobian_rates(self.plan, q, self.x.v, reference)
-        theirs = self.oracle.jacobian_rates(q, self.x.v, frames, [reference])[:, :, 0]
-        rate_bound = bounds.jacobian_rate_bound(self.plan, self.size, reference)
-        yield self._tally(Quantity.JACOBIAN_RATE, reference, rate, theirs, rate_bound, frames)
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         part = Bound(bound.scale[:, moving], bound.k[:, moving])
         theirs = self.oracle.joint_jacobians(q, [reference])[:, :, 0]

@@ -123,21 +123,22 @@ class RobotReport:
         }
 
 
-#: The command that computes a quantity; the Jacobian's for what has none of its own.
+#: The command of a quantity, where it is not the quantity's own name.
 _COMMANDS = {
-    Quantity.PLACEMENT: "placement",
-    Quantity.VELOCITY: "velocity",
-    Quantity.ACCELERATION: "acceleration",
+    Quantity.JOINT_JACOBIAN: "jacobian",
+    Quantity.SCREWS: "jacobian",
+    Quantity.JACOBIAN_RATE: "jacobian-rate",
+    Quantity.JOINT_JACOBIAN_RATE: "jacobian-rate",
 }
 
 
 def replay(source: str, quantity: Quantity, reference: str, case: WorstCase) -> str:
     """The command for one case; numbers are written so that they read back exactly."""
-    command = _COMMANDS.get(quantity, "jacobian")
+    command = _COMMANDS.get(quantity, quantity.value)
     words = ["urdfkin", command, source, "--frame", _quoted(case.frame)]
     if reference:
         words += ["--reference", reference]
-    given = {"placement": "q", "jacobian": "q", "velocity": "qv", "acceleration": "qva"}[command]
+    given = {"placement": "q", "jacobian": "q", "acceleration": "qva"}.get(command, "qv")
     for letter in given:
         words += [f"--{letter}", ",".join(repr(x) for x in getattr(case, letter)) or "neutral"]
     return " ".join(words)
