@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from urdfkin.catalogue import examples
+from urdfkin.cli.judgement import judge_all, print_judgements
 from urdfkin.cli.output import compiling, console, make_table, write_file
 
 if TYPE_CHECKING:
+    from urdfkin.robot import Robot
     from urdfkin.validation.campaign import Progress
     from urdfkin.validation.report import RobotReport, ValidationReport
 
@@ -28,6 +31,8 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Local processes.")
 @click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow (the default).")
 @click.option("--root-joint", type=click.Choice(["floating", "planar"]), help="Hang the root from a joint.")
+@click.option("--judge", "judged", is_flag=True, help="Say whose last digits are right, at 50 digits.")
+@click.option("--judge-samples", type=click.IntRange(1), default=5, show_default=True, help="For --judge.")
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as data.")
 @click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case.")
 @click.pass_context
@@ -40,6 +45,8 @@ def command(
     jobs: int,
     mimic: bool | None,
     root_joint: str | None,
+    judged: bool,
+    judge_samples: int,
     json_: Path | None,
     cases: bool,
 ) -> None:
@@ -55,9 +62,10 @@ def command(
 
     if json_ is not None:
         write_file(json_, b"")  # fail before the work, not after it
+    given = [_once(robot, mimic, root_joint) if judged else robot for robot in robots or examples()]
     with compiling(), _progress() as progress:
         report = validate(
-            list(robots or examples()),
+            given,
             samples=samples,
             seed=seed,
             jobs=jobs,
@@ -65,10 +73,21 @@ def command(
             root_joint=root_joint,
             progress=progress,
         )
+    if judged:
+        found = judge_all(report, given, judge_samples, seed, mimic=mimic, root_joint=root_joint)
+        report = replace(report, judgements=found)
     if json_ is not None:
         write_file(json_, (json.dumps(report.as_dict(), allow_nan=False) + "\n").encode())
     _print(report, cases=cases)
+    print_judgements(report.judgements)
     context.exit(report.exit_code)
+
+
+def _once(source: str, mimic: bool | None, root_joint: str | None) -> Robot | str:
+    """Standard input can be read once, and the judge comes second: load it now."""
+    from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
+
+    return load(source, mimic=mimic, root_joint=root_joint) if source == "-" else source
 
 
 @contextmanager

@@ -10,10 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib import metadata
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from urdfkin.validation.tally import Key, Tally, WorstCase
 from urdfkin.verification.bounds import Quantity
+
+if TYPE_CHECKING:
+    from urdfkin.judge import Judgement
 
 #: Name and version of the JSON layout; documented in docs/validation.md.
 SCHEMA = "urdfkin-validation/1"
@@ -161,6 +164,7 @@ class ValidationReport:
         started: When, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run was stopped; what had finished is kept.
+        judgements: The true errors of both sides, where the judge was asked for.
     """
 
     robots: tuple[RobotReport, ...]
@@ -169,6 +173,7 @@ class ValidationReport:
     started: str
     seconds: float
     interrupted: bool = False
+    judgements: tuple[Judgement, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -195,6 +200,7 @@ class ValidationReport:
             "interrupted": self.interrupted,
             "passed": self.passed,
             "robots": [robot.as_dict() for robot in self.robots],
+            "judge": [judgement.as_dict() for judgement in self.judgements],
         }
 
 
