@@ -221,7 +221,7 @@ class Oracle:
         of_frames = np.empty((len(q), len(ids), 6, model.nv))
         of_joints = np.empty((len(q), len(joints), 6, model.nv))
         v_full = self.rates(v)
-        for k, q_k in enumerate(self.configurations(q, None)):
+        for k, q_k in self._moving(q, None):
             pin.computeJointJacobiansTimeVariation(model, data, q_k, v_full[k])
             for f, frame in enumerate(ids):
                 of_frames[k, f] = pin.getFrameJacobianTimeVariation(model, data, frame, wanted)
