@@ -137,7 +137,7 @@ class Call:
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
     def _replay(self, quantity: Quantity, k: int, frame: str) -> str:
-        words = ["urdfkin", str(quantity), self.robot.source, "--frame", shlex.quote(frame)]
+        words = ["urdfkin", str(quantity).replace(" ", "-"), self.robot.source, "--frame", shlex.quote(frame)]
         if quantity is not Quantity.PLACEMENT:
             words += ["--reference", self.reference.name.lower()]
         for name, array in zip("qva", (self.q, self.v, self.a)[: self.given], strict=False):

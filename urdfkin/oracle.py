@@ -233,21 +233,29 @@ class Oracle:
                     full[k, f, r] = _columns(pin.getFrameJacobianTimeVariation(model, data, frame, reference))
         return self._layout.couple(full)
 
-    def joint_jacobian_rates(
-        self, q: FloatArray, v: FloatArray, references: Sequence[Reference]
-    ) -> FloatArray:
-        """(n, joints, references, 6, nv): `getJointJacobianTimeVariation` of every moving joint."""
+    def jacobian_rates_of_all(
+        self, q: FloatArray, v: FloatArray, frames: Sequence[str], reference: Reference
+    ) -> tuple[FloatArray, FloatArray]:
+        """(n, frames, 6, nv) of frames, (n, joints, 6, nv) by `getJointJacobianTimeVariation`.
+
+        Both come from one `computeJointJacobiansTimeVariation`; joints are the moving ones, in order.
+        """
         pin, model, data = self._pin, self._model, self._data
-        wanted = [self._references[reference] for reference in references]
-        joints = self._layout.joint_ids
-        full = np.empty((len(q), len(joints), len(wanted), 6, model.nv))
+        ids, joints, wanted = (
+            [self._frame(f) for f in frames],
+            self._layout.joint_ids,
+            self._references[reference],
+        )
+        of_frames = np.empty((len(q), len(ids), 6, model.nv))
+        of_joints = np.empty((len(q), len(joints), 6, model.nv))
         v_full = self.rates(v)
-        for k, q_k in enumerate(self.configurations(q, None)):
+        for k, q_k in self._moving(q, None):
             pin.computeJointJacobiansTimeVariation(model, data, q_k, v_full[k])
+            for f, frame in enumerate(ids):
+                of_frames[k, f] = _columns(pin.getFrameJacobianTimeVariation(model, data, frame, wanted))
             for j, joint in enumerate(joints):
-                for r, reference in enumerate(wanted):
-                    full[k, j, r] = _columns(pin.getJointJacobianTimeVariation(model, data, joint, reference))
-        return self._layout.couple(full)
+                of_joints[k, j] = _columns(pin.getJointJacobianTimeVariation(model, data, joint, wanted))
+        return self._layout.couple(of_frames), self._layout.couple(of_joints)
 
     def joint_jacobians(self, q: FloatArray, references: Sequence[Reference]) -> FloatArray:
         """(n, joints, references, 6, nv): `getJointJacobian` of every moving joint, in the tree's order."""

@@ -233,7 +233,8 @@ def _on_tree(change: Callable[[random.Random, ET.Element], None]) -> Mutator:
         if root.tag != "robot":
             return data
         change(rng, root)
-        return ET.tostring(root, encoding="utf-8")
+        changed: bytes = ET.tostring(root, encoding="utf-8")
+        return changed
 
     mutate.__name__ = change.__name__
     return mutate

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,19 +19,17 @@ from tests.high_precision import (
     second_rate,
     turn,
 )
+from urdfkin.loading import load
 from urdfkin.robot import Robot
 from urdfkin.rotation.arrays import FloatArray
-from urdfkin.urdf.reader import read_tree
 
-ROBOTS = Path(__file__).parents[2] / "robots"
 HALF_PI = mp.pi / 2
 
 
 @cache
 def robot(name: str) -> Robot:
     """One of the text's robots; every result is checked against Pinocchio as well."""
-    data = (ROBOTS / f"{name}.urdf").read_bytes()
-    return Robot(read_tree(data), data.decode(), source=name)
+    return load(name)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "placement": ("urdfkin.cli.placement", "pose of a frame"),
     "velocity": ("urdfkin.cli.velocity", "velocity of a frame"),
     "jacobian": ("urdfkin.cli.jacobian", "velocity Jacobian of a frame"),
+    "jacobian-rate": ("urdfkin.cli.jacobian_rate", "rate of a frame's velocity Jacobian"),
     "acceleration": ("urdfkin.cli.acceleration", "classical acceleration of a frame"),
     "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
     "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),

@@ -18,9 +18,10 @@ from urdfkin.cli.arguments import (
     v_option,
     verify_option,
 )
+from urdfkin.cli.breakdown import emit_breakdown
 from urdfkin.cli.output import compiling, emit, exit_code, format_option, output_option
 
-EXAMPLE = "urdfkin acceleration panda --q random --v random --a random"
+EXAMPLE = "urdfkin acceleration panda --q random --v random --a random --explain"
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")
@@ -32,6 +33,7 @@ EXAMPLE = "urdfkin acceleration panda --q random --v random --a random"
 @a_option
 @seed_option
 @verify_option
+@click.option("--explain", is_flag=True, help="Break it down by joint and kind; the parts sum to it.")
 @format_option
 @output_option
 @click.pass_context
@@ -47,17 +49,24 @@ def command(
     a: str,
     seed: int,
     verify: bool,
+    explain: bool,
     format_: str,
     output: Path | None,
 ) -> None:
     """Classical acceleration of a frame (eq. 7.129, 7.130).
 
     The second derivative of the origin's position in m/s^2 and the angular acceleration in
-    rad/s^2, for rates --v and their rates --a. Gravity is not in it.
+    rad/s^2, for rates --v and their rates --a. Gravity is not in it. With --explain, what each joint
+    contributes: transverse, centripetal, Coriolis and sliding parts (eq. 7.125, joint by joint).
     ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input.
     """
     loaded = load_robot(robot, mimic, root_joint, verify=verify)
     x = read_inputs(loaded, frame, seed, q, v, a)
+    if explain:
+        with compiling():
+            parts = loaded.acceleration_breakdown(x.q, x.v, x.a, x.frame, reference)
+        emit_breakdown(x, reference, parts, format_, output)
+        context.exit(exit_code(loaded.certificate()))
     with compiling():
         result = loaded.acceleration(x.q, x.v, x.a, x.frame, reference)
     emit(x, "acceleration", reference, result, format_, output)

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 FORMATS = ("table", "json", "csv", "npy")
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
+#: Quantities with a column for each rate.
+MATRICES = ("jacobian", "jacobian rate")
 #: How many samples of a batch a table shows.
 _SHOWN = 5
 
@@ -162,7 +164,7 @@ def _as_json(
         "rates": list(inputs.robot.rate_names),
         "q": inputs.q.tolist(),
     }
-    if quantity in ("velocity", "acceleration"):
+    if quantity in ("velocity", "jacobian rate", "acceleration"):
         document["v"] = inputs.v.tolist()
     if quantity == "acceleration":
         document["a"] = inputs.a.tolist()
@@ -177,7 +179,7 @@ def _as_csv(
 ) -> bytes:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    if quantity == "jacobian":
+    if quantity in MATRICES:
         writer.writerow(["sample", "row", *inputs.robot.rate_names])
         for k, J in enumerate(result):
             writer.writerows(
@@ -221,7 +223,7 @@ def _print_table(
 
 
 def _table(inputs: Inputs, quantity: str, value: FloatArray) -> Table:
-    if quantity == "jacobian":
+    if quantity in MATRICES:
         return make_table(["joint", *SIX], zip(inputs.robot.rate_names, *value.tolist(), strict=True))
     if quantity == "placement":
         return make_table(

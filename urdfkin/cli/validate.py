@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,9 +13,11 @@ import click
 
 from urdfkin.catalogue import examples
 from urdfkin.cli.arguments import xacro_args, xacro_option
+from urdfkin.cli.judgement import judge_all, print_judgements
 from urdfkin.cli.output import compiling, console, make_table, write_file
 
 if TYPE_CHECKING:
+    from urdfkin.robot import Robot
     from urdfkin.validation.campaign import Progress
     from urdfkin.validation.report import RobotReport, ValidationReport
 
@@ -36,6 +39,8 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow (the default).")
 @click.option("--root-joint", type=click.Choice(["floating", "planar"]), help="Hang the root from a joint.")
 @xacro_option
+@click.option("--judge", "judged", is_flag=True, help="Say whose last digits are right, at 50 digits.")
+@click.option("--judge-samples", type=click.IntRange(1), default=5, show_default=True, help="For --judge.")
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as data.")
 @click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case.")
 @click.pass_context
@@ -48,6 +53,8 @@ def command(
     jobs: int,
     mimic: bool | None,
     root_joint: str | None,
+    judged: bool,
+    judge_samples: int,
     json_: Path | None,
     cases: bool,
 ) -> None:
@@ -63,9 +70,10 @@ def command(
 
     if json_ is not None:
         write_file(json_, b"")  # fail before the work, not after it
+    given = [_once(robot, mimic, root_joint) if judged else robot for robot in robots or examples()]
     with compiling(), _progress() as progress:
         report = validate(
-            list(robots or examples()),
+            given,
             samples=samples,
             seed=seed,
             jobs=jobs,
@@ -74,10 +82,21 @@ def command(
             xacro_args=xacro_args(),
             progress=progress,
         )
+    if judged:
+        found = judge_all(report, given, judge_samples, seed, mimic=mimic, root_joint=root_joint)
+        report = replace(report, judgements=found)
     if json_ is not None:
         write_file(json_, (json.dumps(report.as_dict(), allow_nan=False) + "\n").encode())
     _print(report, cases=cases)
+    print_judgements(report.judgements)
     context.exit(report.exit_code)
+
+
+def _once(source: str, mimic: bool | None, root_joint: str | None) -> Robot | str:
+    """Standard input can be read once, and the judge comes second: load it now."""
+    from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
+
+    return load(source, mimic=mimic, root_joint=root_joint) if source == "-" else source
 
 
 @contextmanager
@@ -94,14 +113,16 @@ def _progress() -> Iterator[Progress]:
 
 def _print(report: ValidationReport, *, cases: bool) -> None:
     from urdfkin.validation.report import Verdict  # noqa: PLC0415
-    from urdfkin.verification.bounds import Quantity  # noqa: PLC0415
 
-    quantities = list(Quantity)
     out = console()
     out.print("worst disagreement with Pinocchio in eps*scale, for each quantity", style="bold")
-    columns = ["robot", "joints", "frames", "results", *(_SHORT[q] for q in quantities), "verdict"]
+    columns = ["robot", "joints", "frames", "results", *_COLUMNS, "verdict"]
     rows = (
-        [*_counts(robot), *(_number(robot.worst(q)) for q in quantities), robot.verdict.value]
+        [
+            *_counts(robot),
+            *(_worst(robot, quantities) for quantities in _COLUMNS.values()),
+            robot.verdict.value,
+        ]
         for robot in report.robots
     )
     out.print(make_table(columns, rows))
@@ -120,20 +141,26 @@ def _print(report: ValidationReport, *, cases: bool) -> None:
     )
 
 
-#: Column heads short enough for 100 columns.
-_SHORT = {
-    "placement": "place",
-    "velocity": "vel",
-    "jacobian": "J",
-    "jacobian rate": "dJ/dt",
-    "acceleration": "acc",
-    "joint jacobian": "joint J",
-    "screws": "data.J",
+#: Column heads, and the quantities whose worst stands below them: frames and joints share a column.
+_COLUMNS = {
+    "place": ("placement",),
+    "vel": ("velocity",),
+    "J": ("jacobian", "joint jacobian"),
+    "J'": ("jacobian rate", "joint jacobian rate"),
+    "acc": ("acceleration",),
+    "data.J": ("screws",),
 }
 
 
 def _counts(robot: RobotReport) -> list[str]:
     return [robot.source, str(len(robot.joints)), str(len(robot.frames)), f"{robot.results:,}"]
+
+
+def _worst(robot: RobotReport, quantities: tuple[str, ...]) -> str:
+    from urdfkin.verification.bounds import Quantity  # noqa: PLC0415
+
+    found = [robot.worst(Quantity(quantity)) for quantity in quantities]
+    return _number(max((value for value in found if value is not None), default=None))
 
 
 def _number(value: float | None) -> str:

@@ -34,6 +34,8 @@ def _motion(
     width = 6 if order else 16
     if out is None:
         out = np.empty((len(q), len(plan.frames), width))
+    if order and reference is Reference.LOCAL:
+        return _local_motion(plan, order, q, v, a, base, out)
     from urdfkin.recursion.motion_kernel import motion  # noqa: PLC0415  compiled when first needed
 
     motion(
@@ -49,6 +51,23 @@ def _motion(
         a,
         out,
         _scratch(plan),
+    )
+    return out
+
+
+def _local_motion(
+    plan: Plan,
+    order: int,
+    q: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+    base: FloatArray,
+    out: FloatArray,
+) -> FloatArray:
+    from urdfkin.recursion.local_kernel import local_motion  # noqa: PLC0415  compiled when first needed
+
+    local_motion(
+        order, plan.steps, plan.geometry, plan.frames, plan.offsets, base, q, v, a, out, _scratch(plan)
     )
     return out
 

@@ -160,6 +160,7 @@ class _Work:
             bound = bounds.acceleration_bound(self.size, reference)
             yield self._tally(Quantity.ACCELERATION, reference, acceleration, theirs, bound, frames)
             yield from self._jacobians(reference)
+            yield from self._jacobian_rates(reference)
         yield self._screws()
 
     def _jacobians(self, reference: Reference) -> Iterator[tuple[Key, Tally]]:
@@ -168,15 +169,28 @@ class _Work:
         theirs = self.oracle.jacobians(q, frames, [reference])[:, :, 0]
         bound = bounds.jacobian_bound(self.plan, self.size, reference)
         yield self._tally(Quantity.JACOBIAN, reference, ours, theirs, bound, frames)
-        rate = evaluate.jacobian_rates(self.plan, q, self.x.v, reference)
-        theirs = self.oracle.jacobian_rates(q, self.x.v, frames, [reference])[:, :, 0]
-        rate_bound = bounds.jacobian_rate_bound(self.plan, self.size, reference)
-        yield self._tally(Quantity.JACOBIAN_RATE, reference, rate, theirs, rate_bound, frames)
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         part = Bound(bound.scale[:, moving], bound.k[:, moving])
         theirs = self.oracle.joint_jacobians(q, [reference])[:, :, 0]
         yield self._tally(
             Quantity.JOINT_JACOBIAN, reference, ours[:, moving], theirs, part, self.robot.joint_names
+        )
+
+    def _jacobian_rates(self, reference: Reference) -> Iterator[tuple[Key, Tally]]:
+        q, v, frames, tree = self.x.q, self.x.v, self.robot.all_frames, self.robot.tree
+        ours = evaluate.jacobian_rates(self.plan, q, v, reference)
+        theirs, of_joints = self.oracle.jacobian_rates_of_all(q, v, frames, reference)
+        bound = bounds.jacobian_rate_bound(self.plan, self.size, reference)
+        yield self._tally(Quantity.JACOBIAN_RATE, reference, ours, theirs, bound, frames)
+        moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
+        part = Bound(bound.scale[:, moving], bound.k[:, moving])
+        yield self._tally(
+            Quantity.JOINT_JACOBIAN_RATE,
+            reference,
+            ours[:, moving],
+            of_joints,
+            part,
+            self.robot.joint_names,
         )
 
     def _screws(self) -> tuple[Key, Tally]:

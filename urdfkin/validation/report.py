@@ -10,10 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib import metadata
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from urdfkin.validation.tally import Key, Tally, WorstCase
 from urdfkin.verification.bounds import Quantity
+
+if TYPE_CHECKING:
+    from urdfkin.judge import Judgement
 
 #: Name and version of the JSON layout; documented in docs/validation.md.
 SCHEMA = "urdfkin-validation/1"
@@ -123,21 +126,22 @@ class RobotReport:
         }
 
 
-#: The command that computes a quantity; the Jacobian's for what has none of its own.
+#: The command of a quantity, where it is not the quantity's own name.
 _COMMANDS = {
-    Quantity.PLACEMENT: "placement",
-    Quantity.VELOCITY: "velocity",
-    Quantity.ACCELERATION: "acceleration",
+    Quantity.JOINT_JACOBIAN: "jacobian",
+    Quantity.SCREWS: "jacobian",
+    Quantity.JACOBIAN_RATE: "jacobian-rate",
+    Quantity.JOINT_JACOBIAN_RATE: "jacobian-rate",
 }
 
 
 def replay(source: str, quantity: Quantity, reference: str, case: WorstCase) -> str:
     """The command for one case; numbers are written so that they read back exactly."""
-    command = _COMMANDS.get(quantity, "jacobian")
+    command = _COMMANDS.get(quantity, quantity.value)
     words = ["urdfkin", command, source, "--frame", _quoted(case.frame)]
     if reference:
         words += ["--reference", reference]
-    given = {"placement": "q", "jacobian": "q", "velocity": "qv", "acceleration": "qva"}[command]
+    given = {"placement": "q", "jacobian": "q", "acceleration": "qva"}.get(command, "qv")
     for letter in given:
         words += [f"--{letter}", ",".join(repr(x) for x in getattr(case, letter)) or "neutral"]
     return " ".join(words)
@@ -160,6 +164,7 @@ class ValidationReport:
         started: When, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run was stopped; what had finished is kept.
+        judgements: The true errors of both sides, where the judge was asked for.
     """
 
     robots: tuple[RobotReport, ...]
@@ -168,6 +173,7 @@ class ValidationReport:
     started: str
     seconds: float
     interrupted: bool = False
+    judgements: tuple[Judgement, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -194,6 +200,7 @@ class ValidationReport:
             "interrupted": self.interrupted,
             "passed": self.passed,
             "robots": [robot.as_dict() for robot in self.robots],
+            "judge": [judgement.as_dict() for judgement in self.judgements],
         }
 
 

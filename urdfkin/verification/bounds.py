@@ -64,6 +64,7 @@ class Quantity(StrEnum):
     JACOBIAN_RATE = "jacobian rate"
     ACCELERATION = "acceleration"
     JOINT_JACOBIAN = "joint jacobian"
+    JOINT_JACOBIAN_RATE = "joint jacobian rate"
     SCREWS = "screws"
 
 
@@ -75,6 +76,7 @@ _FACTORS = {
     Quantity.JACOBIAN_RATE: 3,
     Quantity.ACCELERATION: 3,
     Quantity.JOINT_JACOBIAN: 2,
+    Quantity.JOINT_JACOBIAN_RATE: 3,
     Quantity.SCREWS: 2,
 }
 

@@ -1,0 +1,44 @@
+"""J a + J-dot v is the recursion's acceleration, on every robot of the catalogue and in every reference."""
+
+import numpy as np
+import pytest
+
+import urdfkin
+from urdfkin.catalogue import catalogue
+from urdfkin.recursion import evaluate
+from urdfkin.recursion.base import STILL_STATE
+from urdfkin.reference import Reference
+from urdfkin.tree import FloatArray
+from urdfkin.verification import bounds
+from urdfkin.verification.bounds import EPS, Bound
+from urdfkin.verification.magnitudes import magnitudes
+
+
+def room(bound: Bound) -> FloatArray:
+    """What a quantity may be off by, number for number."""
+    allowed: FloatArray = EPS * bound.k * bound.scale
+    return allowed
+
+
+@pytest.mark.parametrize("name", list(catalogue()))
+def test_the_jacobian_and_its_rate_make_the_acceleration(name: str) -> None:
+    robot = urdfkin.load(name, verify=False)
+    tree = robot.tree
+    generator = np.random.default_rng(5)
+    q, (v, a) = robot.sample(4, 5), generator.normal(size=(2, 4, tree.nv))
+    plan = robot.plan(range(len(tree.links)))
+    size = magnitudes(plan, q, v, a, STILL_STATE)
+    for reference in Reference:
+        J, J_rate = evaluate.jacobians(plan, q, reference), evaluate.jacobian_rates(plan, q, v, reference)
+        total = np.einsum("nfij,nj->nfi", J, a) + np.einsum("nfij,nj->nfi", J_rate, v)
+        expected = evaluate.accelerations(plan, q, v, a, reference)
+        if reference is not Reference.LOCAL_WORLD_ALIGNED:
+            # There it is the spatial acceleration that they make.
+            velocity = evaluate.velocities(plan, q, v, reference)
+            expected[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
+        allowed = (
+            np.einsum("nfij,nj->nfi", room(bounds.jacobian_bound(plan, size, reference)), np.abs(a))
+            + np.einsum("nfij,nj->nfi", room(bounds.jacobian_rate_bound(plan, size, reference)), np.abs(v))
+            + room(bounds.acceleration_bound(size, reference))
+        )
+        assert (np.abs(total - expected) <= allowed).all(), reference

@@ -1,0 +1,123 @@
+"""`urdfkin acceleration --explain`: whose doing an acceleration is, as a table or as data."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from urdfkin.cli.arguments import Inputs
+from urdfkin.cli.output import SIX, check_line, console, make_table, write_file
+
+if TYPE_CHECKING:
+    from urdfkin.recursion.breakdown import AccelerationBreakdown
+    from urdfkin.tree import FloatArray
+
+_COLUMNS = ("joint", "kind", "lin x", "lin y", "lin z", "ang x", "ang y", "ang z")
+#: How many samples of a batch the table shows.
+_SHOWN = 2
+
+
+def emit_breakdown(
+    inputs: Inputs, reference: str, parts: AccelerationBreakdown, format_: str, output: Path | None
+) -> None:
+    """Show or write (n, ...) parts with the certificate of their sum."""
+    certificate = inputs.robot.certificate()
+    if format_ == "table" and output is None:
+        _print(inputs, reference, parts)
+        click.echo(check_line(certificate))
+        return
+    writer = {"table": _as_csv, "csv": _as_csv, "json": _as_json, "npy": _as_npy}[format_]
+    data = writer(inputs, reference, parts)
+    if output is not None:
+        write_file(output, data)
+    else:
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    if format_ != "json":
+        click.echo(check_line(certificate), err=True)
+
+
+def _rows(parts: AccelerationBreakdown, sample: int) -> Iterator[tuple[str, str, FloatArray]]:
+    """(joint, kind, six numbers) of one sample; parts that are exactly zero are left out."""
+    from urdfkin.recursion.breakdown import KINDS  # noqa: PLC0415  keeps --help fast
+
+    if parts.base[sample].any():
+        yield "base", "moving base", parts.base[sample]
+    for j, joint in enumerate(parts.joints):
+        for k, kind in enumerate(KINDS):
+            if parts.terms[sample, j, k].any():
+                yield joint, kind, parts.terms[sample, j, k]
+
+
+def _print(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> None:
+    out = console()
+    out.print(f"{inputs.robot.name}: acceleration of {inputs.frame}, {reference}, by joint", style="bold")
+    out.print("m/s^2 and rad/s^2; transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z (7.125)")
+    for k in range(min(len(parts.base), _SHOWN)):
+        if len(parts.base) > 1:
+            out.print(f"sample {k}")
+        noise = 1e-15 * float(abs(parts.terms[k]).max(initial=0.0))
+        rows = [*_rows(parts, k), ("sum", "", parts.total[k])]
+        table = make_table(
+            _COLUMNS, ((joint, kind, *_cells(six, noise)) for joint, kind, six in rows), words=2
+        )
+        out.print(table)
+    if len(parts.base) > _SHOWN:
+        more = len(parts.base) - _SHOWN
+        out.print(f"... and {more} more samples: --format csv, json or npy has them all")
+
+
+def _cells(six: FloatArray, noise: float) -> list[str]:
+    """Four digits: enough to compare parts, and they fit beside each other."""
+    return ["0" if abs(x) <= noise else f"{x:.4g}" for x in six.tolist()]
+
+
+def _as_json(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> bytes:
+    from urdfkin.recursion.breakdown import KINDS  # noqa: PLC0415
+
+    certificate = inputs.robot.certificate()
+    document = {
+        "robot": inputs.robot.name,
+        "source": inputs.robot.source,
+        "quantity": "acceleration breakdown",
+        "frame": inputs.frame,
+        "reference": reference,
+        "rows": list(SIX),
+        "joints": list(parts.joints),
+        "kinds": list(KINDS),
+        "q": inputs.q.tolist(),
+        "v": inputs.v.tolist(),
+        "a": inputs.a.tolist(),
+        "base": parts.base.tolist(),
+        "terms": parts.terms.tolist(),
+        "total": parts.total.tolist(),
+        "verified": certificate.verified,
+        "check": check_line(certificate),
+    }
+    return (json.dumps(document, indent=2, allow_nan=False) + "\n").encode()
+
+
+def _as_csv(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> bytes:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["sample", "joint", "kind", *SIX])
+    for sample in range(len(parts.base)):
+        for joint, kind, six in _rows(parts, sample):
+            writer.writerow([sample, joint, kind, *map(repr, six.tolist())])
+        writer.writerow([sample, "sum", "", *map(repr, parts.total[sample].tolist())])
+    return stream.getvalue().encode()
+
+
+def _as_npy(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> bytes:
+    import numpy as np  # noqa: PLC0415
+
+    stream = io.BytesIO()
+    np.save(stream, parts.terms)
+    return stream.getvalue()
