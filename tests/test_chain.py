@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, trees
-from urdfkin.chain import chain, rotation_onto
+from urdfkin.chain import chain
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Mimic, build_tree
 
@@ -136,20 +135,3 @@ def test_the_wrong_number_of_coordinates_names_the_right_ones(walker: KinematicT
         chain(walker, "left_foot").placement(np.zeros(3))
     with pytest.raises(InputError, match="walker needs"):
         chain(walker, "left_foot").coupling.select(walker, np.zeros(3))
-
-
-@pytest.mark.parametrize("axis", [*np.eye(3), *-np.eye(3)], ids=str)
-def test_a_coordinate_axis_is_aligned_without_rounding(axis: FloatArray) -> None:
-    R = rotation_onto(axis)
-    assert set(np.abs(R).ravel()) == {0.0, 1.0}
-    np.testing.assert_array_equal(R[:, 2], axis)
-    assert np.linalg.det(R) == 1.0
-
-
-@given(st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 1e-3))
-def test_any_axis_is_aligned_by_a_rotation(vector: tuple[float, float, float]) -> None:
-    axis = np.array(vector) / np.linalg.norm(vector)
-    R = rotation_onto(axis)
-    np.testing.assert_allclose(R.T @ R, np.eye(3), atol=4 * EPS)
-    np.testing.assert_allclose(R[:, 2], axis, atol=2 * EPS)
-    assert np.linalg.det(R) > 0

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.coupling import Coupling, coupling_of
 from urdfkin.errors import InputError
+from urdfkin.rotation import axis_aligning
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, frozen
 
 
@@ -135,15 +136,9 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
         InputError: a planar or floating joint lies on the way.
     """
     base_name = tree.links[0] if base is None else base
-    up, down = tree.path(tree.frame_link(base_name)), tree.path(tree.frame_link(tip))
-    common = 0
-    while common < min(len(up), len(down)) and up[common] == down[common]:
-        common += 1
-    steps = [(tree.joints[i], True) for i in reversed(up[common:])]
-    steps += [(tree.joints[i], False) for i in down[common:]]
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0
     lengths = list[float]()
-    for joint, backwards in steps:
+    for joint, backwards in steps_between(tree, tip, base_name):
         _refuse_many_coordinates(tree, joint, base_name, tip)
         to_joint, from_joint = _around(joint, backwards)
         A = A @ to_joint
@@ -155,6 +150,20 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
         A = A @ from_joint
         length += _norm(joint) if backwards else 0.0
     return FrameChain(tree.name, base_name, tip, tuple(joints), frozen(A), frozen([*lengths, length]))
+
+
+def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:
+    """The joints from `base` to `tip`, fixed ones too, each with whether it is passed backwards.
+
+    Raises:
+        UnknownNameError: there is no such frame.
+    """
+    up, down = tree.path(tree.frame_link(base)), tree.path(tree.frame_link(tip))
+    common = 0
+    while common < min(len(up), len(down)) and up[common] == down[common]:
+        common += 1
+    backwards = [(tree.joints[i], True) for i in reversed(up[common:])]
+    return backwards + [(tree.joints[i], False) for i in down[common:]]
 
 
 def motion_about_z(values: FloatArray, turns: bool) -> FloatArray:
@@ -176,7 +185,7 @@ def _around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray]:
     if not joint.kind.has_axis:
         return (_inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)
     align = np.eye(4)
-    align[:3, :3] = rotation_onto(-joint.axis if backwards else joint.axis)
+    align[:3, :3] = axis_aligning(-joint.axis if backwards else joint.axis)
     if backwards:
         return align, align.T @ _inverse(joint.T_parent_joint)
     return joint.T_parent_joint @ align, align.T
@@ -191,31 +200,6 @@ def _inverse(T: FloatArray) -> FloatArray:
 
 def _norm(joint: Joint) -> float:
     return math.hypot(*joint.T_parent_joint[:3, 3])
-
-
-def rotation_onto(axis: FloatArray) -> FloatArray:
-    """(3, 3) rotation whose third column is the unit vector `axis`.
-
-    For a coordinate axis, either way, the rotation is exact: a permutation with signs, the identity for z.
-    Otherwise the turn is about the line halfway between the axis and the nearer of z and -z, so that it
-    stays well conditioned for every axis.
-
-    Example:
-        >>> rotation_onto(np.array([0.0, 1.0, 0.0])).tolist()
-        [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
-    """
-    x, y, z = (float(component) for component in axis / math.hypot(*axis))
-    sign = math.copysign(1.0, z)
-    # Rodrigues' turn of (0, 0, sign) onto the axis, times diag(1, sign, sign) to let z become the axis.
-    k = 1.0 / (1.0 + sign * z)
-    turn = np.array(
-        [
-            [1.0 - x * x * k, -x * y * k, sign * x],
-            [-x * y * k, 1.0 - y * y * k, sign * y],
-            [-sign * x, -sign * y, sign * z],
-        ]
-    )
-    return np.ascontiguousarray(turn @ np.diag([1.0, sign, sign]))
 
 
 def _refuse_many_coordinates(tree: KinematicTree, joint: Joint, base: str, tip: str) -> None:

@@ -1,0 +1,1 @@
+"""Denavit-Hartenberg tables from any chain, exact, canonical and proven."""
