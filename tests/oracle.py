@@ -63,7 +63,9 @@ class TreeOracle:
         pin.computeJointJacobians(self.model, self.data, self.G @ q + self.offset)
         pin.updateFramePlacements(self.model, self.data)
         reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        return np.asarray(pin.getFrameJacobian(self.model, self.data, self.frame(tip), reference)) @ self.G
+        # A robot of one joint gets a vector from Pinocchio's binding.
+        J = np.reshape(pin.getFrameJacobian(self.model, self.data, self.frame(tip), reference), (6, -1))
+        return np.asarray(J @ self.G)
 
     def acceleration(self, q: FloatArray, v: FloatArray, a: FloatArray, tip: str) -> FloatArray:
         """(6,) classical acceleration of `tip`, [linear; angular], LOCAL_WORLD_ALIGNED."""

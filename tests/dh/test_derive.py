@@ -11,29 +11,18 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from tests.dh.arms import arm
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.chain import FrameChain, chain
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree
+from urdfkin.tree import FloatArray, KinematicTree
 
 EPS = float(np.finfo(np.float64).eps)
 CONVENTIONS = ("standard", "modified")
 LENGTH_BOUND = 10.0
-
-
-def arm(*steps: FloatArray, kinds: str = "", tip: FloatArray | None = None) -> KinematicTree:
-    """A serial robot whose joints have their axis along z and stand at the given poses; R or P each."""
-    named = {"R": JointKind.REVOLUTE, "P": JointKind.PRISMATIC}
-    z = np.array([0.0, 0.0, 1.0])
-    joints = [
-        (Joint(f"j{i + 1}", named[kind], 0, T, z), f"l{i}", f"l{i + 1}")
-        for i, (T, kind) in enumerate(zip(steps, kinds or "R" * len(steps), strict=True))
-    ]
-    end = Joint("end", JointKind.FIXED, 0, np.eye(4) if tip is None else tip, z)
-    return build_tree("arm", "l0", [*joints, (end, f"l{len(steps)}", "tip")])
 
 
 def reach_of(path: FrameChain) -> float:

@@ -17,9 +17,8 @@ from typing import TypeVar
 import numpy as np
 
 from urdfkin.chain import ChainJoint, FrameChain
-from urdfkin.dh.elements import between_axes
+from urdfkin.dh.elements import EPS, as_step, between_axes
 from urdfkin.dh.normals import (
-    EPS,
     NEARLY_PARALLEL,
     PARALLEL,
     NearParallel,
@@ -125,8 +124,11 @@ def _table(
     ends: tuple[FloatArray, FloatArray],
 ) -> DHTable:
     """Bracket the factors S_1 X_1 S_2 X_2 ... S_n X_n as the convention says."""
-    if choices.convention is Convention.MODIFIED:
-        steps = [Step(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), *steps][: len(turns)]
+    if choices.convention is Convention.MODIFIED and turns:
+        first = as_step(ends[0])
+        a, alpha = first or (0.0, 0.0)
+        ends = (np.eye(4) if first else ends[0], ends[1])
+        steps = [Step(0.0, 0.0, a, alpha, 0.0, 0.0, 0.0), *steps[:-1]]
     rows = [
         _row(joint, turn, step, -1 if joint.name in choices.flip else 1)
         for joint, turn, step in zip(chain.joints, turns, steps, strict=True)

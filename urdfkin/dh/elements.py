@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike
 
 from urdfkin.tree import FloatArray
 
+EPS = float(np.finfo(np.float64).eps)
+
 
 def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:
     """(..., 4, 4) S = Rz(theta) Tz(d), radians and metres; the arguments are broadcast."""
@@ -41,6 +43,21 @@ def between_axes(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
             [0.0, 0.0, 0.0, 1.0],
         ]
     )
+
+
+def as_step(T: FloatArray) -> tuple[float, float] | None:
+    """(a, alpha) where a pose is Tx(a) Rx(alpha) to rounding of its rotation, else None.
+
+    Example:
+        >>> as_step(between_axes(0.5, math.pi))
+        (0.5, 3.141592653589793)
+    """
+    crossed = (T[0, 1], T[0, 2], T[1, 0], T[2, 0])
+    if max(map(abs, crossed)) > 4.0 * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
+        return None
+    alpha = math.atan2(T[2, 1], T[2, 2])
+    twelfth = nearest_twelfth(alpha)
+    return float(T[0, 3]), wrapped(twelfth if abs(alpha - twelfth) <= 4.0 * EPS else alpha) + 0.0
 
 
 def wrapped(angle: float) -> float:

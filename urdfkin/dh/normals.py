@@ -18,10 +18,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from urdfkin.dh.elements import between_axes, wrapped
+from urdfkin.dh.elements import EPS, between_axes, wrapped
 from urdfkin.tree import FloatArray
-
-EPS = float(np.finfo(np.float64).eps)
 
 #: Two axes whose tilt is no larger than this (rad) are parallel: the tilt is the rounding of the pose itself.
 PARALLEL = 8.0 * EPS

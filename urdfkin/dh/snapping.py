@@ -15,8 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from urdfkin.chain import ChainJoint, FrameChain, chain, steps_between
-from urdfkin.dh.elements import nearest_twelfth, wrapped
-from urdfkin.dh.normals import EPS
+from urdfkin.dh.elements import EPS, nearest_twelfth, wrapped
 from urdfkin.dh.statement import SnapChange, SnapStatement
 from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors import InputError

@@ -17,16 +17,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.coupling import Coupling, coupling_of
-from urdfkin.dh.elements import along_axis, between_axes
-from urdfkin.dh.normals import EPS
+from urdfkin.dh.elements import EPS, along_axis, between_axes
 from urdfkin.dh.statement import SnapStatement
 from urdfkin.errors import InputError
-from urdfkin.tree import FloatArray, JointKind, Limit, Mimic, frozen
+from urdfkin.reference import Reference
+from urdfkin.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, frozen
+
+if TYPE_CHECKING:
+    from urdfkin.recursion.plan import Plan
 
 
 class Convention(StrEnum):
@@ -233,6 +237,87 @@ class DHTable:
             [0.0, 2.0, 0.0]
         """
         return np.ascontiguousarray(self.frames(q)[..., -1, :, :] @ self.tool)
+
+    # -- motion: the text's recursion on the table's frames ------------------------------------------
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The recursion's walk over the table's frames, made once."""
+        from urdfkin.dh.motion import plan_of  # noqa: PLC0415 - compiles; only who asks for motion pays
+
+        return plan_of(self)
+
+    def jacobian(
+        self, q: ArrayLike | Mapping[str, float], reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
+    ) -> FloatArray:
+        """(..., 6, coordinates) Jacobian of the tip in the base frame, [linear; angular]: 7.85.
+
+        Args:
+            q: (..., coordinates) in the order of `joint_names`, rad or m, or a mapping by name.
+            reference: As everywhere; the world is the table's base frame.
+
+        Raises:
+            InputError: `q` has the wrong length.
+        """
+        from urdfkin.dh import motion  # noqa: PLC0415
+
+        return motion.jacobian(self, q, reference)
+
+    def velocity(
+        self,
+        q: ArrayLike | Mapping[str, float],
+        v: ArrayLike,
+        reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
+    ) -> FloatArray:
+        """(..., 6) velocity of the tip in the base frame, [linear; angular]: 7.127, 7.128.
+
+        Args:
+            q: (..., coordinates), rad or m, or a mapping by name.
+            v: (..., coordinates), rad/s or m/s; batches broadcast.
+            reference: As everywhere; the world is the table's base frame.
+
+        Raises:
+            InputError: an array has the wrong length.
+        """
+        from urdfkin.dh import motion  # noqa: PLC0415
+
+        return motion.velocity(self, q, v, reference)
+
+    def acceleration(
+        self,
+        q: ArrayLike | Mapping[str, float],
+        v: ArrayLike,
+        a: ArrayLike,
+        reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
+    ) -> FloatArray:
+        """(..., 6) classical acceleration of the tip in the base frame, [linear; angular]: 7.129, 7.130.
+
+        Args:
+            q: (..., coordinates), rad or m, or a mapping by name.
+            v: (..., coordinates), rad/s or m/s.
+            a: (..., coordinates), rad/s^2 or m/s^2; batches broadcast.
+            reference: As everywhere; the world is the table's base frame.
+
+        Raises:
+            InputError: an array has the wrong length.
+        """
+        from urdfkin.dh import motion  # noqa: PLC0415
+
+        return motion.acceleration(self, q, v, a, reference)
+
+    # -- other forms ---------------------------------------------------------------------------------
+
+    def to_convention(self, convention: str) -> DHTable:
+        """The same motion in the other convention; raises InputError for an unknown name."""
+        from urdfkin.dh.convert import to_convention  # noqa: PLC0415
+
+        return to_convention(self, convention)
+
+    def to_tree(self) -> KinematicTree:
+        """The robot that the table describes, its joints standing on the table's frames."""
+        from urdfkin.dh.to_tree import to_tree  # noqa: PLC0415
+
+        return to_tree(self)
 
 
 def _rigid(T: ArrayLike, where: str) -> FloatArray:
