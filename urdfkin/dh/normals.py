@@ -140,13 +140,16 @@ def _rest(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
 
 
 def cleaned_length(length: float, reach: float) -> float:
-    """Zero where a length is rounding noise beside the reach, else unchanged.
+    """A length without rounding noise: zero, or twelve digits, where that is no further away than rounding.
 
     Example:
-        >>> cleaned_length(-5e-17, 1.0), cleaned_length(-5e-12, 1.0)
-        (0.0, -5e-12)
+        >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
+        (0.0, 0.076, -5e-12)
     """
-    return 0.0 if abs(length) <= 4.0 * EPS * reach else float(length)
+    if abs(length) <= 4.0 * EPS * reach:
+        return 0.0
+    short = float(f"{length:.12g}")
+    return short if abs(length - short) <= 2.0 * EPS * reach else float(length)
 
 
 def cleaned_angle(angle: float) -> float:

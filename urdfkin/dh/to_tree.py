@@ -25,11 +25,11 @@ def to_tree(table: DHTable) -> KinematicTree:
         table: Any table.
     """
     joints, here = list[tuple[Joint, str, str]](), _link_names(table)
-    for i, (row, T) in enumerate(zip(table.rows, _poses(table)[:-1], strict=True)):
+    for i, (row, T) in enumerate(zip(table.rows, frame_poses(table)[:-1], strict=True)):
         axis = np.array([0.0, 0.0, float(row.sense)])
         joint = Joint(row.joint, _kind(row), 0, T, axis, row.limit, row.mimic)
         joints.append((joint, here[i], here[i + 1]))
-    joints.append((_fixed(f"{table.tip_frame}_fixed", _poses(table)[-1], table), here[-2], here[-1]))
+    joints.append((_fixed(f"{table.tip_frame}_fixed", frame_poses(table)[-1], table), here[-2], here[-1]))
     names = {row.joint for row in table.rows}
     for leader in table.joint_names:
         if leader not in names:
@@ -42,7 +42,7 @@ def to_tree(table: DHTable) -> KinematicTree:
 def free_tree(table: DHTable) -> KinematicTree:
     """The same tree with followers set free: one coordinate a row, in row order."""
     joints, here = list[tuple[Joint, str, str]](), _link_names(table)
-    poses = _poses(table)
+    poses = frame_poses(table)
     for i, row in enumerate(table.rows):
         axis = np.array([0.0, 0.0, float(row.sense)])
         kind = JointKind.CONTINUOUS if row.kind.turns else JointKind.PRISMATIC
@@ -51,7 +51,7 @@ def free_tree(table: DHTable) -> KinematicTree:
     return build_tree(table.robot, here[0], joints)
 
 
-def _poses(table: DHTable) -> list[FloatArray]:
+def frame_poses(table: DHTable) -> list[FloatArray]:
     """Each joint's frame in the one before it, at zero, then the tip in the last joint's frame."""
     S = [row.S() for row in table.rows]
     X = [row.X for row in table.rows]
