@@ -82,10 +82,12 @@ def local_frame(draw: st.DrawFn) -> FloatArray:
 
 
 @st.composite
-def trees(draw: st.DrawFn, min_joints: int = 0, max_joints: int = 7, mimics: bool = True) -> KinematicTree:
+def trees(
+    draw: st.DrawFn, min_joints: int = 0, max_joints: int = 7, mimics: bool = True, slides: bool = True
+) -> KinematicTree:
     """A serial robot `l0 ... tip` of moving joints, with fixed joints strewn in."""
     joints, link, carried = list[tuple[Joint, str, str]](), "l0", np.eye(4)
-    kinds = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.REVOLUTE, JointKind.PRISMATIC)
+    kinds = (JointKind.REVOLUTE, JointKind.CONTINUOUS, *[JointKind.PRISMATIC] * slides)
     for i in range(draw(st.integers(min_joints, max_joints))):
         kind = draw(st.sampled_from(kinds))
         local = draw(local_frame())
