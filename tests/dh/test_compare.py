@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from tests.dh.arms import arm
 from tests.random_chains import configurations, rotation, shift, trees
@@ -75,14 +76,13 @@ def test_sliding_joints_are_fitted_as_well(kinds: str) -> None:
     assert found.differences == ()
 
 
-@given(trees(min_joints=1, max_joints=6, mimics=False))
+@given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
 @settings(max_examples=40, deadline=None)
-def test_a_table_agrees_with_the_chain_it_came_from(tree: KinematicTree) -> None:
+def test_a_table_agrees_with_the_chain_it_came_from(tree: KinematicTree, seed: int) -> None:
     path = chain(tree, "tip")
     assume(path.reach > 1e-3)
-    found = compare(path, dh_table(tree, "tip"))
-    # Two axes that nearly coincide make offsets that nearly do the same, and the fit leaves those alone.
-    assert found.metres <= 1e-7 * max(found.reference.span, 1.0)
+    found = compare(path, disguised(dh_table(tree, "tip"), seed))
+    assert found.metres <= 1e-11 * max(found.reference.span, 1.0)
 
 
 CELLS = [(i, cell) for i in range(6) for cell in ("a", "alpha", "d")]
