@@ -22,6 +22,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "velocity": ("urdfkin.cli.velocity", "velocity of a frame"),
     "jacobian": ("urdfkin.cli.jacobian", "velocity Jacobian of a frame"),
     "acceleration": ("urdfkin.cli.acceleration", "classical acceleration of a frame"),
+    "dh": ("urdfkin.cli.dh", "Denavit-Hartenberg tables, checked, compared, in many forms"),
     "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
 }
 

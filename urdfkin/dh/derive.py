@@ -284,12 +284,13 @@ def _last(
         return cleaned_angle(phi_in + phi), cleaned_length(A[2, 3], reach), step, np.eye(4)
     d = cleaned_length(carry if choices.last is Last.FLANGE else A[2, 3], reach)
     tool = A.copy()
-    tool[2, 3] = cleaned_length(A[2, 3] - d, reach)
+    tool[2, 3] -= d
     if phi_in:
         turn = between_axes(0.0, 0.0)
         turn[:2, :2] = [[math.cos(phi_in), -math.sin(phi_in)], [math.sin(phi_in), math.cos(phi_in)]]
         tool = turn @ tool
     _clean_rotation(tool)
+    tool[:3, 3] = [cleaned_length(component, reach) for component in tool[:3, 3]]
     return 0.0, d, Step(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), tool
 
 
