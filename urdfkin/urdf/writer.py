@@ -1,0 +1,121 @@
+"""`KinematicTree` to URDF text that reads back as the same tree.
+
+Numbers are written so that they read back bit for bit; a joint's rotation becomes roll, pitch and yaw, which
+give it back to rounding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from urdfkin.errors import InputError
+from urdfkin.tree import Joint, JointKind, KinematicTree, Limit
+from urdfkin.urdf.angles import rpy_from_matrix
+
+#: Kinds whose position limits a URDF must give.
+_BOUNDED = (JointKind.REVOLUTE, JointKind.PRISMATIC)
+
+
+def to_urdf(tree: KinematicTree) -> str:
+    """A URDF of the tree's links and joints; they have no shapes and no masses.
+
+    A limit of effort or velocity that is infinite cannot be written in URDF 1.0; the file then says version
+    1.2, where it is left out.
+
+    Args:
+        tree: The robot.
+
+    Raises:
+        InputError: a revolute or prismatic joint without finite limits, or a name that XML cannot hold.
+
+    >>> from urdfkin.tree import build_tree
+    >>> print(to_urdf(build_tree("stone", "only", [])))
+    <robot name="stone">
+      <link name="only"/>
+    </robot>
+    <BLANKLINE>
+    """
+    new = any(_needs_newer(joint) for joint in tree.joints)
+    version = ' version="1.2"' if new else ""
+    lines = [f'<robot name="{attribute(tree.name)}"{version}>']
+    lines += [f'  <link name="{attribute(link)}"/>' for link in tree.links]
+    for number, joint in enumerate(tree.joints):
+        lines += _joint(joint, tree.links[joint.parent], tree.links[number + 1])
+    lines.append("</robot>")
+    return "\n".join(lines) + "\n"
+
+
+def _needs_newer(joint: Joint) -> bool:
+    limit = joint.limit
+    if limit is None:
+        return False
+    infinite = [math.isinf(limit.effort), math.isinf(limit.velocity)]
+    # A joint that needs no <limit> goes without when there is nothing finite to say.
+    return any(infinite) and (joint.kind in _BOUNDED or not all(infinite))
+
+
+def _joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
+    T = joint.T_parent_joint
+    yield f'  <joint name="{attribute(joint.name)}" type="{joint.kind.value}">'
+    yield f'    <parent link="{attribute(parent)}"/>'
+    yield f'    <child link="{attribute(child)}"/>'
+    yield f'    <origin xyz="{numbers(T[:3, 3])}" rpy="{numbers(rpy_from_matrix(T[:3, :3]))}"/>'
+    if joint.kind.has_axis:
+        yield f'    <axis xyz="{numbers(joint.axis)}"/>'
+    elif joint.kind is JointKind.PLANAR:
+        yield '    <axis xyz="0 0 1"/>'
+    yield from _limit(joint, joint.limit)
+    if joint.mimic is not None:
+        leader, rule = attribute(joint.mimic.leader), joint.mimic
+        yield f'    <mimic joint="{leader}" multiplier="{rule.multiplier!r}" offset="{rule.offset!r}"/>'
+    yield "  </joint>"
+
+
+def _limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
+    bounded = joint.kind in _BOUNDED
+    if bounded and (limit is None or math.isinf(limit.lower) or math.isinf(limit.upper)):
+        raise InputError(
+            "a URDF needs finite position limits for a revolute or prismatic joint",
+            where=f"joint {joint.name}",
+            found="none" if limit is None else f"{limit.lower} to {limit.upper}",
+            remedy="give it limits; a joint that turns freely is continuous",
+        )
+    if limit is None:
+        return
+    named = [("effort", limit.effort), ("velocity", limit.velocity)]
+    if bounded:
+        named = [("lower", limit.lower), ("upper", limit.upper), *named]
+    finite = [f'{name}="{float(value)!r}"' for name, value in named if math.isfinite(value)]
+    if finite:
+        yield f"    <limit {' '.join(finite)}/>"
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers that read back bit for bit, with a space between them.
+
+    >>> numbers([0.1, -0.0, 1e-17])
+    '0.1 -0.0 1e-17'
+    """
+    return " ".join(repr(float(value)) for value in values)
+
+
+_ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;", "\n": "&#10;", "\r": "&#13;"}
+
+
+def attribute(text: str) -> str:
+    """A text as an attribute's value.
+
+    Raises:
+        InputError: it holds a character that XML cannot.
+    """
+    bad = next((c for c in text if not _is_xml(c)), None)
+    if bad is not None:
+        raise InputError("XML cannot hold this character", where=repr(text), found=f"U+{ord(bad):04X}")
+    return "".join(_ESCAPES.get(character, character) for character in text)
+
+
+def _is_xml(character: str) -> bool:
+    """Whether XML 1.0 allows a character (production Char)."""
+    code = ord(character)
+    return code in (9, 10, 13) or 0x20 <= code <= 0xD7FF or 0xE000 <= code <= 0xFFFD or code >= 0x10000
