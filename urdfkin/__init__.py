@@ -13,6 +13,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from urdfkin.chain import FrameChain
+    from urdfkin.dh import DHRow, DHTable, read_table, table_from_rows
     from urdfkin.diagnostics import Finding, UrdfError, UrdfWarning
     from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
     from urdfkin.loading import load
@@ -21,41 +23,54 @@ if TYPE_CHECKING:
     from urdfkin.robot import NotVerifiedWarning, Robot
     from urdfkin.validation.campaign import validate
     from urdfkin.verification.certificate import Certificate, VerificationError
+    from urdfkin.verification.tables import TableError
 
 # Loaded when first asked for: `import urdfkin` needs no numpy, no Pinocchio and no compiler.
 _HOMES = {
     "BaseMotion": "urdfkin.recursion.base",
     "Certificate": "urdfkin.verification.certificate",
+    "DHRow": "urdfkin.dh",
+    "DHTable": "urdfkin.dh",
     "Finding": "urdfkin.diagnostics",
+    "FrameChain": "urdfkin.chain",
     "InputError": "urdfkin.errors",
     "NotVerifiedWarning": "urdfkin.robot",
     "Reference": "urdfkin.reference",
     "Robot": "urdfkin.robot",
     "SourceError": "urdfkin.errors",
+    "TableError": "urdfkin.verification.tables",
     "UnknownNameError": "urdfkin.errors",
     "UrdfError": "urdfkin.diagnostics",
     "UrdfWarning": "urdfkin.diagnostics",
     "UrdfkinError": "urdfkin.errors",
     "VerificationError": "urdfkin.verification.certificate",
     "load": "urdfkin.loading",
+    "read_table": "urdfkin.dh",
+    "table_from_rows": "urdfkin.dh",
     "validate": "urdfkin.validation.campaign",
 }
 
 __all__ = [
     "BaseMotion",
     "Certificate",
+    "DHRow",
+    "DHTable",
     "Finding",
+    "FrameChain",
     "InputError",
     "NotVerifiedWarning",
     "Reference",
     "Robot",
     "SourceError",
+    "TableError",
     "UnknownNameError",
     "UrdfError",
     "UrdfWarning",
     "UrdfkinError",
     "VerificationError",
     "load",
+    "read_table",
+    "table_from_rows",
     "validate",
 ]
 

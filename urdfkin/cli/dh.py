@@ -91,13 +91,15 @@ def command(
 
     The path may run down the tree, up, or through the common ancestor. Angles and lengths stay as the file
     has them unless --snap makes angles round; the table then says by how much the tip moves at most.
-    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input.
+    ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json,
+    .csv), which is made a robot first: to convert it, or to write it as a URDF.
 
     Exit 0: verified, or the compared table agrees. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.cli.dh_work import Work, run  # noqa: PLC0415  keeps --help fast
+    from urdfkin.cli.dh_work import Work, run, table_robot  # noqa: PLC0415  keeps --help fast
 
-    loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    is_table = Path(robot).suffix in (".toml", ".json", ".csv")
+    loaded = table_robot(robot, verify) if is_table else load_robot(robot, mimic, root_joint, verify=verify)
     with compiling():
         code = run(Work(robot=loaded, output=output, **options))
     context.exit(code)

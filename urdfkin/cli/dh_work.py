@@ -61,6 +61,11 @@ class Work:
         )
 
 
+def table_robot(path: str, verify: bool) -> Robot:
+    """The robot that a table file describes."""
+    return read_table(path).to_robot(verify=verify)
+
+
 def run(work: Work) -> int:
     """Do it; the exit code."""
     chosen = [
@@ -122,9 +127,7 @@ def _table(work: Work, tip: str | None) -> tuple[DHTable, TableCheck | None]:
 
 def _written(work: Work, table: DHTable, check: TableCheck | None) -> str:
     if work.format_ == "urdf":
-        from urdfkin.urdf.writer import to_urdf  # noqa: PLC0415
-
-        return to_urdf(table.to_tree())
+        return table.to_urdf()
     if work.format_ == "svg":
         from urdfkin.dh.drawing import drawing  # noqa: PLC0415  needs an extra
 

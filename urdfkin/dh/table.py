@@ -31,6 +31,7 @@ from urdfkin.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, fro
 
 if TYPE_CHECKING:
     from urdfkin.recursion.plan import Plan
+    from urdfkin.robot import Robot
 
 
 class Convention(StrEnum):
@@ -318,6 +319,24 @@ class DHTable:
         from urdfkin.dh.to_tree import to_tree  # noqa: PLC0415
 
         return to_tree(self)
+
+    # The way back to a robot ends above this package: the two imports wait until they are called.
+
+    def to_urdf(self) -> str:
+        """A URDF of the table's robot, without shapes and masses; see `to_tree` for names and limits."""
+        from urdfkin.urdf.writer import to_urdf  # noqa: PLC0415
+
+        return to_urdf(self.to_tree())
+
+    def to_robot(self, *, verify: bool = True) -> Robot:
+        """The table's robot, its base frame the root, its tip the leaf.
+
+        Args:
+            verify: Whether every result is held against Pinocchio's.
+        """
+        from urdfkin.from_table import robot_from_table  # noqa: PLC0415
+
+        return robot_from_table(self, verify=verify)
 
 
 def _rigid(T: ArrayLike, where: str) -> FloatArray:

@@ -8,10 +8,16 @@ and what a URDF is written from.
 
 from __future__ import annotations
 
+import math
+from typing import TypeGuard
+
 import numpy as np
 
 from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
+
+#: A sliding joint that no file bounds: a kilometre either way, m and m/s and N.
+UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 
 def to_tree(table: DHTable) -> KinematicTree:
@@ -19,7 +25,7 @@ def to_tree(table: DHTable) -> KinematicTree:
 
     Joint names, senses, limits and followers are the rows'. A leader that is not on the path gets a joint of
     its own on a link beside the base, so that the coordinates stay the table's. A revolute joint without
-    limits becomes continuous.
+    limits becomes continuous; a sliding one gets a kilometre either way, since a URDF must say something.
 
     Args:
         table: Any table.
@@ -27,14 +33,15 @@ def to_tree(table: DHTable) -> KinematicTree:
     joints, here = list[tuple[Joint, str, str]](), _link_names(table)
     for i, (row, T) in enumerate(zip(table.rows, frame_poses(table)[:-1], strict=True)):
         axis = np.array([0.0, 0.0, float(row.sense)])
-        joint = Joint(row.joint, _kind(row), 0, T, axis, row.limit, row.mimic)
+        joint = Joint(row.joint, _kind(row), 0, T, axis, _limit(row), row.mimic)
         joints.append((joint, here[i], here[i + 1]))
     joints.append((_fixed(f"{table.tip_frame}_fixed", frame_poses(table)[-1], table), here[-2], here[-1]))
     names = {row.joint for row in table.rows}
     for leader in table.joint_names:
         if leader not in names:
-            kind = next(_kind(row) for row in table.rows if row.mimic and row.mimic.leader == leader)
-            joint = Joint(leader, kind, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), _leader_limit(table, leader))
+            turns = next(row.kind.turns for row in table.rows if row.mimic and row.mimic.leader == leader)
+            kind, limit = (JointKind.CONTINUOUS, None) if turns else (JointKind.PRISMATIC, UNBOUNDED_SLIDE)
+            joint = Joint(leader, kind, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), limit)
             joints.append((joint, here[0], _new(f"{leader}_link", here)))
     return build_tree(table.robot, here[0], joints)
 
@@ -84,19 +91,21 @@ def _fixed(name: str, T: FloatArray, table: DHTable) -> Joint:
     return Joint(_new(name, taken), JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0]))
 
 
+def _is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
+    return limit is not None and math.isfinite(limit.lower) and math.isfinite(limit.upper)
+
+
 def _kind(row: DHRow) -> JointKind:
-    return JointKind.CONTINUOUS if row.kind.turns and row.limit is None else row.kind
+    if not row.kind.turns:
+        return JointKind.PRISMATIC
+    return (
+        JointKind.REVOLUTE
+        if _is_bounded(row.limit) and row.kind is JointKind.REVOLUTE
+        else JointKind.CONTINUOUS
+    )
 
 
-def _leader_limit(table: DHTable, leader: str) -> Limit | None:
-    """What the followers' limits allow the leader; None where one has no limit."""
-    lower, upper = -np.inf, np.inf
-    for row in table.rows:
-        if row.mimic and row.mimic.leader == leader:
-            if row.limit is None or row.mimic.multiplier == 0.0:
-                return None
-            ends = [
-                (end - row.mimic.offset) / row.mimic.multiplier for end in (row.limit.lower, row.limit.upper)
-            ]
-            lower, upper = max(lower, min(ends)), min(upper, max(ends))
-    return Limit(lower, upper, np.inf, np.inf)
+def _limit(row: DHRow) -> Limit | None:
+    if _is_bounded(row.limit) or row.kind is JointKind.CONTINUOUS:
+        return row.limit
+    return None if row.kind.turns else UNBOUNDED_SLIDE
