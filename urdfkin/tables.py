@@ -10,6 +10,7 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from urdfkin.chain import FrameChain, chain
 from urdfkin.dh.elements import EPS
@@ -17,6 +18,7 @@ from urdfkin.dh.make import dh_table
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
 from urdfkin.oracle import version
+from urdfkin.tree import FloatArray
 from urdfkin.verification.sampling import draw
 from urdfkin.verification.tables import TableCheck, TableError, check_table
 
@@ -44,6 +46,14 @@ class Tables:
         robot = cast("Robot", self)
         return chain(robot.tree, tip or robot.tip_frame, base or robot.base_frame)
 
+    def select(self, path: FrameChain | DHTable, q: ArrayLike) -> FloatArray:
+        """(..., coordinates) of a path or table out of the robot's `q` (..., nq).
+
+        Raises:
+            InputError: `q` has another length than the robot's.
+        """
+        return path.coupling.select(cast("Robot", self).tree, q)
+
     def dh(
         self,
         tip: str | None = None,
@@ -59,8 +69,8 @@ class Tables:
     ) -> DHTable:
         """The Denavit-Hartenberg table of the path between two frames, checked against Pinocchio.
 
-        Its methods take the path's own coordinates, `table.joint_names`; `table.coupling.select(tree, q)`
-        picks them out of the robot's. The other arguments are those of `urdfkin.dh.dh_table`.
+        Its methods take the path's own coordinates, `table.joint_names`; `robot.select(table, q)` picks them
+        out of the robot's. The other arguments are those of `urdfkin.dh.dh_table`.
 
         Args:
             tip: A link's or joint's name; the robot's tip when None.

@@ -69,7 +69,7 @@ def test_a_catalogue_robot_survives_the_way_to_a_table_and_back(
     table = robot.dh(tip, base, convention)
     again = table.to_robot()
     q = robot.sample(6)
-    own = table.coupling.select(robot.tree, q)
+    own = robot.select(table, q)
     order = [table.joint_names.index(joint) for joint in again.coordinate_names]
     T_base, T_tip = robot.placement(q, base), robot.placement(q, tip)
     found = again.placement(own[:, order], again.tip_frame)
