@@ -13,7 +13,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from urdfkin.chain import FrameChain
     from urdfkin.checking import check
+    from urdfkin.dh import DHRow, DHTable, read_table, table_from_rows
     from urdfkin.diagnostics import Finding, UrdfError, UrdfWarning
     from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
     from urdfkin.loading import load
@@ -22,17 +24,22 @@ if TYPE_CHECKING:
     from urdfkin.robot import NotVerifiedWarning, Robot
     from urdfkin.validation.campaign import validate
     from urdfkin.verification.certificate import Certificate, VerificationError
+    from urdfkin.verification.tables import TableError
 
 # Loaded when first asked for: `import urdfkin` needs no numpy, no Pinocchio and no compiler.
 _HOMES = {
     "BaseMotion": "urdfkin.recursion.base",
     "Certificate": "urdfkin.verification.certificate",
+    "DHRow": "urdfkin.dh",
+    "DHTable": "urdfkin.dh",
     "Finding": "urdfkin.diagnostics",
+    "FrameChain": "urdfkin.chain",
     "InputError": "urdfkin.errors",
     "NotVerifiedWarning": "urdfkin.robot",
     "Reference": "urdfkin.reference",
     "Robot": "urdfkin.robot",
     "SourceError": "urdfkin.errors",
+    "TableError": "urdfkin.verification.tables",
     "UnknownNameError": "urdfkin.errors",
     "UrdfError": "urdfkin.diagnostics",
     "UrdfWarning": "urdfkin.diagnostics",
@@ -40,18 +47,24 @@ _HOMES = {
     "VerificationError": "urdfkin.verification.certificate",
     "check": "urdfkin.checking",
     "load": "urdfkin.loading",
+    "read_table": "urdfkin.dh",
+    "table_from_rows": "urdfkin.dh",
     "validate": "urdfkin.validation.campaign",
 }
 
 __all__ = [
     "BaseMotion",
     "Certificate",
+    "DHRow",
+    "DHTable",
     "Finding",
+    "FrameChain",
     "InputError",
     "NotVerifiedWarning",
     "Reference",
     "Robot",
     "SourceError",
+    "TableError",
     "UnknownNameError",
     "UrdfError",
     "UrdfWarning",
@@ -59,6 +72,8 @@ __all__ = [
     "VerificationError",
     "check",
     "load",
+    "read_table",
+    "table_from_rows",
     "validate",
 ]
 

@@ -23,6 +23,7 @@ from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import Plan, make_plan
 from urdfkin.reference import Reference
 from urdfkin.rotation.arrays import floats, scalars
+from urdfkin.tables import Tables
 from urdfkin.tree import FloatArray, KinematicTree
 from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Quantity
@@ -36,7 +37,7 @@ class NotVerifiedWarning(UserWarning):
     """Results are handed out that Pinocchio could not check; the message says why."""
 
 
-class Robot(Manipulator):
+class Robot(Manipulator, Tables):
     """A robot that was loaded; make one with `urdfkin.load`.
 
     Configurations `q` are (..., nq), rates `v` and `a` (..., nv), with any leading batch shape; the three
@@ -309,16 +310,20 @@ class Robot(Manipulator):
         if not (self.verify if verify is None else verify):
             self.ledger.unchecked(quantity, n, "verify=False was asked for")
             return False
+        if (reason := self.cannot_verify(base)) is not None:
+            warnings.warn(f"not verified: {reason}", NotVerifiedWarning, stacklevel=3)
+            self.ledger.unchecked(quantity, n, reason)
+            return False
+        return True
+
+    def cannot_verify(self, base: BaseMotion | None = None) -> str | None:
+        """Why Pinocchio cannot check this robot; None if it can."""
         if self.unverifiable is None:
             try:
                 self.oracle(base)
             except OracleError as error:
                 self.unverifiable = str(error)
-        if self.unverifiable is not None:
-            warnings.warn(f"not verified: {self.unverifiable}", NotVerifiedWarning, stacklevel=3)
-            self.ledger.unchecked(quantity, n, self.unverifiable)
-            return False
-        return True
+        return self.unverifiable
 
     def checked(self, value: ArrayLike, what: str) -> FloatArray:
         """`value` as float64 with the right last axis and finite numbers."""

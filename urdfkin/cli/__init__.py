@@ -23,6 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "jacobian": ("urdfkin.cli.jacobian", "velocity Jacobian of a frame"),
     "jacobian-rate": ("urdfkin.cli.jacobian_rate", "rate of a frame's velocity Jacobian"),
     "acceleration": ("urdfkin.cli.acceleration", "classical acceleration of a frame"),
+    "dh": ("urdfkin.cli.dh", "Denavit-Hartenberg tables, checked, compared, in many forms"),
     "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
     "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),
     "explain": ("urdfkin.cli.explain", "what a finding's code means, with a bad and a good example"),

@@ -1,0 +1,95 @@
+"""URDF to table to URDF: Pinocchio sees one robot in both files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.random_chains import configurations, trees
+from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows
+from urdfkin.dh.references import references
+from urdfkin.loading import load
+from urdfkin.tree import FloatArray, KinematicTree
+from urdfkin.urdf.writer import to_urdf
+
+EPS = float(np.finfo(np.float64).eps)
+
+
+def placements(text: str, names: tuple[str, ...], q: FloatArray, tip: str) -> FloatArray:
+    """Poses of a frame by Pinocchio's own reading of a URDF, coordinates given by joint name."""
+    model = pin.buildModelFromXML(text)
+    data = model.createData()
+    poses = []
+    for one in q:
+        full = pin.neutral(model)
+        for name, value in zip(names, one, strict=True):
+            joint = model.joints[model.getJointId(name)]
+            full[joint.idx_q : joint.idx_q + joint.nq] = (
+                [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+            )
+        pin.framesForwardKinematics(model, data, full)
+        poses.append(data.oMf[model.getFrameId(tip, pin.FrameType.BODY)].homogeneous)
+    return np.array(poses)
+
+
+def agree(table: DHTable, first: FloatArray, second: FloatArray, q: FloatArray) -> None:
+    metres, radians = table.tolerance(q)
+    error = np.abs(first - second)
+    assert (error[:, :3, 3].max(axis=-1) <= 4 * metres + 4 * EPS).all()
+    assert (error[:, :3, :3].max(axis=(-1, -2)) <= 4 * radians).all()
+
+
+@given(trees(min_joints=1, mimics=False), st.sampled_from(["standard", "modified"]))
+@settings(max_examples=60, deadline=None)
+def test_urdf_to_table_to_urdf_is_one_robot_to_pinocchio(tree: KinematicTree, convention: str) -> None:
+    table = dh_table(tree, "tip", convention=convention)
+    q = configurations(tree.nq, 4)
+    before = placements(to_urdf(tree), table.joint_names, q, "tip")
+    after = placements(table.to_urdf(), table.joint_names, q, table.to_tree().links[-1])
+    agree(table, before, after, q)
+
+
+@pytest.mark.parametrize(
+    ("name", "base", "tip"),
+    [
+        ("ur5", "base", "tool0"),
+        ("panda", "panda_link0", "panda_hand"),
+        ("tiago", "base_link", "arm_tool_link"),
+        ("talos", "left_sole_link", "imu_link"),
+    ],
+)
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_a_catalogue_robot_survives_the_way_to_a_table_and_back(
+    name: str, base: str, tip: str, convention: str
+) -> None:
+    robot = load(name)
+    table = robot.dh(tip, base, convention)
+    again = table.to_robot()
+    q = robot.sample(6)
+    own = robot.select(table, q)
+    order = [table.joint_names.index(joint) for joint in again.coordinate_names]
+    T_base, T_tip = robot.placement(q, base), robot.placement(q, tip)
+    found = again.placement(own[:, order], again.tip_frame)
+    np.testing.assert_allclose(found, np.linalg.solve(T_base, T_tip), atol=1e-14)
+    assert again.certificate().verified
+    second = again.dh(convention=convention)
+    np.testing.assert_allclose(second.placement(own), found, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", references())
+def test_a_shipped_reference_is_a_robot(name: str) -> None:
+    table = read_table(references()[name])
+    robot = table.to_robot()
+    q = robot.sample(4)
+    np.testing.assert_allclose(robot.placement(q, table.tip_frame), table.placement(q), atol=1e-14)
+    assert robot.certificate().verified
+
+
+def test_a_table_with_a_sliding_joint_and_no_limits_is_a_robot() -> None:
+    table = table_from_rows([[0, "pi/2", 0.3, 0], [0, 0, 0.1, 0, "P"]], "standard")
+    robot = table.to_robot()
+    q = robot.sample(4)
+    np.testing.assert_allclose(robot.placement(q, "tip"), table.placement(q), atol=1e-13)

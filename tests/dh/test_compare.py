@@ -1,0 +1,146 @@
+"""A comparison forgives what cannot matter, and names the cell that does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from tests.dh.arms import arm
+from tests.random_chains import configurations, rotation, shift, trees
+from urdfkin.chain import chain
+from urdfkin.dh import DHTable, dh_table, table_from_rows, units_of
+from urdfkin.dh.compare import compare, comparison_text
+from urdfkin.errors import InputError
+from urdfkin.tree import FloatArray, KinematicTree
+
+EPS = float(np.finfo(np.float64).eps)
+
+
+def elbow(kinds: str = "RRRRRR") -> KinematicTree:
+    """Six joints, a parallel pair, skew and meeting ones: every inner cell can be told from the others."""
+    square = rotation("x", math.pi / 2)
+    steps = [
+        shift(0, 0, 0.3),
+        shift(0.05, 0.02, 0.1) @ square,
+        shift(0.4, 0, 0.1),
+        shift(0.35, 0.01, 0) @ rotation("y", 0.7),
+        shift(0, -0.2, 0.1) @ square,
+        shift(0.02, 0.05, 0) @ rotation("x", -math.pi / 2),
+    ]
+    return arm(*steps[: len(kinds)], kinds=kinds, tip=shift(0.1, 0, 0.08))
+
+
+def disguised(table: DHTable, seed: int) -> DHTable:
+    """The same mechanism with x and z turned round here and there, zeros moved, base and tool dropped.
+
+    Rz(pi) before a step and after it negates a and alpha; reversing z_i-1 by Rx(pi) negates d and theta
+    and moves alpha by pi on both sides.
+    """
+    rng = np.random.default_rng(seed)
+    flip_x, flip_z = rng.integers(0, 2, (2, len(table.rows) + 1)).astype(bool)
+    rows = []
+    for i, row in enumerate(table.rows):
+        alpha = row.alpha + math.pi * (flip_z[i] != flip_z[i + 1])
+        a = row.a
+        if flip_x[i]:
+            a, alpha = -a, -alpha
+        z = -1.0 if flip_z[i] else 1.0
+        turn = math.pi * (flip_x[i] != (flip_x[i - 1] if i else False))
+        theta = z * row.theta + turn + (rng.uniform(-3, 3) if row.kind.turns else 0.0)
+        d = z * row.d + (0.0 if row.kind.turns else rng.uniform(-1, 1))
+        rows.append(replace(row, a=a, alpha=alpha, d=d, theta=theta))
+    return replace(table, rows=tuple(rows), base=np.eye(4), tool=np.eye(4))
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_what_cannot_matter_is_forgiven(seed: int, convention: str) -> None:
+    path = chain(elbow(), "tip")
+    reference = disguised(dh_table(elbow(), "tip"), seed).to_convention(convention)
+    found = compare(path, reference)
+    assert found.exact
+    assert found.differences == ()
+    assert found.residual <= 1e-13
+
+
+@pytest.mark.parametrize("kinds", ["PRRRRR", "RRPRRR", "RRRRRP", "RPRPRR"])
+def test_sliding_joints_are_fitted_as_well(kinds: str) -> None:
+    tree = elbow(kinds)
+    found = compare(chain(tree, "tip"), disguised(dh_table(tree, "tip"), 3))
+    assert found.exact
+    assert found.differences == ()
+
+
+@given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
+@settings(max_examples=40, deadline=None)
+def test_a_table_agrees_with_the_chain_it_came_from(tree: KinematicTree, seed: int) -> None:
+    path = chain(tree, "tip")
+    assume(path.reach > 1e-3)
+    found = compare(path, disguised(dh_table(tree, "tip"), seed))
+    assert found.metres <= 1e-11 * max(found.reference.span, 1.0)
+
+
+CELLS = [(i, cell) for i in range(6) for cell in ("a", "alpha", "d")]
+#: What base and tool take up, and the offsets along the parallel pair, which only their sum shows.
+FREE = {(0, "d"), (5, "a"), (5, "alpha"), (5, "d")}
+
+
+@pytest.mark.parametrize(("row", "cell"), [one for one in CELLS if one not in FREE], ids=str)
+def test_a_wrong_cell_is_named_with_its_size(row: int, cell: str) -> None:
+    table = dh_table(elbow(), "tip")
+    wrong = list(table.rows)
+    wrong[row] = replace(wrong[row], **{cell: getattr(wrong[row], cell) + 2e-3})
+    found = compare(chain(elbow(), "tip"), disguised(replace(table, rows=tuple(wrong)), 1))
+    assert not found.agrees
+    assert found.residual <= 1e-12
+    named = [(one.row, one.cell) for one in found.differences]
+    parallel = {(1, "d"), (2, "d"), (3, "d")} if (row, cell) in {(1, "d"), (2, "d")} else set()
+    assert len(named) == 1
+    assert named[0] == (row, cell) or (parallel and named[0] in parallel)
+    assert abs(found.differences[0].difference) == pytest.approx(2e-3, rel=1e-6)
+
+
+@pytest.mark.parametrize(("row", "cell"), sorted(FREE))
+def test_a_cell_that_base_or_tool_takes_up_cannot_be_wrong(row: int, cell: str) -> None:
+    table = dh_table(elbow(), "tip")
+    other = list(table.rows)
+    other[row] = replace(other[row], **{cell: getattr(other[row], cell) + 0.1})
+    assert compare(chain(elbow(), "tip"), replace(table, rows=tuple(other))).exact
+
+
+def test_the_fitted_table_takes_the_urdfs_own_coordinates() -> None:
+    path = chain(elbow(), "tip")
+    found = compare(path, disguised(dh_table(elbow(), "tip"), 7))
+    q: FloatArray = configurations(6)
+    np.testing.assert_allclose(found.reference.placement(q), path.placement(q), atol=1e-13)
+    assert found.reference.joint_names == path.joint_names
+
+
+def test_another_robot_differs_and_says_so() -> None:
+    other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
+    found = compare(chain(elbow(), "tip"), other)
+    assert not found.agrees
+    assert "DIFFERS" in comparison_text(found, units_of())
+
+
+def test_a_table_of_other_joints_is_refused() -> None:
+    with pytest.raises(InputError, match=r"found RRR in the table, RRRRRR in the URDF; choose base and tip"):
+        compare(chain(elbow(), "tip"), table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 3, "standard"))
+
+
+def test_the_text_names_row_cell_and_millimetres() -> None:
+    table = dh_table(elbow(), "tip")
+    wrong = (*table.rows[:2], replace(table.rows[2], a=table.rows[2].a + 3e-4), *table.rows[3:])
+    text = comparison_text(
+        compare(chain(elbow(), "tip"), replace(table, rows=wrong)), units_of("degrees", "millimetres")
+    )
+    assert "Cells that differ (mm, deg)" in text
+    assert any(
+        line.split()[:3] == ["3", "j3", "a"] and line.split()[-2:] == ["-0.3", "0.3"]
+        for line in text.splitlines()
+    )

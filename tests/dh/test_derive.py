@@ -1,0 +1,342 @@
+"""A table is the chain it was made from, in every geometry, and looks as a person would write it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from tests.dh.arms import arm
+from tests.oracle import TreeOracle
+from tests.random_chains import configurations, rotation, shift, trees
+from urdfkin.chain import FrameChain, chain
+from urdfkin.dh.make import dh_table
+from urdfkin.dh.table import Convention, DHTable
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.tree import FloatArray, KinematicTree
+
+EPS = float(np.finfo(np.float64).eps)
+CONVENTIONS = ("standard", "modified")
+LENGTH_BOUND = 10.0
+
+
+def reach_of(path: FrameChain) -> float:
+    return float(path.lengths.sum())
+
+
+def residual(table: DHTable, path: FrameChain, q: FloatArray) -> tuple[float, float]:
+    """Metres and radians over what the table tolerates, at the worst of the configurations."""
+    metres, radians = table.tolerance(q)
+    error = table.placement(q) - path.placement(q)
+    lengths = np.linalg.norm(error[..., :3, 3], axis=-1)
+    # The chain's own product rounds as well, by as much as the table's.
+    scale = np.maximum(2.0 * metres + 8 * EPS * reach_of(path), 1e-300)
+    return float((lengths / scale).max()), float(
+        (np.abs(error[..., :3, :3]).max(axis=(-1, -2)) / (2 * radians)).max()
+    )
+
+
+@given(
+    trees(),
+    st.sampled_from(CONVENTIONS),
+    st.sampled_from(["tip", "flange"]),
+    st.sampled_from(["last", "first", "each"]),
+)
+@settings(max_examples=400, deadline=None)
+def test_the_table_places_the_tip_where_the_chain_does(
+    tree: KinematicTree, convention: str, last: str, offset: str
+) -> None:
+    path = chain(tree, "tip")
+    table = dh_table(tree, "tip", convention=convention, last=last, parallel_offset=offset)
+    metres, radians = residual(table, path, configurations(len(path.joint_names)))
+    assert metres <= 1.0
+    assert radians <= 1.0
+
+
+@given(trees(), st.sampled_from(CONVENTIONS))
+@settings(max_examples=100, deadline=None)
+def test_the_table_of_a_reversed_path_is_as_exact(tree: KinematicTree, convention: str) -> None:
+    path = chain(tree, "l0", "tip")
+    table = dh_table(tree, "l0", "tip", convention)
+    assert max(residual(table, path, configurations(len(path.joint_names)))) <= 1.0
+
+
+@given(trees(), st.sampled_from(CONVENTIONS))
+@settings(max_examples=60, deadline=None)
+def test_the_table_agrees_with_pinocchio(tree: KinematicTree, convention: str) -> None:
+    table = dh_table(tree, "tip", convention=convention)
+    q = configurations(tree.nq, 4)
+    own = table.coupling.select(tree, q)
+    metres, radians = table.tolerance(own)
+    error = np.abs(table.placement(own) - TreeOracle(tree).placement(q, "tip", "l0"))
+    path = chain(tree, "tip")
+    assert (
+        error[:, :3, 3].max(axis=-1) <= 2 * metres + 10 * len(tree.joints) * EPS * (reach_of(path) + 1)
+    ).all()
+    assert (error[:, :3, :3].max(axis=(-1, -2)) <= 2 * radians).all()
+
+
+@given(trees(), st.sampled_from(CONVENTIONS), st.booleans())
+@settings(max_examples=400, deadline=None)
+def test_no_row_is_longer_than_ten_times_the_reach(
+    tree: KinematicTree, convention: str, backwards: bool
+) -> None:
+    ends = ("l0", "tip") if backwards else ("tip", "l0")
+    table = dh_table(tree, *ends, convention)
+    bound = LENGTH_BOUND * reach_of(chain(tree, *ends))
+    assert max((max(abs(row.a), abs(row.d)) for row in table.rows), default=0.0) <= bound
+
+
+@given(trees(min_joints=1))
+@settings(max_examples=30, deadline=None)
+def test_the_same_chain_gives_the_same_table_to_the_bit(tree: KinematicTree) -> None:
+    first, second = dh_table(tree, "tip"), dh_table(replace(tree), "tip")
+    assert first.rows == second.rows
+    assert first.base.tobytes() == second.base.tobytes()
+    assert first.tool.tobytes() == second.tool.tobytes()
+
+
+def exact_placement(table: DHTable, values: list[float]) -> mpmath.matrix:
+    """The product of the table's own numbers in 60 digits."""
+    T = mpmath.matrix(table.base.tolist())
+    for row, value in zip(table.rows, values, strict=True):
+        moved = row.sense * mpmath.mpf(value)
+        theta = mpmath.mpf(row.theta) + (moved if row.kind.turns else 0)
+        d = mpmath.mpf(row.d) + (0 if row.kind.turns else moved)
+        S = mp_turn(2, theta) * mp_shift(2, d)
+        X = (
+            mp_shift(0, mpmath.mpf(row.a))
+            * mp_turn(0, mpmath.mpf(row.alpha))
+            * mp_turn(1, mpmath.mpf(row.beta))
+        )
+        T = T * (S * X if table.convention is Convention.STANDARD else X * S)
+    return T * mpmath.matrix(table.tool.tolist())
+
+
+def exact_chain(path: FrameChain, values: list[float]) -> mpmath.matrix:
+    T = mpmath.eye(4)
+    for joint, value in zip(path.joints, values, strict=True):
+        move = mp_turn if joint.kind.turns else mp_shift
+        T = T * mpmath.matrix(joint.T_previous_joint.tolist()) * move(2, mpmath.mpf(value))
+    return T * mpmath.matrix(path.T_last_tip.tolist())
+
+
+def mp_turn(axis: int, angle: mpmath.mpf) -> mpmath.matrix:
+    T = mpmath.eye(4)
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    T[j, j] = T[k, k] = mpmath.cos(angle)
+    T[k, j], T[j, k] = mpmath.sin(angle), -mpmath.sin(angle)
+    return T
+
+
+def mp_shift(axis: int, length: mpmath.mpf) -> mpmath.matrix:
+    T = mpmath.eye(4)
+    T[axis, 3] = length
+    return T
+
+
+@given(trees(min_joints=1, max_joints=5), st.sampled_from(CONVENTIONS))
+@settings(max_examples=60, deadline=None)
+def test_in_sixty_digits_the_cells_are_right_to_a_few_units_in_the_last_place(
+    tree: KinematicTree, convention: str
+) -> None:
+    path, table = chain(tree, "tip"), dh_table(tree, "tip", convention=convention)
+    with mpmath.workdps(60):
+        for q in configurations(len(path.joint_names), 3):
+            values = path.coupling.values(q).tolist()
+            error = exact_placement(table, values) - exact_chain(path, values)
+            travel = sum(abs(v) for v, row in zip(values, table.rows, strict=True) if not row.kind.turns)
+            scale = EPS * 16 * (1 + len(table.rows))
+            assert max(abs(error[i, j]) for i in range(3) for j in range(3)) <= scale
+            assert max(abs(error[i, 3]) for i in range(3)) <= scale * (reach_of(path) + travel)
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+@pytest.mark.parametrize("power", range(1, 17))
+def test_a_pair_of_any_tilt_is_exact_and_short(power: int, convention: str) -> None:
+    tilted = shift(0.4, 0.1, 0.05) @ rotation("x", 10.0**-power) @ rotation("y", 3.0 * 10.0**-power)
+    tree = arm(rotation("x", 0.4) @ shift(0, 0, 0.3), tilted, tilted, rotation("x", 1.0), kinds="RRRR")
+    path, table = chain(tree, "tip"), dh_table(tree, "tip", convention=convention)
+    assert max(residual(table, path, configurations(4))) <= 1.0
+    assert max(max(abs(row.a), abs(row.d)) for row in table.rows) <= LENGTH_BOUND * reach_of(path)
+
+
+@given(st.floats(-3, 3), st.floats(-3, 3), st.integers(3, 15), st.floats(-0.5, 0.5), st.floats(0.05, 0.5))
+@settings(max_examples=100, deadline=None)
+def test_a_tiny_tilt_changes_the_lengths_of_a_parallel_pair_by_as_little(
+    direction: float, turn: float, power: int, offset: float, a: float
+) -> None:
+    def table(tilt: float) -> DHTable:
+        tip = rotation("z", direction) @ rotation("x", tilt) @ rotation("z", turn)
+        return dh_table(
+            arm(np.eye(4), shift(a, 0.0, offset) @ tip, rotation("x", 1.0) @ shift(0, 0, 0.2)), "tip"
+        )
+
+    level, tilted = table(0.0), table(10.0**-power)
+    for before, after in zip(level.rows, tilted.rows, strict=True):
+        for name in ("a", "d", "alpha", "beta"):
+            assert abs(getattr(before, name) - getattr(after, name)) <= 4 * 10.0**-power + 1e-14
+
+
+def test_strict_rows_have_four_parameters_and_are_as_exact_as_their_length_allows() -> None:
+    tilted = shift(0.4, 0.1, 0.0) @ rotation("x", 1e-6)
+    tree = arm(np.eye(4), tilted, rotation("x", 1.0))
+    hayati, strict = dh_table(tree, "tip"), dh_table(tree, "tip", near_parallel="strict")
+    assert hayati.has_hayati_rows
+    assert not strict.has_hayati_rows
+    assert max(abs(row.d) for row in strict.rows) > 1e4
+    assert max(residual(strict, chain(tree, "tip"), configurations(3))) <= 1.0
+
+
+def test_a_strict_table_uses_the_freedom_of_a_sliding_axis_to_stay_short() -> None:
+    tilted = shift(0.4, 0.1, 0.0) @ rotation("x", 1e-6)
+    for kinds in ("RPR", "PRR", "RRP"):
+        steps = (
+            (np.eye(4), tilted, rotation("x", 1.0))
+            if kinds != "RRP"
+            else (rotation("x", 1.0), np.eye(4), tilted)
+        )
+        tree = arm(*steps, kinds=kinds, tip=shift(0.1, 0.2, 0.3))
+        table = dh_table(tree, "tip", near_parallel="strict")
+        assert max(residual(table, chain(tree, "tip"), configurations(3))) <= 1.0
+        assert max(abs(row.d) for row in table.rows) < 1.0
+        assert not table.has_hayati_rows
+
+
+# -- canonical choices ---------------------------------------------------------------------------------
+
+
+def cells(table: DHTable) -> list[tuple[float, ...]]:
+    return [tuple(round(cell, 12) + 0.0 for cell in row.cells[:4]) for row in table.rows]
+
+
+def test_the_base_is_the_identity_and_d1_stays_in_the_table() -> None:
+    tree = arm(shift(0, 0, 0.3), rotation("x", math.pi / 2), tip=shift(0.2, 0, 0))
+    for convention in CONVENTIONS:
+        table = dh_table(tree, "tip", convention=convention)
+        np.testing.assert_array_equal(table.base, np.eye(4))
+        assert table.rows[0].d == 0.3
+
+
+def test_parallel_axes_pass_their_offset_on_to_the_row_after_the_run() -> None:
+    link = shift(0.4, 0, 0.1)
+    tree = arm(np.eye(4), link, link, rotation("x", math.pi / 2))
+    by_rule = {
+        rule: [d for _, _, d, _ in cells(dh_table(tree, "tip", parallel_offset=rule))]
+        for rule in ("last", "first", "each")
+    }
+    assert by_rule == {"last": [0, 0, 0.2, 0], "first": [0.2, 0, 0, 0], "each": [0.1, 0.1, 0, 0]}
+
+
+def test_an_offset_changes_sign_when_it_passes_an_antiparallel_axis() -> None:
+    down = shift(0.4, 0, 0.1) @ rotation("x", math.pi)
+    tree = arm(np.eye(4), down, shift(0.3, 0, 0.05), rotation("x", math.pi / 2))
+    rows = cells(dh_table(tree, "tip"))
+    assert rows[0] == (0.4, round(math.pi, 12), 0.0, 0.0)
+    assert [row[2] for row in rows] == [0, 0, -0.05, 0]
+    assert [row[2] for row in cells(dh_table(tree, "tip", parallel_offset="first"))] == [0.05, 0, 0, 0]
+
+
+def test_collinear_axes_copy_x() -> None:
+    tree = arm(np.eye(4), shift(0, 0, 0.2) @ rotation("z", 0.7), rotation("x", 1.0))
+    assert cells(dh_table(tree, "tip"))[0] == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_x_is_turned_round_where_theta_would_exceed_a_right_angle() -> None:
+    back = arm(np.eye(4), shift(-0.4, 0, 0), rotation("x", 1.0))
+    assert cells(dh_table(back, "tip"))[0] == (-0.4, 0.0, 0.0, 0.0)
+    aside = arm(np.eye(4), shift(0, -0.4, 0), rotation("x", 1.0))
+    assert cells(dh_table(aside, "tip"))[0] == (0.4, 0.0, 0.0, round(-math.pi / 2, 12))
+
+
+def test_a_rounded_right_angle_keeps_a_positive() -> None:
+    for angle in (1.5707, 1.5708, -1.5708, 1.571):
+        tree = arm(np.eye(4), rotation("z", angle) @ shift(0.4, 0, 0), rotation("x", 1.0))
+        assert dh_table(tree, "tip").rows[0].a == pytest.approx(0.4)
+
+
+def test_the_tool_is_the_identity_when_the_last_row_can_reach_the_tip() -> None:
+    turned = shift(0.1, 0, 0.2) @ rotation("x", 0.3)
+    table = dh_table(arm(rotation("x", 1.0), np.eye(4), tip=turned), "tip")
+    np.testing.assert_array_equal(table.tool, np.eye(4))
+    assert cells(table)[-1] == (0.1, 0.3, 0.2, 0.0)
+    flange = dh_table(arm(rotation("x", 1.0), np.eye(4), tip=turned), "tip", last="flange")
+    np.testing.assert_allclose(flange.tool, turned, atol=4 * EPS)
+    assert cells(flange)[-1] == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_otherwise_d_reaches_the_foot_of_the_tip_and_the_tool_holds_the_rest() -> None:
+    table = dh_table(arm(rotation("x", 1.0), np.eye(4), tip=shift(0.1, 0.2, 0.3)), "tip")
+    assert cells(table)[-1] == (0.0, 0.0, 0.3, 0.0)
+    np.testing.assert_allclose(table.tool, shift(0.1, 0.2, 0.0), atol=4 * EPS)
+
+
+def test_the_first_sliding_axis_goes_through_the_origin_of_the_base() -> None:
+    tree = arm(shift(0.5, 0.2, 0.3), shift(0.1, 0, 0), rotation("x", math.pi / 2), kinds="PRR")
+    table = dh_table(tree, "tip")
+    np.testing.assert_array_equal(table.base, np.eye(4))
+    assert table.rows[0].a == pytest.approx(math.hypot(0.6, 0.2))
+
+
+def test_the_last_sliding_axis_goes_through_the_tip_where_that_frees_the_tool() -> None:
+    tree = arm(rotation("x", 1.0), rotation("x", 1.0) @ shift(0.1, 0, 0), kinds="RP", tip=shift(0, 0.2, 0.3))
+    np.testing.assert_array_equal(dh_table(tree, "tip").tool, np.eye(4))
+    assert max(residual(dh_table(tree, "tip"), chain(tree, "tip"), configurations(2))) <= 1.0
+
+
+def test_a_flipped_joint_has_sense_minus_one_and_the_same_coordinate() -> None:
+    tree = arm(np.eye(4), rotation("x", 1.0) @ shift(0.3, 0, 0), tip=shift(0.2, 0, 0))
+    table = dh_table(tree, "tip", flip=["j2"])
+    assert [row.sense for row in table.rows] == [1, -1]
+    assert max(residual(table, chain(tree, "tip"), configurations(2))) <= 1.0
+
+
+def test_a_path_without_joints_is_a_table_without_rows() -> None:
+    for convention in CONVENTIONS:
+        table = dh_table(arm(tip=shift(1, 2, 3)), "tip", convention=convention)
+        assert table.rows == ()
+        np.testing.assert_array_equal(table.placement([]), shift(1, 2, 3))
+
+
+@example(kinds="PPP")
+@given(st.text("RP", min_size=1, max_size=5))
+@settings(max_examples=40, deadline=None)
+def test_sliding_joints_may_stand_anywhere(kinds: str) -> None:
+    steps = [
+        shift(0.1 * i, 0.2, 0.05) @ rotation("xyz"[i % 3], math.pi / 2 * (i % 2)) for i in range(len(kinds))
+    ]
+    tree = arm(*steps, kinds=kinds, tip=shift(0.1, 0.2, 0.3))
+    for convention in CONVENTIONS:
+        for strict in ("hayati", "strict"):
+            table = dh_table(tree, "tip", convention=convention, near_parallel=strict)
+            assert max(residual(table, chain(tree, "tip"), configurations(len(kinds)))) <= 1.0
+
+
+# -- bad input -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ({"convention": "craig"}, r"unknown convention: found 'craig'; say 'standard' or 'modified'"),
+        ({"near_parallel": "drop"}, r"near_parallel: found 'drop'; say 'hayati' or 'strict'"),
+        ({"last": "hand"}, r"last: found 'hand'; say 'tip' or 'flange'"),
+        ({"parallel_offset": "none"}, r"say 'last' or 'first' or 'each'"),
+        ({"snap": -1.0}, r"snap is an angle"),
+        ({"snap": math.nan}, r"snap is an angle"),
+        ({"snap": 1.0}, r"snap is an angle"),
+    ],
+)
+def test_an_unknown_choice_says_what_there_is(option: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        dh_table(arm(np.eye(4)), "tip", **option)  # type: ignore[arg-type]
+
+
+def test_a_flip_of_a_joint_that_is_not_on_the_path_offers_those_that_are() -> None:
+    with pytest.raises(UnknownNameError, match=r"unknown joint 'j3'.*did you mean j[12]"):
+        dh_table(arm(np.eye(4), np.eye(4)), "tip", flip=["j3"])

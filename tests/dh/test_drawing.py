@@ -1,0 +1,41 @@
+"""The drawing shows every frame and every joint, and the same table gives the same file."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from tests.dh.arms import arm
+from tests.random_chains import rotation, shift
+from urdfkin.dh import dh_table
+from urdfkin.dh.drawing import drawing
+from urdfkin.errors import InputError
+
+pytest.importorskip("matplotlib")
+LINK = shift(0.3, 0.1, 0.2) @ rotation("x", 1.0)
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_it_is_an_svg_with_every_frame_and_joint(convention: str) -> None:
+    text = drawing(dh_table(arm(LINK, LINK, LINK, kinds="RPR", tip=LINK), "tip", convention=convention))
+    root = ET.fromstring(text)
+    assert root.tag.endswith("svg")
+    written = "".join("".join(node.itertext()) for node in root.iter() if node.tag.endswith("text"))
+    for name in ("j1", "j2", "j3", "tip", f"{convention} Denavit-Hartenberg frames"):
+        assert name in written
+    assert written.count("x") >= 4
+    assert written.count("z") >= 4
+
+
+def test_the_same_table_gives_the_same_file() -> None:
+    table = dh_table(arm(LINK, LINK), "tip")
+    assert drawing(table) == drawing(table)
+    assert drawing(table) != drawing(table, [0.5, 0.5])
+
+
+def test_a_chain_without_motion_can_be_drawn_and_a_batch_cannot() -> None:
+    assert "<svg" in drawing(dh_table(arm(tip=LINK), "tip"))
+    with pytest.raises(InputError, match="shows one configuration"):
+        drawing(dh_table(arm(LINK), "tip"), np.zeros((2, 1)))

@@ -1,0 +1,50 @@
+"""A table's Jacobian and acceleration are Pinocchio's, and the derivatives of its own placement."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.dh.arms import arm
+from tests.oracle import TreeOracle
+from tests.random_chains import configurations, rotation, shift, trees
+from urdfkin.chain import chain
+from urdfkin.dh.make import dh_table
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.tree import KinematicTree
+
+EPS = float(np.finfo(np.float64).eps)
+
+
+@given(trees(min_joints=1), st.sampled_from(["standard", "modified"]))
+@settings(max_examples=60, deadline=None)
+def test_jacobian_and_acceleration_agree_with_pinocchio(tree: KinematicTree, convention: str) -> None:
+    path, table, oracle = chain(tree, "tip"), dh_table(tree, "tip", convention=convention), TreeOracle(tree)
+    columns = list(path.coupling.v_index(tree))
+    q, v, a = (configurations(tree.nq, 3, seed) for seed in (0, 1, 2))
+    q_own, v_own, a_own = (path.coupling.select(tree, array) for array in (q, v, a))
+    rates = np.abs(path.coupling.matrix).sum(initial=1.0) * 3.0
+    reach = table.span + rates + float(np.linalg.norm(table.base[:3, 3]))
+    bound = 20 * EPS * (1 + len(table.rows)) * reach
+    J, vel = table.jacobian(q_own), table.velocity(q_own, v_own)
+    acc = table.acceleration(q_own, v_own, a_own)
+    for i in range(len(q)):
+        expected = oracle.jacobian(q[i], "tip")
+        assert np.abs(J[i] - expected[:, columns]).max(initial=0.0) <= bound * rates
+        assert np.abs(acc[i] - oracle.acceleration(q[i], v[i], a[i], "tip")).max() <= bound * (1 + rates) ** 2
+        np.testing.assert_allclose(vel[i], J[i] @ v_own[i], atol=bound * rates, rtol=0)
+
+
+def test_batches_broadcast_and_lengths_are_checked() -> None:
+    link = shift(0.3, 0.0, 0.1) @ rotation("x", 1.0)
+    table = dh_table(arm(link, link, link), "tip")
+    q = np.zeros((4, 1, 3))
+    assert table.jacobian(q).shape == (4, 1, 6, 3)
+    assert table.acceleration(q, np.ones((5, 3)), np.ones(3)).shape == (4, 5, 6)
+    assert table.velocity({"j1": 0.1}, np.ones(3)).shape == (6,)
+    with pytest.raises(InputError, match="v needs 3 values"):
+        table.velocity(q, np.ones(2))
+    with pytest.raises(UnknownNameError, match="unknown reference"):
+        table.jacobian(q, "sideways")

@@ -1,0 +1,105 @@
+"""`urdfkin dh`: Denavit-Hartenberg tables, checked, compared, in every format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from urdfkin.cli.arguments import load_robot, robot_argument, together, verify_option
+from urdfkin.cli.output import compiling, output_option
+
+#: Forms of a table. They repeat `urdfkin.dh.export.FORMATS`, whose import --help does not need.
+FORMATS = (
+    *("terminal", "markdown", "latex", "csv", "json", "toml"),
+    *("numpy", "matlab", "matlab-rst", "roboticstoolbox", "c", "urdf", "svg"),
+)
+
+EXAMPLE = "urdfkin dh ur5 --base base --tip tool0 --snap 1e-6 --degrees --millimetres"
+
+
+def _choice(name: str, choices: tuple[str, ...], text: str) -> Any:
+    return click.option(name, type=click.Choice(choices), default=choices[0], show_default=True, help=text)
+
+
+path_options = together(
+    click.option("--base", metavar="NAME", help="A link or joint. Default: the robot's base frame."),
+    click.option("--tip", metavar="NAME", help="A link or joint. Default: the robot's tip."),
+    click.option("--all", "all_", is_flag=True, help="A table for each leaf of the robot."),
+    click.option("--tree", is_flag=True, help="Khalil and Kleinfinger's parameters of the whole robot."),
+)
+choice_options = together(
+    _choice("--convention", ("standard", "modified"), "Distal (the text's), or proximal (Craig's)."),
+    _choice("--near-parallel", ("hayati", "strict"), "Nearly parallel axes: a fifth parameter, or four."),
+    click.option(
+        "--snap",
+        type=float,
+        default=0.0,
+        metavar="RAD",
+        help="Make angles within this of a multiple of 15 degrees round.",
+    ),
+    _choice("--last", ("tip", "flange"), "Whether the last row takes the tip where it can."),
+    _choice("--parallel-offset", ("last", "first", "each"), "The row of parallel axes with the offset."),
+    click.option("--flip", multiple=True, metavar="JOINT", help="Count a joint the other way; repeatable."),
+)
+compare_options = together(
+    click.option(
+        "--compare",
+        metavar="TABLE",
+        help="Hold the URDF against a table: a .toml, .json or .csv file, or the name of a shipped one.",
+    ),
+    click.option(
+        "--tolerance",
+        type=float,
+        default=0.2,
+        show_default=True,
+        metavar="MM",
+        help="Millimetres at the tip up to which --compare agrees.",
+    ),
+)
+form_options = together(
+    click.option(
+        "--format", "format_", type=click.Choice(FORMATS), default="terminal", show_default=True, help="Form."
+    ),
+    click.option("--degrees/--radians", default=False, help="Angles in what people read."),
+    click.option("--millimetres/--metres", default=False, help="Lengths in what people read."),
+    click.option("--digits", type=click.IntRange(3, 17), default=10, show_default=True, help="Significant."),
+)
+
+
+@click.command(epilog=f"Example: {EXAMPLE}")
+@robot_argument
+@path_options
+@choice_options
+@compare_options
+@form_options
+@verify_option
+@output_option
+@click.pass_context
+def command(
+    context: click.Context,
+    /,
+    robot: str,
+    mimic: bool | None,
+    root_joint: str | None,
+    verify: bool,
+    output: Path | None,
+    **options: Any,
+) -> None:
+    """Denavit-Hartenberg table of the path between two frames, exact to rounding and checked.
+
+    The path may run down the tree, up, or through the common ancestor. Angles and lengths stay as the file
+    has them unless --snap makes angles round; the table then says by how much the tip moves at most.
+    ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json,
+    .csv), which is made a robot first: to convert it, or to write it as a URDF.
+
+    Exit 0: verified, or the compared table agrees. 1: a disagreement. 2: bad input. 3: not checked.
+    """
+    from urdfkin.cli.dh_work import Work, run, table_robot  # noqa: PLC0415  keeps --help fast
+
+    is_table = Path(robot).suffix in (".toml", ".json", ".csv")
+    loaded = table_robot(robot, verify) if is_table else load_robot(robot, mimic, root_joint, verify=verify)
+    with compiling():
+        code = run(Work(robot=loaded, output=output, **options))
+    context.exit(code)

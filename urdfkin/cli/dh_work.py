@@ -1,0 +1,220 @@
+"""What `urdfkin dh` does, once its options are read."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from urdfkin.cli.output import write_file
+from urdfkin.dh import DHTable, Units, export, read_table, units_of
+from urdfkin.dh.compare import Comparison, compare, comparison_text
+from urdfkin.dh.export.mapping import to_mapping
+from urdfkin.dh.export.tree import as_mapping, write_tree
+from urdfkin.dh.references import reference_path
+from urdfkin.dh.tree_parameters import tree_parameters
+from urdfkin.errors import InputError
+from urdfkin.oracle import version
+from urdfkin.robot import Robot
+from urdfkin.tables import SAMPLES, verified, verified_tree
+from urdfkin.verification.tables import TableCheck
+
+#: Forms that can hold several tables one after the other.
+_SEVERAL = ("terminal", "markdown", "latex", "json")
+#: Forms under which the check's result is written; elsewhere it goes to stderr.
+_READ = ("terminal", "markdown")
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """The command's options."""
+
+    robot: Robot
+    output: Path | None
+    base: str | None
+    tip: str | None
+    all_: bool
+    tree: bool
+    convention: str
+    near_parallel: str
+    snap: float
+    last: str
+    parallel_offset: str
+    flip: tuple[str, ...]
+    compare: str | None
+    tolerance: float
+    format_: str
+    degrees: bool
+    millimetres: bool
+    digits: int
+
+    @property
+    def units(self) -> Units:
+        """As the options say."""
+        return units_of(
+            "degrees" if self.degrees else "radians",
+            "millimetres" if self.millimetres else "metres",
+            self.digits,
+        )
+
+
+def table_robot(path: str, verify: bool) -> Robot:
+    """The robot that a table file describes."""
+    return read_table(path).to_robot(verify=verify)
+
+
+def run(work: Work) -> int:
+    """Do it; the exit code."""
+    chosen = [
+        name for name, on in (("--all", work.all_), ("--tree", work.tree), ("--compare", work.compare)) if on
+    ]
+    if len(chosen) > 1:
+        raise InputError(f"{' and '.join(chosen)} do not go together", remedy="ask for one after the other")
+    if work.compare is not None:
+        return _compare(work, work.compare)
+    if work.tree:
+        return _tree(work)
+    return _tables(work)
+
+
+# -- tables --------------------------------------------------------------------------------------------
+
+
+def _tables(work: Work) -> int:
+    tips = _tips(work)
+    if len(tips) > 1 and work.format_ not in _SEVERAL:
+        raise InputError(f"--all has no form {work.format_!r}", remedy=f"say --format {', '.join(_SEVERAL)}")
+    made = [_table(work, tip) for tip in tips]
+    if work.format_ == "json" and work.all_:
+        text = json.dumps([_document(table, check) for table, check in made], indent=2) + "\n"
+    elif work.format_ == "json":
+        text = json.dumps(_document(*made[0]), indent=2) + "\n"
+    else:
+        text = "\n".join(_written(work, table, check) for table, check in made)
+    _put(work, text)
+    if work.format_ not in (*_READ, "json"):
+        for _, check in made:
+            click.echo(check_line(check), err=True)
+    return 0 if all(check is not None for _, check in made) else 3
+
+
+def _tips(work: Work) -> list[str | None]:
+    tree = work.robot.tree
+    return [tree.links[leaf] for leaf in tree.leaves()] if work.all_ else [work.tip]
+
+
+def _table(work: Work, tip: str | None) -> tuple[DHTable, TableCheck | None]:
+    robot = work.robot
+    base = work.base
+    if base is None and work.all_:
+        base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
+    table = robot.dh(
+        tip,
+        base,
+        work.convention,
+        near_parallel=work.near_parallel,
+        snap=work.snap,
+        last=work.last,
+        parallel_offset=work.parallel_offset,
+        flip=work.flip,
+        verify=False,
+    )
+    return table, verified(robot, table) if robot.verify else None
+
+
+def _written(work: Work, table: DHTable, check: TableCheck | None) -> str:
+    if work.format_ == "urdf":
+        return table.to_urdf()
+    if work.format_ == "svg":
+        from urdfkin.dh.drawing import drawing  # noqa: PLC0415  needs an extra
+
+        return drawing(table)
+    text = export(table, work.format_, work.units)
+    return f"{text}\n{check_line(check)}\n" if work.format_ in _READ else text
+
+
+def _document(table: DHTable, check: TableCheck | None) -> dict[str, Any]:
+    return {**to_mapping(table), "checked": check_line(check)}
+
+
+def check_line(check: TableCheck | None) -> str:
+    """One line on what Pinocchio says."""
+    if check is None:
+        return f"NOT VERIFIED by Pinocchio {version()}"
+    return f"Pinocchio {version()}: {check}"
+
+
+# -- the whole tree ------------------------------------------------------------------------------------
+
+
+def _tree(work: Work) -> int:
+    parameters = tree_parameters(work.robot.tree)
+    if work.format_ == "json":
+        text = json.dumps(as_mapping(parameters), indent=2, allow_nan=False) + "\n"
+    elif work.format_ in ("terminal", "markdown", "csv"):
+        text = write_tree(parameters, work.format_, work.units)
+    else:
+        raise InputError(f"--tree has no form {work.format_!r}", remedy="say terminal, markdown, csv or json")
+    check = verified_tree(work.robot, parameters, SAMPLES) if work.robot.verify else None
+    if work.format_ in _READ:
+        text += f"\n{check or check_line(None)}\n"
+    else:
+        click.echo(str(check or check_line(None)), err=True)
+    _put(work, text)
+    return 0 if check is not None else 3
+
+
+# -- a comparison --------------------------------------------------------------------------------------
+
+
+def _compare(work: Work, name: str) -> int:
+    reference = read_table(reference_path(name))
+    robot = work.robot
+    known = robot.frame_names
+    base = work.base or (reference.base_frame if reference.base_frame in known else None)
+    tip = work.tip or (reference.tip_frame if reference.tip_frame in known else None)
+    chain = robot.chain(tip, base)
+    found = compare(chain, reference, work.tolerance / 1e3)
+    if work.format_ == "json":
+        text = json.dumps(_comparison(found), indent=2, allow_nan=False) + "\n"
+    elif work.format_ == "terminal":
+        text = comparison_text(found, work.units)
+    else:
+        raise InputError(f"--compare has no form {work.format_!r}", remedy="say terminal or json")
+    _put(work, text)
+    return 0 if found.agrees else 1
+
+
+def _comparison(found: Comparison) -> dict[str, Any]:
+    return {
+        "agrees": found.agrees,
+        "exact": found.exact,
+        "tip_off_at_most_m": found.metres,
+        "tip_turned_at_most_rad": found.radians,
+        "residual_m": found.residual,
+        "samples": found.samples,
+        "senses": list(found.senses),
+        "offsets": list(found.offsets),
+        "differences": [
+            {
+                "row": one.row + 1,
+                "joint": one.joint,
+                "cell": one.cell,
+                "table": one.reference,
+                "urdf": one.urdf,
+                "tip_m": one.tip,
+            }
+            for one in found.differences
+        ],
+        "fitted": to_mapping(found.reference),
+    }
+
+
+def _put(work: Work, text: str) -> None:
+    if work.output is None:
+        click.echo(text, nl=False)
+    else:
+        write_file(work.output, text.encode())

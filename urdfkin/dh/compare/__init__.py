@@ -1,0 +1,6 @@
+"""Does a URDF agree with the vendor's table?"""
+
+from urdfkin.dh.compare.compare import TOLERANCE, CellDifference, Comparison, compare
+from urdfkin.dh.compare.text import comparison_text
+
+__all__ = ["TOLERANCE", "CellDifference", "Comparison", "compare", "comparison_text"]

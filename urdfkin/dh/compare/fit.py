@@ -1,0 +1,169 @@
+"""How a reference table must change to be the URDF: the freedoms first, then as few cells as possible.
+
+The tip's error is a twist at each of some sampled configurations, and every number of a table moves the tip
+by a twist: a turn about a line or a shift along one. Gauss-Newton solves for the numbers. Base, tool and
+joint offsets (the freedoms) are eliminated first and take all they can; what is left falls to the cells, and
+where several cells could take it (the offsets along parallel axes, say), a reweighted least-norm solution
+puts it into as few as possible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urdfkin.dh.elements import along_axis, between_axes
+from urdfkin.rotation import exp_rotation, log_rotation
+from urdfkin.tree import FloatArray
+
+#: Cells in the order in which they act: theta, d, a, alpha, beta.
+CELLS = ("theta", "d", "a", "alpha", "beta")
+_ROUNDS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A standard table as numbers to be fitted.
+
+    Attributes:
+        cells: (n, 5) theta, d, a, alpha, beta of each row.
+        turns: (n,) which rows turn.
+        senses: (n,) +1 or -1.
+        base: (4, 4) and
+        tool: (4, 4): the ends.
+    """
+
+    cells: FloatArray
+    turns: FloatArray
+    senses: FloatArray
+    base: FloatArray
+    tool: FloatArray
+
+    def walk(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Tip poses (s, 4, 4), then the lines and kinds of motion of every cell.
+
+        Returns:
+            poses; origins and axes (s, n, 5, 3) on and along which each cell acts.
+        """
+        samples, n = len(values), len(self.cells)
+        origins, axes = np.empty((2, samples, n, 5, 3))
+        T: FloatArray = np.broadcast_to(self.base, (samples, 4, 4))
+        for i, (theta, d, a, alpha, beta) in enumerate(self.cells):
+            moved = self.senses[i] * values[:, i]
+            axes[:, i, :2] = T[:, None, :3, 2]
+            origins[:, i, :2] = T[:, None, :3, 3]
+            T = T @ along_axis(theta + self.turns[i] * moved, d + (1.0 - self.turns[i]) * moved)
+            axes[:, i, 2:4] = T[:, None, :3, 0]
+            T = T @ between_axes(a, alpha)
+            axes[:, i, 4] = T[:, :3, 1]
+            T = T @ between_axes(0.0, 0.0, beta)
+            origins[:, i, 2:] = T[:, None, :3, 3]
+        return T @ self.tool, origins, axes
+
+
+def columns(model: Model, values: FloatArray, scale: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Tip poses and the twists (6 s, parameters) of freedoms and of cells, angles times `scale`.
+
+    Freedoms are the base's six, the tool's six and each row's own variable; cells are (n, 5) in order.
+    """
+    poses, origins, axes = model.walk(values)
+    tip = poses[:, None, None, :3, 3]
+    turning = np.array([True, False, False, True, True])
+    linear = np.where(turning[:, None], np.cross(axes, tip - origins), axes)
+    angular = np.where(turning[:, None], axes, 0.0)
+    # Cells that are angles are counted in metres at the distance `scale`, like the twist's angular part.
+    per_cell = np.where(turning, 1.0 / scale, 1.0)[:, None]
+    cells = np.concatenate([linear * per_cell, scale * angular * per_cell], axis=-1)
+    n = len(model.cells)
+    cells = np.moveaxis(cells.reshape(len(values), 5 * n, 6), 1, 2).reshape(-1, 5 * n)
+    own = [5 * i + (0 if model.turns[i] else 1) for i in range(n)]
+    ends = [_end(poses, np.broadcast_to(model.base, poses.shape), scale), _end(poses, poses, scale)]
+    return poses, np.hstack([*ends, cells[:, own]]), cells
+
+
+def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
+    """(6 s, 6) twists of shifting and turning everything from a frame on."""
+    arm = poses[:, :3, 3] - at[:, :3, 3]
+    out = np.zeros((len(poses), 6, 6))
+    for k in range(3):
+        axis = at[:, :3, k]
+        out[:, :3, k] = axis
+        out[:, :3, 3 + k] = np.cross(axis, arm) / scale
+        out[:, 3:, 3 + k] = axis
+    return out.reshape(-1, 6)
+
+
+def errors(poses: FloatArray, wanted: FloatArray, scale: float) -> FloatArray:
+    """(6 s,) twists that would bring the poses to the wanted ones, angles times `scale`."""
+    turn = log_rotation(wanted[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
+    return np.concatenate([wanted[:, :3, 3] - poses[:, :3, 3], scale * turn], axis=-1).ravel()
+
+
+def fit_freedoms(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> Model:
+    """The base, tool and offsets with which the table, its cells untouched, comes closest."""
+    return _descend(model, values, wanted, scale, with_cells=False)
+
+
+def fit_cells(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> Model:
+    """The smallest and fewest changes of cells with which the table is the URDF."""
+    return _descend(model, values, wanted, scale, with_cells=True)
+
+
+def _descend(model: Model, values: FloatArray, wanted: FloatArray, scale: float, with_cells: bool) -> Model:
+    start, best, best_size = model, model, np.inf
+    for _ in range(_ROUNDS):
+        poses, freedoms, cells = columns(model, values, scale)
+        error = errors(poses, wanted, scale)
+        size = float(np.linalg.norm(error))
+        if size < best_size * (1.0 - 1e-9):
+            best, best_size = model, size
+        elif size > 2.0 * best_size or size <= 1e-14 * scale * len(error):
+            break
+        change = np.zeros(cells.shape[1])
+        if with_cells:
+            change = _sparse(model, start, freedoms, cells, error, scale)
+        # Axes that nearly coincide let two offsets grow against each other for nothing: cut those off.
+        free = np.linalg.lstsq(freedoms, error - cells @ change, rcond=1e-8)[0]
+        shorten = min(1.0, 0.5 * scale / max(float(np.abs(free).max()), 1e-300))
+        model = _moved(model, np.asarray(free * shorten, np.float64), change * shorten, scale)
+    return best
+
+
+def _sparse(
+    model: Model, start: Model, freedoms: FloatArray, cells: FloatArray, error: FloatArray, scale: float
+) -> FloatArray:
+    """Changes of cells that take what the freedoms cannot, the sum with those so far having few entries."""
+    Q, _ = np.linalg.qr(freedoms)
+    cells_left = cells - Q @ (Q.T @ cells)
+    in_metres = np.array([scale, 1.0, 1.0, scale, scale])
+    so_far = ((model.cells - start.cells) * in_metres).ravel()
+    # The freedoms took each row's own variable; a cell that moves nothing else is not asked for anything.
+    target = error - Q @ (Q.T @ error) + cells_left @ so_far
+    total = np.zeros(cells.shape[1])
+    weights = np.linspace(1.0, 1.2, cells.shape[1])  # of two equally good cells, one is to win
+    weights[4::5] = 0.3  # beta only where alpha will not do
+    for _ in range(25):
+        total = weights * np.linalg.lstsq(cells_left * weights, target, rcond=1e-9)[0]
+        weights = np.abs(total) + 1e-9 * scale
+        weights[4::5] *= 0.5
+    return np.asarray(total - so_far, np.float64)
+
+
+def _moved(model: Model, free: FloatArray, change: FloatArray, scale: float) -> Model:
+    """The model after small changes, all counted in metres."""
+    per_cell = np.array([1.0 / scale, 1.0, 1.0, 1.0 / scale, 1.0 / scale])
+    cells = model.cells + change.reshape(-1, 5) * per_cell
+    for i, own in enumerate(free[12:]):
+        k = 0 if model.turns[i] else 1
+        cells[i, k] += own * per_cell[k]
+    base = _pushed(model.base, free[:6], scale)
+    return replace(model, cells=cells, base=base, tool=_pushed(model.tool, free[6:12], scale))
+
+
+def _pushed(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
+    """T followed by a small shift and turn in its own axes."""
+    push = np.eye(4)
+    push[:3, :3] = exp_rotation(twist[3:] / scale)
+    push[:3, 3] = twist[:3]
+    return np.asarray(T @ push)

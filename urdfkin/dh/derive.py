@@ -1,0 +1,308 @@
+"""From a chain of axes to a table: the canonical choices, in one pass from base to tip.
+
+docs/dh.md gives the reasons. In short: frame 0 at the foot of the base's origin on the first axis, x_0 the
+base's x projected; x_i along the common normal; between parallel axes d = 0 and the offset carried into the
+first row after the run; x_i turned round where theta would exceed a right angle; the last row takes the tip
+where four parameters can; a prismatic axis keeps the line that the URDF draws, except at the two ends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TypeVar
+
+import numpy as np
+
+from urdfkin.chain import ChainJoint, FrameChain
+from urdfkin.dh.elements import EPS, as_step, between_axes
+from urdfkin.dh.normals import (
+    NEARLY_PARALLEL,
+    PARALLEL,
+    NearParallel,
+    Step,
+    cleaned_angle,
+    cleaned_length,
+    step_between,
+)
+from urdfkin.dh.table import Convention, DHRow, DHTable, convention_of
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.tree import FloatArray
+
+#: x is turned round when |theta| exceeds a right angle by more than this (rad): 1.5708 and 1.571 do not.
+RIGHT_ANGLE_SLACK = 1e-3
+
+
+class Last(StrEnum):
+    """Where the tip goes: into the last row if that is exact, or into the tool."""
+
+    TIP = "tip"
+    FLANGE = "flange"
+
+
+class ParallelOffset(StrEnum):
+    """Which row of a run of parallel axes gets the offset along them."""
+
+    LAST = "last"
+    FIRST = "first"
+    EACH = "each"
+
+
+@dataclass(frozen=True, slots=True)
+class Choices:
+    """The options of a derivation; `urdfkin.dh.dh_table` explains them."""
+
+    convention: Convention = Convention.STANDARD
+    near_parallel: NearParallel = NearParallel.HAYATI
+    last: Last = Last.TIP
+    parallel_offset: ParallelOffset = ParallelOffset.LAST
+    flip: tuple[str, ...] = ()
+
+
+_Choice = TypeVar("_Choice", bound=StrEnum)
+
+
+def _choice(kind: type[_Choice], name: str, value: str) -> _Choice:
+    try:
+        return kind(value)
+    except ValueError:
+        known = " or ".join(repr(member.value) for member in kind)
+        raise InputError(f"unknown value for {name}", found=repr(value), remedy=f"say {known}") from None
+
+
+def choices_of(
+    chain: FrameChain,
+    *,
+    convention: str,
+    near_parallel: str,
+    last: str,
+    parallel_offset: str,
+    flip: Collection[str],
+) -> Choices:
+    """Options by name; raises InputError or UnknownNameError for what does not exist."""
+    names = [joint.name for joint in chain.joints]
+    for name in flip:
+        if name not in names:
+            raise UnknownNameError("joint", name, names, where=f"path {chain.base} to {chain.tip}")
+    return Choices(
+        convention_of(convention),
+        _choice(NearParallel, "near_parallel", near_parallel),
+        _choice(Last, "last", last),
+        _choice(ParallelOffset, "parallel_offset", parallel_offset),
+        tuple(flip),
+    )
+
+
+def derive(chain: FrameChain, choices: Choices) -> DHTable:
+    """The table of a chain: base . rows . tool equals the chain's placement for every q, to rounding."""
+    constants = _reversed_axes(chain, choices.flip)
+    reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
+    if not chain.joints:
+        return _table(chain, choices, [], [], (constants[0], np.eye(4)))
+    _use_freedom_of_prismatic_axes(chain, constants, choices, reach)
+    base, phi_in, carry = _frame_zero(constants[0], reach)
+    rows, steps = list[tuple[float, float]](), list[Step]()
+    for A in constants[1:-1]:
+        step, theta = _next_step(A, phi_in, carry, reach, choices)
+        rows.append((theta, step.delta))
+        steps.append(step)
+        phi_in, carry = step.phi_next, step.delta_next
+    theta, d, last, tool = _last(_lifted(constants[-1], carry), phi_in, carry, reach, choices)
+    rows.append((theta, d))
+    if choices.parallel_offset is ParallelOffset.FIRST:
+        rows = _offsets_first(rows, steps)
+    return _table(chain, choices, rows, [*steps, last], (base, tool))
+
+
+def _table(
+    chain: FrameChain,
+    choices: Choices,
+    turns: list[tuple[float, float]],
+    steps: list[Step],
+    ends: tuple[FloatArray, FloatArray],
+) -> DHTable:
+    """Bracket the factors S_1 X_1 S_2 X_2 ... S_n X_n as the convention says."""
+    if choices.convention is Convention.MODIFIED and turns:
+        first = as_step(ends[0])
+        a, alpha = first or (0.0, 0.0)
+        ends = (np.eye(4) if first else ends[0], ends[1])
+        steps = [Step(0.0, 0.0, a, alpha, 0.0, 0.0, 0.0), *steps[:-1]]
+    rows = [
+        _row(joint, turn, step, -1 if joint.name in choices.flip else 1)
+        for joint, turn, step in zip(chain.joints, turns, steps, strict=True)
+    ]
+    return DHTable(choices.convention, tuple(rows), *ends, chain.robot, chain.base, chain.tip)
+
+
+def _row(joint: ChainJoint, turn: tuple[float, float], step: Step, sense: int) -> DHRow:
+    theta, d = turn
+    return DHRow(
+        step.a + 0.0,
+        step.alpha + 0.0,
+        d + 0.0,
+        theta + 0.0,
+        joint.kind,
+        joint.name,
+        sense,
+        step.beta + 0.0,
+        joint.mimic,
+        joint.limit,
+    )
+
+
+# -- before the pass -----------------------------------------------------------------------------------
+
+
+def _reversed_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
+    """The chain's constants with the z of some joints turned round, by half a turn about their x."""
+    constants = [np.array(A) for A in chain.constants]
+    half = np.diag([1.0, -1.0, -1.0, 1.0])
+    for i, joint in enumerate(chain.joints):
+        if joint.name in flip:
+            constants[i] = constants[i] @ half
+            constants[i + 1] = half @ constants[i + 1]
+    return constants
+
+
+def _use_freedom_of_prismatic_axes(
+    chain: FrameChain, constants: list[FloatArray], choices: Choices, reach: float
+) -> None:
+    """Shift lines of sliding joints, which have a direction only: Tz(q) commutes with any translation.
+
+    The first joint's goes through the base's origin, so that the base can be the identity; the last one's
+    through the tip where that lets the last row take the tip. In strict tables a line that is nearly
+    parallel to a neighbour's is moved onto that neighbour, so that no foot is far away.
+    """
+    slides = [not joint.kind.turns for joint in chain.joints]
+    n = len(slides)
+    moved = [
+        slides[k] and choices.near_parallel is NearParallel.STRICT and _meets_neighbour(constants, k, n)
+        for k in range(n)
+    ]
+    if slides[0] and not moved[0]:
+        _shift_after(constants, 0, constants[0][:3, :3].T @ constants[0][:3, 3])
+        moved[0] = True
+    if slides[-1] and not moved[-1] and choices.last is Last.TIP:
+        tip = constants[-1]
+        if not _representable(tip, reach, choices) and abs(tip[2, 0]) <= PARALLEL:
+            _shift_before(constants, n - 1, np.array([tip[0, 3], tip[1, 3], 0.0]))
+
+
+def _meets_neighbour(constants: list[FloatArray], k: int, n: int) -> bool:
+    """Move joint k's line through the origin of a nearly parallel neighbour, if it has one."""
+    before, after = constants[k], constants[k + 1]
+    if k > 0 and PARALLEL < math.hypot(before[0, 2], before[1, 2]) < NEARLY_PARALLEL:
+        _shift_after(constants, k, before[:3, :3].T @ before[:3, 3])
+        return True
+    if k < n - 1 and PARALLEL < math.hypot(after[0, 2], after[1, 2]) < NEARLY_PARALLEL:
+        _shift_before(constants, k, after[:3, 3].copy())
+        return True
+    return False
+
+
+def _shift_after(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
+    """Take all of the offset before joint k, given in its frame, and put it after the joint."""
+    constants[k][:3, 3] = 0.0
+    constants[k + 1][:3, 3] += offset
+
+
+def _shift_before(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
+    """Take `offset` (in joint k's frame) from the pose after joint k and put it into the one before."""
+    constants[k][:3, 3] += constants[k][:3, :3] @ offset
+    constants[k + 1][:3, 3] -= offset
+
+
+# -- the pass ------------------------------------------------------------------------------------------
+
+
+def _frame_zero(A: FloatArray, reach: float) -> tuple[FloatArray, float, float]:
+    """T_base_0, then the turn and the offset along z_0 that lead to the first joint's frame."""
+    z, p = A[:3, 2], A[:3, 3]
+    offset = cleaned_length(float(z @ p), reach)
+    base = np.eye(4)
+    base[:3, 3] = [cleaned_length(component, reach) for component in p - offset * z]
+    if math.hypot(z[0], z[1]) <= PARALLEL:  # the base's own z, either way up
+        z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
+    x = np.array([1.0, 0.0, 0.0]) - z[0] * z
+    if np.linalg.norm(x) < NEARLY_PARALLEL:  # the axis runs along the base's x, whose shadow is a point
+        x = np.array([0.0, 1.0, 0.0]) - z[1] * z
+    x /= np.linalg.norm(x)
+    base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    _clean_rotation(base)
+    turn = math.atan2(A[:3, 0] @ base[:3, 1], A[:3, 0] @ base[:3, 0])
+    return base, cleaned_angle(turn), offset
+
+
+def _clean_rotation(T: FloatArray) -> None:
+    """Entries of a rotation that are rounding noise become zero; lengths have their own scale."""
+    R = T[:3, :3]
+    R[np.abs(R) <= 2.0 * EPS] = 0.0
+
+
+def _lifted(A: FloatArray, carry: float) -> FloatArray:
+    """Tz(carry) A: measured from the origin of the DH frame instead of the joint's."""
+    lifted = A.copy()
+    lifted[2, 3] += carry
+    return lifted
+
+
+def _next_step(
+    A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices
+) -> tuple[Step, float]:
+    """The step to the next axis and theta of its row, with x turned so that theta stays small."""
+    each = choices.parallel_offset is not ParallelOffset.LAST
+    step = step_between(_lifted(A, carry), reach, choices.near_parallel, -phi_in, each)
+    theta = cleaned_angle(phi_in + step.phi)
+    if abs(theta) > math.pi / 2.0 + RIGHT_ANGLE_SLACK:
+        step = step.turned()
+        theta = cleaned_angle(phi_in + step.phi)
+    return step, theta
+
+
+def _representable(A: FloatArray, reach: float, choices: Choices) -> bool:
+    """Whether Rz Tz Tx Rx (standard) or Rz Tz (modified) is all of A."""
+    if choices.last is Last.FLANGE:
+        return False
+    x_along_z, lateral = abs(A[2, 0]), abs(A[0, 0] * A[1, 3] - A[1, 0] * A[0, 3])
+    if choices.convention is Convention.MODIFIED:
+        tilt, aside = math.hypot(A[0, 2], A[1, 2]), math.hypot(A[0, 3], A[1, 3])
+        return tilt <= PARALLEL and A[2, 2] > 0.0 and aside <= PARALLEL * reach
+    return bool(x_along_z <= PARALLEL and lateral <= PARALLEL * reach)
+
+
+def _last(
+    A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices
+) -> tuple[float, float, Step, FloatArray]:
+    """theta, d and the step of the last row, and the tool; `A` is measured from O_{n-1}."""
+    if _representable(A, reach, choices):
+        phi = math.atan2(A[1, 0], A[0, 0])
+        a = cleaned_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach)
+        alpha = cleaned_angle(math.atan2(A[2, 1], A[2, 2]))
+        step = Step(phi, 0.0, a, alpha, 0.0, 0.0, 0.0)
+        return cleaned_angle(phi_in + phi), cleaned_length(A[2, 3], reach), step, np.eye(4)
+    d = cleaned_length(carry if choices.last is Last.FLANGE else A[2, 3], reach)
+    tool = A.copy()
+    tool[2, 3] -= d
+    if phi_in:
+        turn = between_axes(0.0, 0.0)
+        turn[:2, :2] = [[math.cos(phi_in), -math.sin(phi_in)], [math.sin(phi_in), math.cos(phi_in)]]
+        tool = turn @ tool
+    _clean_rotation(tool)
+    tool[:3, 3] = [cleaned_length(component, reach) for component in tool[:3, 3]]
+    return 0.0, d, Step(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), tool
+
+
+def _offsets_first(rows: list[tuple[float, float]], steps: list[Step]) -> list[tuple[float, float]]:
+    """Move the offsets of each run of parallel axes into the run's first row.
+
+    An offset slides through Tx(a) Rx(0 or pi) unchanged but for its sign.
+    """
+    moved = list(rows)
+    for i in range(len(steps) - 1, -1, -1):
+        if steps[i].beta == 0.0 and steps[i].alpha in (0.0, math.pi):
+            sign = 1.0 if steps[i].alpha == 0.0 else -1.0
+            moved[i] = (moved[i][0], moved[i][1] + sign * moved[i + 1][1])
+            moved[i + 1] = (moved[i + 1][0], 0.0)
+    return moved

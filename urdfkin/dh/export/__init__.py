@@ -1,0 +1,44 @@
+"""A table in every form that people ask for: to read, to print, to keep, to run. One file a form."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, cast
+
+from urdfkin.dh.units import Units
+from urdfkin.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    from urdfkin.dh.table import DHTable
+
+#: Format name -> (module that holds `write`, one-line summary).
+FORMATS: dict[str, tuple[str, str]] = {
+    "terminal": ("urdfkin.dh.export.terminal", "aligned text"),
+    "markdown": ("urdfkin.dh.export.markdown", "a Markdown table"),
+    "latex": ("urdfkin.dh.export.latex", "a LaTeX table (booktabs)"),
+    "csv": ("urdfkin.dh.export.csv", "comma-separated, read back by urdfkin"),
+    "json": ("urdfkin.dh.export.json", "JSON, read back by urdfkin"),
+    "toml": ("urdfkin.dh.export.toml", "TOML, read back by urdfkin"),
+    "numpy": ("urdfkin.dh.export.numpy", "Python code on NumPy"),
+    "matlab": ("urdfkin.dh.export.matlab", "MATLAB code, plain matrices"),
+    "matlab-rst": ("urdfkin.dh.export.matlab_rst", "MATLAB code for the Robotics System Toolbox"),
+    "roboticstoolbox": ("urdfkin.dh.export.roboticstoolbox", "Python code for roboticstoolbox's DHRobot"),
+    "c": ("urdfkin.dh.export.c", "C99 code"),
+}
+
+
+def export(table: DHTable, format: str, units: Units | None = None) -> str:
+    """The table as text.
+
+    Args:
+        table: Any table.
+        format: A name in `FORMATS`.
+        units: For the forms that are read by people; files and code are in metres and radians.
+
+    Raises:
+        UnknownNameError: no such format.
+        InputError: the form cannot hold this table (a Hayati row in roboticstoolbox's `DHRobot`).
+    """
+    if format not in FORMATS:
+        raise UnknownNameError("format", format, FORMATS)
+    return cast("str", importlib.import_module(FORMATS[format][0]).write(table, units or Units()))

@@ -1,0 +1,93 @@
+"""The table for a paper: booktabs, the convention in the caption, pi as a fraction."""
+
+from __future__ import annotations
+
+import re
+
+from urdfkin.dh.export.words import at_most, cells, is_identity
+from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.units import Angles, Units
+from urdfkin.tree import FloatArray
+
+_FORMULA = {
+    Convention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
+    Convention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
+}
+_SPECIAL = {c: f"\\{c}" for c in "&%$#_{}"} | {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+}
+
+
+def write(table: DHTable, units: Units) -> str:
+    """A table environment that needs the packages booktabs and amsmath."""
+    modified = table.convention is Convention.MODIFIED
+    at = "_{i-1}" if modified else "_i"
+    angle = "rad" if units.angles is Angles.RADIANS else r"$^\circ$"
+    length = units.length_name
+    heads = [
+        r"$i$",
+        "joint",
+        f"$a{at}$ [{length}]",
+        rf"$\alpha{at}$ [{angle}]",
+        f"$d_i$ [{length}]",
+        rf"$\theta_i$ [{angle}]",
+    ]
+    if table.has_hayati_rows:
+        heads.append(rf"$\beta{at}$ [{angle}]")
+    rows = []
+    for i, row in enumerate(table.rows, 1):
+        texts = [_math(text) for text in cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")]
+        rows.append([str(i), escaped(row.joint), *texts])
+    lines = [
+        r"\begin{table}",
+        r"  \centering",
+        f"  \\caption{{{_caption(table)}}}",
+        rf"  \begin{{tabular}}{{rl{'r' * (len(heads) - 2)}}}",
+        r"    \toprule",
+        f"    {' & '.join(heads)} \\\\",
+        r"    \midrule",
+        *(f"    {' & '.join(row)} \\\\" for row in rows),
+        r"    \bottomrule",
+        r"  \end{tabular}",
+        r"\end{table}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _caption(table: DHTable) -> str:
+    names = f"{escaped(table.robot)}, {escaped(table.base_frame)} to {escaped(table.tip_frame)}"
+    product = _FORMULA[table.convention]
+    if table.has_hayati_rows:
+        product = product.replace(r"R_x(\alpha_i)", r"R_x(\alpha_i)\,R_y(\beta_i)")
+        product = product.replace(r"R_x(\alpha_{i-1})", r"R_x(\alpha_{i-1})\,R_y(\beta_{i-1})")
+    caption = f"Denavit--Hartenberg parameters of {names}, {table.convention} convention, $T = {product}$."
+    for what, T in (("Base", table.base), ("Tool", table.tool)):
+        if not is_identity(T):
+            caption += f" {what} (m): ${_matrix(T)}$."
+    if table.snap is not None and table.snap.changes:
+        caption += (
+            f" Angles were rounded within {_math(f'{table.snap.tolerance:.2g}')}\\,rad,"
+            f" which moves the tip by at most {_math(at_most(table.snap.metres))}\\,m."
+        )
+    return caption
+
+
+def _matrix(T: FloatArray) -> str:
+    rows = (" & ".join(_plain(f"{x + 0.0:.6g}") for x in row) for row in T)
+    return r"\begin{bmatrix}" + r" \\ ".join(rows) + r"\end{bmatrix}"
+
+
+def _math(text: str) -> str:
+    """A cell in math mode, a/b as it stands and 1e-6 as a power."""
+    return f"${_plain(text)}$"
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"e([+-])0*(\d+)", lambda m: rf"\cdot 10^{{{'-' if m[1] == '-' else ''}{m[2]}}}", text)
+
+
+def escaped(text: str) -> str:
+    """Text with LaTeX's special characters made harmless."""
+    return "".join(_SPECIAL.get(character, character) for character in text)

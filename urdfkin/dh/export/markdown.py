@@ -1,0 +1,29 @@
+"""The table in Markdown, for a README or an issue."""
+
+from __future__ import annotations
+
+from urdfkin.dh.export.words import cells, formula, headings, is_identity, pose_lines, snap_lines
+from urdfkin.dh.table import DHTable
+from urdfkin.dh.units import Units
+
+
+def write(table: DHTable, units: Units) -> str:
+    """A heading line, the table, base and tool, and what was snapped."""
+    body = [["i", "joint", *headings(table, units)]]
+    body += [[str(i), f"`{row.joint}`", *cells(table, row, units)] for i, row in enumerate(table.rows, 1)]
+    title = f"**{table.robot}**, `{table.base_frame}` to `{table.tip_frame}`"
+    lines = [f"{title}, {table.convention} Denavit-Hartenberg parameters: `{formula(table)}`", ""]
+    lines += [_line(body[0]), _line(["---:", ":---", *["---:"] * (len(body[0]) - 2)])]
+    lines += [_line(row) for row in body[1:]]
+    for what, T in (("Base", table.base), ("Tool", table.tool)):
+        if is_identity(T):
+            lines += ["", f"{what}: the identity."]
+        else:
+            lines += ["", f"{what} (metres):", "", "```", *pose_lines(T, units.digits), "```"]
+    if table.snap is not None:
+        lines += ["", *snap_lines(table, "- ")]
+    return "\n".join(lines) + "\n"
+
+
+def _line(texts: list[str]) -> str:
+    return "| " + " | ".join(text.replace("|", "\\|") for text in texts) + " |"

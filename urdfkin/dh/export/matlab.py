@@ -1,0 +1,49 @@
+"""MATLAB code of plain matrices; runs in Octave as well."""
+
+from __future__ import annotations
+
+from urdfkin.dh.export.code import header, identifier, numbers, row_numbers
+from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.units import Units
+from urdfkin.tree import FloatArray
+
+_BODY = """
+T = base;
+for i = 1:size(rows, 1)
+    a = rows(i, 1); alpha = rows(i, 2); d = rows(i, 3); theta = rows(i, 4); beta = rows(i, 5);
+    if rows(i, 6)
+        theta = theta + rows(i, 7) * values(i);
+    else
+        d = d + rows(i, 7) * values(i);
+    end
+    S = [cos(theta), -sin(theta), 0, 0; sin(theta), cos(theta), 0, 0; 0, 0, 1, d; 0, 0, 0, 1];
+    Tx = [eye(3), [a; 0; 0]; 0, 0, 0, 1];
+    Rx = [1, 0, 0, 0; 0, cos(alpha), -sin(alpha), 0; 0, sin(alpha), cos(alpha), 0; 0, 0, 0, 1];
+    Ry = [cos(beta), 0, sin(beta), 0; 0, 1, 0, 0; -sin(beta), 0, cos(beta), 0; 0, 0, 0, 1];
+    T = T * {product};
+end
+T = T * tool;
+end
+"""
+
+
+def write(table: DHTable, units: Units) -> str:
+    """A function file `ROBOT_placement.m`."""
+    del units
+    lines = [f"function T = {identifier(table.robot)}_placement(q)"]
+    lines += [f"% {line}" for line in header(table)]
+    lines += ["% columns: a, alpha, d, theta, beta, 1 for turning and 0 for sliding, sense"]
+    lines += matrix("rows", row_numbers(table), 7)
+    lines += matrix("coupling", table.coupling.matrix.tolist(), len(table.joint_names))
+    lines += [f"values = coupling * q(:) + [{'; '.join(numbers([x]) for x in table.coupling.offset)}];"]
+    for what, T in (("base", table.base), ("tool", table.tool)):
+        lines += matrix(what, T.tolist(), 4)
+    product = "S * (Tx * Rx * Ry)" if table.convention is Convention.STANDARD else "(Tx * Rx * Ry) * S"
+    return "\n".join(lines) + _BODY.format(product=product)
+
+
+def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> list[str]:
+    """Lines that assign a matrix, also one without rows."""
+    if not len(rows):
+        return [f"{name} = zeros(0, {columns});"]
+    return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]

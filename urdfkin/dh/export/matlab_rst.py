@@ -1,0 +1,46 @@
+"""MATLAB code for the Robotics System Toolbox: a `rigidBodyTree`.
+
+The toolbox's own "dh" and "mdh" fixed transforms ignore theta of a revolute joint and d of a prismatic one,
+so that offsets would be lost, and know no Hayati row. The joints are therefore placed by the matrices of
+the table's own frames, and turn about z.
+"""
+
+from __future__ import annotations
+
+from urdfkin.dh.export.code import header, identifier, is_coupled, plain
+from urdfkin.dh.export.matlab import matrix
+from urdfkin.dh.table import DHTable
+from urdfkin.dh.to_tree import frame_poses
+from urdfkin.dh.units import Units
+from urdfkin.errors import InputError
+
+
+def write(table: DHTable, units: Units) -> str:
+    """A function file `ROBOT_tree.m` that returns a rigidBodyTree."""
+    del units
+    if is_coupled(table):
+        raise InputError(
+            "rigidBodyTree has no joint that follows another",
+            where=f"table of {table.robot}",
+            remedy="load with mimic off, or use the plain MATLAB form",
+        )
+    poses = frame_poses(table)
+    lines = [f"function robot = {identifier(table.robot)}_tree()", *(f"% {line}" for line in header(table))]
+    lines += ["robot = rigidBodyTree('DataFormat', 'row');", f"robot.BaseName = '{plain(table.base_frame)}';"]
+    parent = "robot.BaseName"
+    for row, T in zip(table.rows, poses[:-1], strict=True):
+        kind = "revolute" if row.kind.turns else "prismatic"
+        lines += matrix("T", T.tolist(), 4)
+        lines += [
+            f"body = rigidBody('{plain(row.joint)}_link');",
+            f"joint = rigidBodyJoint('{plain(row.joint)}', '{kind}');",
+            "setFixedTransform(joint, T);",
+            f"joint.JointAxis = [0 0 {row.sense}];",
+        ]
+        if row.limit is not None and row.limit.lower > float("-inf") and row.limit.upper < float("inf"):
+            lines.append(f"joint.PositionLimits = [{row.limit.lower!r} {row.limit.upper!r}];")
+        lines += ["body.Joint = joint;", f"addBody(robot, body, {parent});"]
+        parent = f"'{plain(row.joint)}_link'"
+    lines += [*matrix("T", poses[-1].tolist(), 4), f"body = rigidBody('{plain(table.tip_frame)}_tip');"]
+    lines += ["setFixedTransform(body.Joint, T);", f"addBody(robot, body, {parent});", "end"]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,68 @@
+"""Khalil and Kleinfinger's table as text, Markdown, comma-separated values and plain data."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import asdict, fields
+from typing import Any
+
+from urdfkin.dh.export.terminal import aligned
+from urdfkin.dh.export.words import added
+from urdfkin.dh.tree_parameters import TreeParameters, TreeRow
+from urdfkin.dh.units import Units
+
+FORMULA = "T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r), i = a(j)"
+
+
+def as_mapping(table: TreeParameters) -> dict[str, Any]:
+    """Plain data, metres and radians; rows are numbered from 1, the root is 0."""
+    return {
+        "notation": "Khalil-Kleinfinger",
+        "robot": table.robot,
+        "root": table.root,
+        "rows": [{**asdict(row), "antecedent": row.antecedent + 1} for row in table.rows],
+        "T_frame_link": table.T_frame_link.tolist(),
+    }
+
+
+def write_tree(table: TreeParameters, form: str, units: Units) -> str:
+    """The table as "terminal", "markdown" or "csv"; csv is in metres and radians."""
+    if form == "csv":
+        out = io.StringIO()
+        writer = csv.DictWriter(out, [field.name for field in fields(TreeRow)], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(as_mapping(table)["rows"])
+        return out.getvalue()
+    title = f"{table.robot}: Khalil-Kleinfinger parameters, {table.root} is frame 0"
+    body = [_heads(table, units), *(_cells(table, j, units) for j in range(len(table.rows)))]
+    if form == "markdown":
+        lines = ["| " + " | ".join(row) + " |" for row in body]
+        rule = "| " + " | ".join(["---:"] * len(body[0])) + " |"
+        return "\n".join([f"**{title}**: `{FORMULA}`", "", lines[0], rule, *lines[1:]]) + "\n"
+    return "\n".join([title, FORMULA, "", *aligned(body)]) + "\n"
+
+
+def _heads(table: TreeParameters, units: Units) -> list[str]:
+    angle, length = units.angle_name, units.length_name
+    heads = ["j", "joint", "a(j)", "sigma", f"gamma [{angle}]", f"b [{length}]", f"alpha [{angle}]"]
+    heads += [f"d [{length}]", f"theta [{angle}]", f"r [{length}]"]
+    return [*heads, f"beta [{angle}]"] if _bent(table) else heads
+
+
+def _cells(table: TreeParameters, j: int, units: Units) -> list[str]:
+    row = table.rows[j]
+    theta, r = units.angle(row.theta), units.length(row.r)
+    # A follower's own offset is part of its constant, as in the other tables.
+    own = f"q({row.joint})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
+    if row.sigma == 0:
+        theta = added(own, units.angle(row.theta + row.offset))
+    elif row.sigma == 1:
+        r = added(own, units.length(row.r + row.offset))
+    cells = [str(j + 1), row.joint, str(row.antecedent + 1), str(row.sigma), units.angle(row.gamma)]
+    cells += [units.length(row.b), units.angle(row.alpha), units.length(row.d), theta, r]
+    return [*cells, units.angle(row.beta)] if _bent(table) else cells
+
+
+def _bent(table: TreeParameters) -> bool:
+    return any(row.beta for row in table.rows)

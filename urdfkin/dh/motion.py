@@ -1,0 +1,68 @@
+"""Velocity, Jacobian and acceleration of a table: the text's recursion run on its own frames.
+
+Equations 7.85 and 7.127 to 7.130, with d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). The recursion exists once
+(`urdfkin.recursion`); it runs here on the tree whose joints stand on the table's frames. Followers are free
+joints there, and the coupling values = G q + g is applied outside: J = J_rows G.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.dh.to_tree import free_tree
+from urdfkin.recursion.evaluate import accelerations, jacobians, velocities
+from urdfkin.recursion.plan import Plan, make_plan
+from urdfkin.reference import Reference
+from urdfkin.tree import FloatArray
+
+if TYPE_CHECKING:
+    from urdfkin.dh.table import DHTable
+
+
+def plan_of(table: DHTable) -> Plan:
+    """The walk over the table's frames to its tip."""
+    tree = free_tree(table)
+    return make_plan(tree, [len(tree.links) - 1])
+
+
+def jacobian(table: DHTable, q: ArrayLike | Mapping[str, float], reference: Reference | str) -> FloatArray:
+    """(..., 6, coordinates); see `DHTable.jacobian`."""
+    shape, (values,) = _flat(table, table.coupling.values(q))
+    J = jacobians(table.plan, values, Reference.of(reference))[:, 0] @ table.coupling.matrix
+    return np.ascontiguousarray(J.reshape(*shape, 6, len(table.joint_names)))
+
+
+def velocity(
+    table: DHTable, q: ArrayLike | Mapping[str, float], v: ArrayLike, reference: Reference | str
+) -> FloatArray:
+    """(..., 6); see `DHTable.velocity`."""
+    shape, (values, rates) = _flat(table, table.coupling.values(q), _rates(table, v, "v"))
+    return velocities(table.plan, values, rates, Reference.of(reference)).reshape(*shape, 6)
+
+
+def acceleration(
+    table: DHTable, q: ArrayLike | Mapping[str, float], v: ArrayLike, a: ArrayLike, reference: Reference | str
+) -> FloatArray:
+    """(..., 6); see `DHTable.acceleration`."""
+    arrays = (table.coupling.values(q), _rates(table, v, "v"), _rates(table, a, "a"))
+    shape, (values, rates, rates_of_rates) = _flat(table, *arrays)
+    found = accelerations(table.plan, values, rates, rates_of_rates, Reference.of(reference))
+    return found.reshape(*shape, 6)
+
+
+def _rates(table: DHTable, rates: ArrayLike, what: str) -> FloatArray:
+    """(..., rows) rates of all joints from rates of the coordinates."""
+    return table.coupling.checked(rates, what) @ table.coupling.matrix.T
+
+
+def _flat(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
+    """The common batch shape, and the arrays broadcast to it as (n, rows)."""
+    shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+    rows = len(table.rows)
+    wide = [np.broadcast_to(array, (*shape, rows)).reshape(math.prod(shape), rows) for array in arrays]
+    return shape, [np.ascontiguousarray(array) for array in wide]

@@ -1,0 +1,28 @@
+"""The reference tables that ship with urdfkin: vendors' and textbooks', each with its source."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from urdfkin.errors import UnknownNameError
+from urdfkin.resources import robots_dir
+
+
+def references() -> dict[str, Path]:
+    """Name -> file of each shipped table."""
+    return {path.stem: path for path in sorted((robots_dir() / "dh").glob("*.toml"))}
+
+
+def reference_path(name: str) -> Path:
+    """The file of a table: a path that exists, or the name of a shipped one.
+
+    Raises:
+        UnknownNameError: neither; the nearest names are offered.
+    """
+    path = Path(name)
+    if path.suffix or path.exists():
+        return path
+    shipped = references()
+    if name not in shipped:
+        raise UnknownNameError("reference table", name, shipped)
+    return shipped[name]

@@ -1,0 +1,220 @@
+"""Angles that a file has rounded (1.5708) or a calibration has nudged, made round again, and accounted for.
+
+Three places, base to tip: the orientation of each joint's origin in the URDF (its roll, pitch and yaw); the
+tilt between consecutive axes and the turns before and after it; theta of the finished rows. Positions are
+kept as the file has them, so that what follows is turned about a joint's origin and nothing else moves: see
+`urdfkin.dh.statement` for why the bound holds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from urdfkin.chain import ChainJoint, FrameChain, chain, steps_between
+from urdfkin.dh.elements import EPS, nearest_twelfth, wrapped
+from urdfkin.dh.statement import SnapChange, SnapStatement
+from urdfkin.dh.table import Convention, DHTable
+from urdfkin.errors import InputError
+from urdfkin.rotation.euler import coordinate_rotation
+from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
+
+#: Half of 15 degrees is where the next multiple begins; a tolerance must stay clear of it.
+LARGEST_TOLERANCE = math.pi / 36.0
+
+
+def checked_tolerance(snap: float) -> float:
+    """The tolerance as a float; raises InputError unless it lies between 0 and 5 degrees."""
+    if not 0.0 <= snap <= LARGEST_TOLERANCE:
+        raise InputError("snap is an angle in radians between 0 and 0.087 (5 degrees)", found=repr(snap))
+    return float(snap)
+
+
+def snap_chain(
+    tree: KinematicTree, tip: str, base: str | None, tolerance: float
+) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
+    """The chain with its angles made round, and each change with the index of the constant it is in."""
+    exact = chain(tree, tip, base)
+    rounder, moved = _snap_origins(tree, tolerance)
+    path = chain(rounder, tip, base)
+    changes = _changes_of_origins(steps_between(tree, tip, exact.base), moved)
+    constants = list(path.constants)
+    names = [*(joint.name for joint in path.joints), path.tip]
+    for k, A in enumerate(constants):
+        constants[k], angle = _snap_pose(A, tolerance)
+        if angle:
+            changes.append((k, _change(exact, k + 1, f"direction of {names[k]}", angle)))
+    joints = [
+        replace(joint, T_previous_joint=frozen(A))
+        for joint, A in zip(path.joints, constants[:-1], strict=True)
+    ]
+    return replace(path, joints=tuple(joints), T_last_tip=frozen(constants[-1])), changes
+
+
+def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DHTable, list[SnapChange]]:
+    """Theta of the finished rows made round: everything beyond turns about the row's axis."""
+    rows, changes = list(table.rows), list[SnapChange]()
+    for i, row in enumerate(rows):
+        theta = wrapped(nearest_twelfth(row.theta)) + 0.0
+        angle = abs(math.remainder(row.theta - theta, 2.0 * math.pi))
+        if 0.0 < angle <= tolerance:
+            rows[i] = replace(row, theta=theta)
+            # A sliding axis may have been moved up to the joint before it.
+            pivot = i + 1 if row.kind.turns else i
+            what = f"theta of {row.joint}: {row.theta:.9g} to {theta:.9g}"
+            changes.append(replace(_change(exact, pivot, what, angle), row=i))
+    return replace(table, rows=tuple(rows)), changes
+
+
+def statement(
+    exact: FrameChain, table: DHTable, changes: Sequence[SnapChange], tolerance: float, samples: int = 500
+) -> SnapStatement:
+    """Add the changes up, and measure them against the exact chain on samples within limits."""
+    radians = sum((change.angle for change in changes), 0.0)
+    per_metre = dict[str, float]()
+    for change in changes:
+        for name in change.sliders:
+            per_metre[name] = per_metre.get(name, 0.0) + change.angle
+    travel = {joint.name: _travel(joint.limit) for joint in exact.joints}
+    metres = sum((change.tip for change in changes), 0.0)
+    metres += sum(rate * travel[name] for name, rate in per_metre.items())
+    q = _samples(exact, samples)
+    T_exact, T_table = exact.placement(q), table.placement(q)
+    shift = np.linalg.norm(T_exact[:, :3, 3] - T_table[:, :3, 3], axis=-1)
+    turn = rotation_angle(T_exact[:, :3, :3], T_table[:, :3, :3])
+    return SnapStatement(
+        tolerance,
+        tuple(sorted(changes, key=lambda change: change.row)),
+        metres,
+        radians,
+        per_metre,
+        float(shift.max(initial=0.0)),
+        float(turn.max(initial=0.0)),
+        samples,
+    )
+
+
+def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
+    """(...,) radians between rotations (..., 3, 3), also small ones: |R - S| = 2 sqrt2 sin(angle / 2)."""
+    chord = np.linalg.norm(R - S, axis=(-2, -1)) / (2.0 * math.sqrt(2.0))
+    return np.asarray(2.0 * np.arcsin(np.minimum(chord, 1.0)))
+
+
+# -- the three places ----------------------------------------------------------------------------------
+
+
+def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree, dict[str, float]]:
+    """The tree with roll, pitch and yaw of its joint origins made round; how far each origin turned."""
+    joints, moved = list(tree.joints), dict[str, float]()
+    for i, joint in enumerate(joints):
+        T = np.array(joint.T_parent_joint)
+        T[:3, :3] = _round_rotation(T[:3, :3], tolerance)
+        angle = float(rotation_angle(T[:3, :3], joint.T_parent_joint[:3, :3]))
+        if angle > 0.0:
+            joints[i] = replace(joint, T_parent_joint=T)
+        if angle > 8.0 * EPS:
+            moved[joint.name] = angle
+    return replace(tree, joints=tuple(joints)), moved
+
+
+def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
+    """Rz(yaw) Ry(pitch) Rx(roll) with each angle that is nearly a multiple of pi/12 made one."""
+    level = math.hypot(R[0, 0], R[1, 0])
+    pitch = math.atan2(-R[2, 0], level)
+    if level <= tolerance:  # roll and yaw turn about one line: give it all to the yaw
+        roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
+    else:
+        roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
+    return _product(((2, yaw), (1, pitch), (0, roll)), tolerance)
+
+
+def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
+    """Rz(phi) Rx(tilt) Rz(psi) with each angle made round where it nearly is; the position is kept."""
+    R = A[:3, :3]
+    sine = math.hypot(R[0, 2], R[1, 2])
+    tilt = math.atan2(sine, R[2, 2])
+    if sine <= max(math.sin(tolerance), 8.0 * EPS):
+        phi = 0.0
+        psi = math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])
+        if R[2, 2] < 0.0:
+            psi = -math.atan2(R[1, 0] + R[0, 1], R[0, 0] - R[1, 1])
+    else:
+        phi, psi = math.atan2(R[0, 2], -R[1, 2]), math.atan2(R[2, 0], R[2, 1])
+    pose = np.array(A)
+    pose[:3, :3] = _product(((2, phi), (0, tilt), (2, psi)), tolerance)
+    angle = float(rotation_angle(pose[:3, :3], R))
+    return pose, (angle if angle > 8.0 * EPS else 0.0)
+
+
+def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
+    """Turns about coordinate axes multiplied, each first made round if it is nearly so."""
+    R = np.eye(3)
+    for axis, angle in turns:
+        twelfth = nearest_twelfth(angle)
+        is_round = abs(angle - twelfth) <= max(tolerance, 8.0 * EPS)
+        turn = coordinate_rotation(axis, np.asarray(twelfth if is_round else angle))
+        if is_round:
+            turn[np.abs(turn) < EPS] = 0.0  # the cosine of a right angle
+        R = R @ turn
+    return R
+
+
+# -- accounting ----------------------------------------------------------------------------------------
+
+
+def _changes_of_origins(
+    steps: Sequence[tuple[Joint, bool]], moved: Mapping[str, float]
+) -> list[tuple[int, SnapChange]]:
+    """A change for each origin on the path, the lever being the way from it to the tip."""
+    changes, lever, sliders = list[tuple[int, SnapChange]](), 0.0, list[str]()
+    moving = sum(joint.kind.has_axis for joint, _ in steps)
+    for joint, backwards in reversed(steps):
+        offset = math.hypot(*joint.T_parent_joint[:3, 3])
+        slides = joint.kind is JointKind.PRISMATIC
+        lever += offset if backwards else 0.0
+        sliders += [joint.name] if slides and not backwards else []
+        if angle := moved.get(joint.name, 0.0):
+            before = moving - (joint.kind.has_axis and not backwards)
+            change = SnapChange(0, f"origin of {joint.name}", angle, lever, tuple(reversed(sliders)))
+            changes.append((before, change))
+        sliders += [joint.name] if slides and backwards else []
+        lever += 0.0 if backwards else offset
+        moving -= joint.kind.has_axis
+    return changes[::-1]
+
+
+def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
+    """A turn about the origin of joint k (from 1; one more is the tip), seen at the tip."""
+    sliders = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
+    return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), sliders)
+
+
+def row_of_constant(table: DHTable, k: int) -> int:
+    """Index of the row in which the chain's constant A_k shows; -1 is the base, the row count the tool."""
+    n = len(table.rows)
+    if k == 0:
+        return -1
+    if k == n:
+        return n - 1 if np.array_equal(table.tool, np.eye(4)) else n
+    return k - 1 if table.convention is Convention.STANDARD else k
+
+
+def _travel(limit: Limit | None) -> float:
+    """Metres: how far a sliding joint may be from zero; one metre where the file does not say."""
+    return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
+
+
+def _samples(exact: FrameChain, count: int) -> FloatArray:
+    """(count, coordinates) within limits; a whole turn where there are none."""
+    bounds = {joint.name: _range(joint) for joint in exact.joints if joint.mimic is None}
+    lower, upper = np.array([bounds.get(name, (-1.0, 1.0)) for name in exact.joint_names]).reshape(-1, 2).T
+    return np.random.default_rng(0).uniform(lower, upper, (count, len(exact.joint_names)))
+
+
+def _range(joint: ChainJoint) -> tuple[float, float]:
+    if joint.kind is JointKind.CONTINUOUS or joint.limit is None:
+        return (-math.pi, math.pi) if joint.kind.turns else (-1.0, 1.0)
+    return (joint.limit.lower, joint.limit.upper)

@@ -1,0 +1,352 @@
+"""The Denavit-Hartenberg table: rows, a base and a tool, in a convention that is always named.
+
+Section 7.5 of the text. With S_i = Rz(theta_i) Tz(d_i) and X = Tx(a) Rx(alpha) Ry(beta):
+
+    standard   T_base_tip = base . S_1 X_1 . S_2 X_2 ... S_n X_n . tool        (X_i from row i)
+    modified   T_base_tip = base . X_0 S_1 . X_1 S_2 ... X_{n-1} S_n . tool    (X_{i-1} from row i)
+
+The variable of row i is theta_i for a turning joint and d_i for a sliding one: the constant in the row plus
+`sense` times the joint's value. The standard convention is the text's: joint i turns about z_{i-1}, and
+d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.coupling import Coupling, coupling_of
+from urdfkin.dh.elements import EPS, along_axis, between_axes
+from urdfkin.dh.statement import SnapStatement
+from urdfkin.errors import InputError
+from urdfkin.reference import Reference
+from urdfkin.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, frozen
+
+if TYPE_CHECKING:
+    from urdfkin.recursion.plan import Plan
+    from urdfkin.robot import Robot
+
+
+class Convention(StrEnum):
+    """Where a joint's axis stands: z_{i-1} (standard, distal) or z_i (modified, proximal, Craig)."""
+
+    STANDARD = "standard"
+    MODIFIED = "modified"
+
+
+def convention_of(name: str) -> Convention:
+    """The convention by name; raises InputError for anything else."""
+    try:
+        return Convention(name)
+    except ValueError:
+        raise InputError(
+            "unknown convention", found=repr(name), remedy="say 'standard' or 'modified'"
+        ) from None
+
+
+@dataclass(frozen=True, slots=True)
+class DHRow:
+    """One joint: the constant parts of its parameters, metres and radians.
+
+    Attributes:
+        a: Length along x: a_i in a standard table, a_{i-1} in a modified one.
+        alpha: Turn about x, likewise.
+        d: Offset along the joint's axis; the joint's value is added for a prismatic joint.
+        theta: Turn about the joint's axis; the joint's value is added for a turning joint.
+        kind: Revolute, continuous or prismatic.
+        joint: The joint's name.
+        sense: +1, or -1 where the row counts the joint's value the other way.
+        beta: Turn about y, after alpha: 0 except in a Hayati row.
+        mimic: Whom the joint follows; None if it has a coordinate of its own.
+        limit: Its bounds, None where there are none.
+    """
+
+    a: float
+    alpha: float
+    d: float
+    theta: float
+    kind: JointKind
+    joint: str
+    sense: int = 1
+    beta: float = 0.0
+    mimic: Mimic | None = None
+    limit: Limit | None = None
+
+    def __post_init__(self) -> None:
+        where = f"row of joint {self.joint}"
+        for name in ("a", "alpha", "d", "theta", "beta"):
+            if not math.isfinite(getattr(self, name)):
+                raise InputError(
+                    f"{name} is not a finite number", where=where, found=str(getattr(self, name))
+                )
+        if self.sense not in (1, -1):
+            raise InputError("the sense is +1 or -1", where=where, found=str(self.sense))
+        if not self.kind.has_axis:
+            raise InputError(
+                "a row is a revolute, continuous or prismatic joint", where=where, found=self.kind.value
+            )
+
+    @property
+    def cells(self) -> tuple[float, float, float, float, float]:
+        """(a, alpha, d, theta, beta)."""
+        return (self.a, self.alpha, self.d, self.theta, self.beta)
+
+    @property
+    def X(self) -> FloatArray:
+        """(4, 4) Tx(a) Rx(alpha) Ry(beta)."""
+        return between_axes(self.a, self.alpha, self.beta)
+
+    def S(self, value: ArrayLike = 0.0) -> FloatArray:
+        """(..., 4, 4) Rz(theta) Tz(d) with the joint at `value`, rad or m."""
+        moved = self.sense * np.asarray(value, dtype=np.float64)
+        return (
+            along_axis(self.theta + moved, self.d)
+            if self.kind.turns
+            else along_axis(self.theta, self.d + moved)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class DHTable:
+    """A Denavit-Hartenberg table that computes.
+
+    Attributes:
+        convention: Standard or modified.
+        rows: One for each moving joint, base to tip.
+        base: (4, 4) T_base_0, constant, metres.
+        tool: (4, 4) T_n_tip, constant, metres.
+        robot: The robot's name.
+        base_frame: What the base is called.
+        tip_frame: What the tip is called.
+        snap: What was moved to make cells round, and how far that moves the tip; None for an exact table.
+
+    Raises:
+        InputError: when two rows name one joint, or base or tool is no rigid transform.
+    """
+
+    convention: Convention
+    rows: tuple[DHRow, ...]
+    base: FloatArray = field(default_factory=lambda: np.eye(4))
+    tool: FloatArray = field(default_factory=lambda: np.eye(4))
+    robot: str = "robot"
+    base_frame: str = "base"
+    tip_frame: str = "tip"
+    snap: SnapStatement | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "convention", convention_of(self.convention))
+        for name in ("base", "tool"):
+            object.__setattr__(
+                self, name, _rigid(getattr(self, name), f"{name} of the table of {self.robot}")
+            )
+        names = [row.joint for row in self.rows]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(
+                    "two rows name the same joint", where=f"table of {self.robot}", found=repr(name)
+                )
+
+    # -- coordinates ---------------------------------------------------------------------------------
+
+    @cached_property
+    def coupling(self) -> Coupling:
+        """How the table's coordinates move its joints."""
+        return coupling_of([(row.joint, row.mimic) for row in self.rows])
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The table's coordinates: its independent joints in row order, leaders of followers included."""
+        return self.coupling.names
+
+    # -- sizes ---------------------------------------------------------------------------------------
+
+    @property
+    def has_hayati_rows(self) -> bool:
+        """Whether any row needs its fifth parameter, beta."""
+        return any(row.beta != 0.0 for row in self.rows)
+
+    @cached_property
+    def span(self) -> float:
+        """Metres: the sum of all |a| and |d| and of the tool's length, without any motion."""
+        lengths = sum(abs(row.a) + abs(row.d) for row in self.rows)
+        return lengths + float(np.linalg.norm(self.tool[:3, 3]))
+
+    def rounding(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+        """(...,) metres: what rounding may do to `placement(q)`; divided by `span`, radians.
+
+        Each row is a product of two matrices and an angle sum: about ten roundings of eps times the lever
+        arm, and half an eps of the angle itself. Cells cleaned to round numbers cost up to four eps each.
+        """
+        values = np.abs(self.coupling.values(q))
+        turns = np.array([row.kind.turns for row in self.rows], dtype=bool)
+        angle = values[..., turns].sum(axis=-1)
+        lever = self.span + values[..., ~turns].sum(axis=-1) + float(np.linalg.norm(self.base[:3, 3]))
+        return np.asarray(EPS * (8.0 + 8.0 * len(self.rows) + angle) * lever)
+
+    def tolerance(self, q: ArrayLike | Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
+        """(...,) metres and (...,) radians: how far `placement(q)` may be from the URDF's.
+
+        That is rounding for an exact table; what snapping declares is added.
+        """
+        metres = self.rounding(q)
+        radians = EPS * (8.0 + 8.0 * len(self.rows)) + np.zeros_like(metres)
+        if self.snap is None:
+            return metres, radians
+        values = self.coupling.values(q)
+        by_name = {row.joint: values[..., i] for i, row in enumerate(self.rows)}
+        return metres + self.snap.bound(by_name), radians + self.snap.radians
+
+    # -- placement -----------------------------------------------------------------------------------
+
+    def frames(self, q: ArrayLike | Mapping[str, float] | None = None) -> FloatArray:
+        """(..., n + 1, 4, 4) poses of the frames 0 ... n in the base frame.
+
+        Args:
+            q: (..., coordinates) in the order of `joint_names`, or a mapping by name; None is all zero.
+
+        Raises:
+            InputError: `q` has the wrong length.
+        """
+        values = self.coupling.values(np.zeros(len(self.joint_names)) if q is None else q)
+        poses = np.empty((*values.shape[:-1], len(self.rows) + 1, 4, 4))
+        poses[..., 0, :, :] = self.base
+        for i, row in enumerate(self.rows):
+            S = row.S(values[..., i])
+            step = S @ row.X if self.convention is Convention.STANDARD else row.X @ S
+            poses[..., i + 1, :, :] = poses[..., i, :, :] @ step
+        return poses
+
+    def placement(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+        """(..., 4, 4) T_base_tip: base, rows and tool multiplied.
+
+        Args:
+            q: (..., coordinates) in the order of `joint_names`, rad or m, or a mapping by name.
+
+        Raises:
+            InputError: `q` has the wrong length.
+
+        Example:
+            >>> arm = DHTable(Convention.STANDARD, (DHRow(2.0, 0.0, 0.0, 0.0, JointKind.REVOLUTE, "j"),))
+            >>> arm.placement([math.pi / 2])[:3, 3].round(12).tolist()
+            [0.0, 2.0, 0.0]
+        """
+        return np.ascontiguousarray(self.frames(q)[..., -1, :, :] @ self.tool)
+
+    # -- motion: the text's recursion on the table's frames ------------------------------------------
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The recursion's walk over the table's frames, made once."""
+        from urdfkin.dh.motion import plan_of  # noqa: PLC0415 - compiles; only who asks for motion pays
+
+        return plan_of(self)
+
+    def jacobian(
+        self, q: ArrayLike | Mapping[str, float], reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
+    ) -> FloatArray:
+        """(..., 6, coordinates) Jacobian of the tip in the base frame, [linear; angular]: 7.85.
+
+        Args:
+            q: (..., coordinates) in the order of `joint_names`, rad or m, or a mapping by name.
+            reference: As everywhere; the world is the table's base frame.
+
+        Raises:
+            InputError: `q` has the wrong length.
+        """
+        from urdfkin.dh import motion  # noqa: PLC0415
+
+        return motion.jacobian(self, q, reference)
+
+    def velocity(
+        self,
+        q: ArrayLike | Mapping[str, float],
+        v: ArrayLike,
+        reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
+    ) -> FloatArray:
+        """(..., 6) velocity of the tip in the base frame, [linear; angular]: 7.127, 7.128.
+
+        Args:
+            q: (..., coordinates), rad or m, or a mapping by name.
+            v: (..., coordinates), rad/s or m/s; batches broadcast.
+            reference: As everywhere; the world is the table's base frame.
+
+        Raises:
+            InputError: an array has the wrong length.
+        """
+        from urdfkin.dh import motion  # noqa: PLC0415
+
+        return motion.velocity(self, q, v, reference)
+
+    def acceleration(
+        self,
+        q: ArrayLike | Mapping[str, float],
+        v: ArrayLike,
+        a: ArrayLike,
+        reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
+    ) -> FloatArray:
+        """(..., 6) classical acceleration of the tip in the base frame, [linear; angular]: 7.129, 7.130.
+
+        Args:
+            q: (..., coordinates), rad or m, or a mapping by name.
+            v: (..., coordinates), rad/s or m/s.
+            a: (..., coordinates), rad/s^2 or m/s^2; batches broadcast.
+            reference: As everywhere; the world is the table's base frame.
+
+        Raises:
+            InputError: an array has the wrong length.
+        """
+        from urdfkin.dh import motion  # noqa: PLC0415
+
+        return motion.acceleration(self, q, v, a, reference)
+
+    # -- other forms ---------------------------------------------------------------------------------
+
+    def to_convention(self, convention: str) -> DHTable:
+        """The same motion in the other convention; raises InputError for an unknown name."""
+        from urdfkin.dh.convert import to_convention  # noqa: PLC0415
+
+        return to_convention(self, convention)
+
+    def to_tree(self) -> KinematicTree:
+        """The robot that the table describes, its joints standing on the table's frames."""
+        from urdfkin.dh.to_tree import to_tree  # noqa: PLC0415
+
+        return to_tree(self)
+
+    # The way back to a robot ends above this package: the two imports wait until they are called.
+
+    def to_urdf(self) -> str:
+        """A URDF of the table's robot, without shapes and masses; see `to_tree` for names and limits."""
+        from urdfkin.urdf.writer import to_urdf  # noqa: PLC0415
+
+        return to_urdf(self.to_tree())
+
+    def to_robot(self, *, verify: bool = True) -> Robot:
+        """The table's robot, its base frame the root, its tip the leaf.
+
+        Args:
+            verify: Whether every result is held against Pinocchio's.
+        """
+        from urdfkin.from_table import robot_from_table  # noqa: PLC0415
+
+        return robot_from_table(self, verify=verify)
+
+
+def _rigid(T: ArrayLike, where: str) -> FloatArray:
+    """A read-only (4, 4) rigid transform; rejects what is none to within 1e-6."""
+    pose = frozen(T)
+    if pose.shape != (4, 4) or not np.isfinite(pose).all():
+        raise InputError(
+            "a pose is a (4, 4) array of finite numbers", where=where, found=f"shape {pose.shape}"
+        )
+    off = np.abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max()
+    if off > 1e-6 or np.linalg.det(pose[:3, :3]) < 0.0 or pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
+        raise InputError("a pose must be a rotation and a translation", where=where, found=str(pose.tolist()))
+    return pose

@@ -1,0 +1,261 @@
+"""Khalil and Kleinfinger's parameters: one table for a whole tree.
+
+W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots", ICRA 1986. Each
+link j has one frame, its z_j along the axis of the joint that carries it (proximal, as in the modified
+convention), and its pose in the frame of its antecedent i = a(j), the nearest link that moves, is
+
+    T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
+
+gamma and b are zero on the link's first moving child, whose common normal defines x_i: along a chain without
+branches the table is the modified one with a(i-1) = d and d(i) = r. sigma says how the joint moves: 0 turns
+(theta), 1 slides (r), 2 is fixed. Fixed frames take all six numbers, so every frame of the robot is exact.
+beta is not of the original: it is zero except between nearly parallel axes (Hayati), where four numbers
+would need offsets of kilometres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from urdfkin.chain import motion_about_z
+from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
+from urdfkin.dh.elements import along_axis, between_axes
+from urdfkin.dh.normals import NearParallel, Step, cleaned_angle, cleaned_length, step_between
+from urdfkin.errors import InputError
+from urdfkin.rotation import axis_aligning
+from urdfkin.tree import FloatArray, JointKind, KinematicTree
+
+_SIGMA = {
+    JointKind.REVOLUTE: 0,
+    JointKind.CONTINUOUS: 0,
+    JointKind.PRISMATIC: 1,
+    JointKind.FIXED: 2,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class TreeRow:
+    """One joint and the link it carries; metres and radians.
+
+    Attributes:
+        joint: Its name.
+        link: The link's name.
+        antecedent: Index of the row of the antecedent link, from 0; -1 is the root.
+        sigma: 0 turns, 1 slides, 2 is fixed.
+        gamma: Turn about the antecedent's z.
+        b: Offset along it.
+        alpha: Turn about x, the common normal.
+        d: Length along x.
+        beta: Turn about y after alpha; 0 except between nearly parallel axes.
+        theta: Turn about the joint's own z; the joint's value is added if sigma is 0.
+        r: Offset along it; the joint's value is added if sigma is 1.
+        leader: Name of the joint that this one follows, or its own.
+        multiplier: The joint's value is multiplier * q_leader + offset.
+        offset: Likewise.
+    """
+
+    joint: str
+    link: str
+    antecedent: int
+    sigma: int
+    gamma: float
+    b: float
+    alpha: float
+    d: float
+    beta: float
+    theta: float
+    r: float
+    leader: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class TreeParameters:
+    """The table of a whole robot.
+
+    Attributes:
+        robot: The robot's name.
+        root: The root link.
+        rows: One for each joint, fixed ones too, in the tree's order.
+        T_frame_link: (joints, 4, 4) pose of the URDF's link frame in the row's frame: a turn and a shift
+            that make z the joint's axis and x the common normal.
+    """
+
+    robot: str
+    root: str
+    rows: tuple[TreeRow, ...]
+    T_frame_link: FloatArray
+
+    @cached_property
+    def coordinates(self) -> tuple[str, ...]:
+        """Joints that move and follow nobody, in the tree's order: the columns of `q`."""
+        return tuple(row.joint for row in self.rows if row.sigma < 2 and row.leader == row.joint)
+
+    @property
+    def roundings(self) -> float:
+        """How many eps of the reach rounding may make: eight for each joint of the deepest link, and more."""
+        return 8.0 * (2.0 + max((len(self._way(j)) for j in range(len(self.rows))), default=0))
+
+    def reach(self, q: FloatArray) -> FloatArray:
+        """(..., joints) metres: the length of the way from the root to each row's frame at `q`."""
+        values = np.abs(self._values(q))
+        own = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
+        own = own + np.where([row.sigma == 1 for row in self.rows], values, 0.0)
+        own = own + np.linalg.norm(self.T_frame_link[:, :3, 3], axis=-1)
+        reach = np.zeros((*q.shape[:-1], len(self.rows)))
+        for j in range(len(self.rows)):
+            reach[..., j] = own[..., self._way(j)].sum(axis=-1)
+        return reach
+
+    def _way(self, j: int) -> list[int]:
+        way = []
+        while j >= 0:
+            way.append(j)
+            j = self.rows[j].antecedent
+        return way
+
+    def _values(self, q: FloatArray) -> FloatArray:
+        """(..., joints) values of all joints; zero for fixed ones."""
+        column = {name: i for i, name in enumerate(self.coordinates)}
+        values = np.zeros((*q.shape[:-1], len(self.rows)))
+        for j, row in enumerate(self.rows):
+            if row.sigma < 2:
+                values[..., j] = row.multiplier * q[..., column[row.leader]] + row.offset
+        return values
+
+    def placements(self, q: FloatArray) -> FloatArray:
+        """(..., joints, 4, 4) poses of every link's URDF frame in the root's.
+
+        Args:
+            q: (..., coordinates) in the robot's order.
+
+        Raises:
+            InputError: the wrong number of coordinates.
+        """
+        q = np.asarray(q, dtype=np.float64)
+        if q.shape[-1:] != (len(self.coordinates),):
+            raise InputError(f"q needs {len(self.coordinates)} numbers", found=f"shape {q.shape}")
+        values = self._values(q)
+        frames = np.empty((*q.shape[:-1], len(self.rows), 4, 4))
+        for j, row in enumerate(self.rows):
+            T = np.eye(4) if row.antecedent < 0 else frames[..., row.antecedent, :, :]
+            constant = along_axis(row.gamma, row.b) @ between_axes(row.d, row.alpha, row.beta)
+            T = T @ constant @ along_axis(row.theta, row.r)
+            if row.sigma < 2:
+                T = T @ motion_about_z(values[..., j], row.sigma == 0)
+            frames[..., j, :, :] = T
+        return np.asarray(frames @ self.T_frame_link)
+
+
+def tree_parameters(tree: KinematicTree) -> TreeParameters:
+    """Khalil and Kleinfinger's parameters of a whole robot, exact to rounding.
+
+    Args:
+        tree: The robot.
+
+    Raises:
+        InputError: a planar or floating joint, which has no single axis.
+    """
+    for joint in tree.joints:
+        if joint.kind not in _SIGMA:
+            raise InputError(
+                f"a {joint.kind.value} joint has no single axis and no row",
+                where=f"joint {joint.name}",
+                remedy="load the robot without root_joint, or take tables of the parts on either side",
+            )
+    links = _links(tree)
+    steps, own = _steps(tree, links)
+    rows = tuple(_row(tree, links[j], j, steps[j], own) for j in range(len(tree.joints)))
+    poses = [
+        np.linalg.inv(along_axis(*own.get(j, (0.0, 0.0)))) @ links[j].T_link_axis.T for j in range(len(rows))
+    ]
+    return TreeParameters(tree.name, tree.links[0], rows, np.array(poses).reshape(-1, 4, 4))
+
+
+@dataclass(frozen=True, slots=True)
+class _Link:
+    """Where a link's axis frame stands: the antecedent is the nearest link that moves (-1 the root)."""
+
+    antecedent: int
+    T_antecedent_axis: FloatArray
+    T_link_axis: FloatArray
+
+
+def _links(tree: KinematicTree) -> list[_Link]:
+    """For each joint: its axis frame (z the axis; the link's own frame if fixed) in the antecedent's."""
+    links = list[_Link]()
+    # Of each link: the moving link that carries it, and its frame in that one's axis frame.
+    carried = [(-1, np.eye(4))]
+    for j, joint in enumerate(tree.joints):
+        antecedent, T = carried[joint.parent]
+        align = np.eye(4)
+        if joint.kind.has_axis:
+            align[:3, :3] = axis_aligning(joint.axis)
+        here = T @ joint.T_parent_joint @ align
+        links.append(_Link(antecedent, here, align))
+        carried.append((j, align.T) if joint.kind.has_axis else (antecedent, here))
+    return links
+
+
+def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[int, tuple[float, float]]]:
+    """The step to every axis, and the turn and shift from a link's axis frame to its row's frame.
+
+    The first moving child of a link defines its x; a link without one keeps the x that makes theta zero.
+    """
+    reach = _reach(tree)
+    steps, own = list[Step](), {-1: (0.0, 0.0)}
+    for link, joint in zip(links, tree.joints, strict=True):
+        i = link.antecedent
+        moving = joint.kind.has_axis
+        defines = moving and i not in own
+        before = steps[i].phi_next if i >= 0 else 0.0
+        known = own.get(i, (-before, 0.0))[0]
+        start = -before if defines else known
+        step = step_between(link.T_antecedent_axis, reach, NearParallel.HAYATI, start)
+        if abs(cleaned_angle(step.phi - start)) > np.pi / 2.0 + RIGHT_ANGLE_SLACK:
+            step = step.turned()
+        if defines:
+            own[i] = (step.phi, step.delta)
+        steps.append(step)
+    for j, joint in enumerate(tree.joints):
+        if joint.kind.has_axis and j not in own:
+            own[j] = (-steps[j].phi_next, 0.0)
+    return steps, own
+
+
+def _row(
+    tree: KinematicTree, link: _Link, j: int, step: Step, own: dict[int, tuple[float, float]]
+) -> TreeRow:
+    reach = _reach(tree)
+    joint, i = tree.joints[j], link.antecedent
+    turn, shift = own.get(i, (0.0, 0.0))
+    own_turn, own_shift = own.get(j, (0.0, 0.0))
+    rule = joint.mimic
+    return TreeRow(
+        joint=joint.name,
+        link=tree.links[j + 1],
+        antecedent=i,
+        sigma=_SIGMA[joint.kind],
+        gamma=cleaned_angle(step.phi - turn),
+        b=cleaned_length(step.delta - shift, reach),
+        alpha=step.alpha + 0.0,
+        d=step.a + 0.0,
+        beta=step.beta + 0.0,
+        theta=cleaned_angle(step.phi_next + own_turn),
+        r=cleaned_length(step.delta_next + own_shift, reach),
+        leader=rule.leader if rule else joint.name,
+        multiplier=rule.multiplier if rule else 1.0,
+        offset=rule.offset if rule else 0.0,
+    )
+
+
+def _reach(tree: KinematicTree) -> float:
+    """Metres: the longest way from the root to a link."""
+    ways = [0.0]
+    for joint in tree.joints:
+        ways.append(ways[joint.parent] + float(np.linalg.norm(joint.T_parent_joint[:3, 3])))
+    return max(ways)

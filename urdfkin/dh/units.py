@@ -1,0 +1,141 @@
+"""Numbers of a table as a person writes them: pi as a fraction where exact, degrees, millimetres.
+
+The table itself is always in metres and radians; units exist at the border only.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+from fractions import Fraction
+
+from urdfkin.errors import InputError
+
+
+class Angles(StrEnum):
+    """How angles are written."""
+
+    RADIANS = "radians"
+    DEGREES = "degrees"
+
+
+class Lengths(StrEnum):
+    """How lengths are written."""
+
+    METRES = "metres"
+    MILLIMETRES = "millimetres"
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """How a table is written: radians and metres unless said otherwise.
+
+    Attributes:
+        angles: Radians, with pi as a fraction where that is exact, or degrees.
+        lengths: Metres or millimetres.
+        digits: Significant digits.
+    """
+
+    angles: Angles = Angles.RADIANS
+    lengths: Lengths = Lengths.METRES
+    digits: int = 10
+
+    @property
+    def angle_name(self) -> str:
+        """The unit as a heading writes it."""
+        return "rad" if self.angles is Angles.RADIANS else "deg"
+
+    @property
+    def length_name(self) -> str:
+        """The unit as a heading writes it."""
+        return "m" if self.lengths is Lengths.METRES else "mm"
+
+    def angle(self, radians: float, pi: str = "pi") -> str:
+        """An angle as text.
+
+        Args:
+            radians: The angle.
+            pi: How to write pi.
+
+        Example:
+            >>> Units().angle(-math.pi / 2), Units(Angles.DEGREES).angle(math.pi / 12)
+            ('-pi/2', '15')
+        """
+        fraction = pi_fraction(radians)
+        if self.angles is Angles.DEGREES:
+            return str(fraction * 180) if fraction is not None else self._number(math.degrees(radians))
+        if fraction is None:
+            return self._number(radians)
+        return fraction_text(fraction, pi)
+
+    def length(self, metres: float) -> str:
+        """A length as text.
+
+        Example:
+            >>> Units(lengths=Lengths.MILLIMETRES).length(0.0825)
+            '82.5'
+        """
+        return self._number(metres if self.lengths is Lengths.METRES else metres * 1000.0)
+
+    def _number(self, value: float) -> str:
+        return f"{value:.{self.digits}g}" if value else "0"
+
+
+def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10) -> Units:
+    """Units by name; raises InputError for a name that is none."""
+    try:
+        return Units(Angles(angles), Lengths(lengths), digits)
+    except ValueError:
+        raise InputError(
+            "unknown unit",
+            found=f"{angles!r}, {lengths!r}",
+            remedy="say radians or degrees, metres or millimetres",
+        ) from None
+
+
+def pi_fraction(radians: float) -> Fraction | None:
+    """The multiple of pi that an angle is to the last bit, in twelfths; None for any other angle.
+
+    Example:
+        >>> pi_fraction(math.pi / 2), pi_fraction(1.5708)
+        (Fraction(1, 2), None)
+    """
+    twelfths = round(radians * 12.0 / math.pi)
+    return Fraction(twelfths, 12) if twelfths * math.pi / 12.0 == radians else None
+
+
+def fraction_text(fraction: Fraction, pi: str = "pi") -> str:
+    """A multiple of pi as text: 0, pi, -pi/2, 5pi/12."""
+    if fraction == 0:
+        return "0"
+    count = {1: "", -1: "-"}.get(fraction.numerator, str(fraction.numerator))
+    return f"{count}{pi}" + (f"/{fraction.denominator}" if fraction.denominator != 1 else "")
+
+
+_PI = re.compile(r"\s*([+-]?)\s*(?:(\d+(?:\.\d*)?)\s*\*?\s*)?pi\s*(?:/\s*(\d+(?:\.\d*)?))?\s*")
+
+
+def read_number(value: object, where: str) -> float:
+    """A number, or text that is one, or a multiple of pi such as "-pi/2" or "3*pi/4".
+
+    Raises:
+        InputError: anything else, with its place.
+
+    Example:
+        >>> read_number("-pi/2", "alpha") == -math.pi / 2
+        True
+    """
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value)
+    if isinstance(value, str):
+        if match := _PI.fullmatch(value):
+            sign, count, divisor = match.groups()
+            size = float(count or 1.0) * math.pi / float(divisor or 1.0)
+            return -size if sign == "-" else size
+        try:
+            return float(value)
+        except ValueError:
+            pass
+    raise InputError("not a number", where=where, found=repr(value), remedy="write 1.5708 or pi/2")
