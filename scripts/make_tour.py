@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/tour.md into docs/images (needs matplotlib: the extra `tour`)."""
+"""Draw the pictures of docs/tour.md into docs/images (needs matplotlib: the extra `plots`)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A chain drawn with its Denavit-Hartenberg frames, joint axes and common normals, as SVG.
 
-The only module that imports matplotlib (the extra `urdfkin[draw]`). The picture is an orthographic view:
+The only module that imports matplotlib (the extra `urdfkin[plots]`). The picture is an orthographic view:
 joint axes are dashed lines along z, the offsets d run along them in grey, the lengths a along the common
 normals in orange; each frame shows its x and z. Arrows that end at one place share a label.
 """
@@ -47,7 +47,7 @@ def drawing(
         import matplotlib as mpl  # noqa: PLC0415 - an extra
         from matplotlib.figure import Figure  # noqa: PLC0415
     except ImportError:
-        raise InputError("drawing needs matplotlib", remedy="pip install 'urdfkin[draw]'") from None
+        raise InputError("drawing needs matplotlib", remedy="pip install 'urdfkin[plots]'") from None
     frames = table.frames(q)
     if frames.ndim != 3:
         raise InputError("a drawing shows one configuration", found=f"a batch of shape {frames.shape[:-3]}")
