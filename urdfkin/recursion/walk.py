@@ -28,6 +28,8 @@ __all__ = [
 COLUMN = FIXED_ROWS
 SLOTS = FIXED_ROWS + 9
 _RESUME, _SAVE = 1, 2
+# Where `Plan.offsets` has a frame's offset in the axes of the step.
+_IN_STEP = 12
 
 
 def scratch_rows(slots: int, columns: int) -> int:
@@ -51,7 +53,7 @@ def start(m, s, b, base, order):
 def frame_state(m, s, offsets, f, order, rows, turned):
     """The state of a frame that is fixed to the present link; its rotation only where it is `turned`."""
     copy_rows(m, s, 0, FRAME, rows)
-    interorigin(m, s, 0, offsets, f)
+    interorigin(m, s, offsets, f, _IN_STEP)
     carry(m, s, FRAME, order)
     if turned:
         turn_by_constant(m, s, FRAME, offsets, f)

@@ -7,7 +7,9 @@ no comment, no entity, no namespace, and no element twice.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+
+import numpy as np
 
 from urdfkin.diagnostics.dialect import check_dialect
 from urdfkin.diagnostics.document import DEFAULT_LIMITS, Limits, parse
@@ -15,7 +17,9 @@ from urdfkin.diagnostics.encoding import utf8_bytes
 from urdfkin.diagnostics.finding import UrdfError
 from urdfkin.diagnostics.records import JointRecord, LimitRecord, read_robot
 from urdfkin.diagnostics.reporter import Reporter
-from urdfkin.urdf.angles import rpy_from_quaternion
+from urdfkin.rotation.arrays import FloatArray
+from urdfkin.rotation.euler import rpy_of
+from urdfkin.rotation.quaternion import rotation_of
 from urdfkin.urdf.writer import attribute, numbers
 
 
@@ -45,10 +49,16 @@ def skeleton(data: bytes, limits: Limits = DEFAULT_LIMITS) -> bytes:
     return "\n".join(lines).encode()
 
 
+def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:
+    """Roll, pitch and yaw of a quaternion (x, y, z, w) of any length, as URDF 1.1 writes it."""
+    scaled = np.asarray(quaternion) / np.abs(quaternion).max()
+    return rpy_of(rotation_of(scaled / np.linalg.norm(scaled)))
+
+
 def _joint(joint: JointRecord) -> Iterable[str]:
     yield f'<joint name="{attribute(joint.name)}" type="{joint.kind}">'
     yield f'<parent link="{attribute(joint.parent or "")}"/><child link="{attribute(joint.child or "")}"/>'
-    rpy = joint.rpy if joint.quaternion is None else rpy_from_quaternion(joint.quaternion)
+    rpy = joint.rpy if joint.quaternion is None else rpy_of_quaternion(joint.quaternion)
     yield f'<origin xyz="{numbers(joint.xyz)}" rpy="{numbers(rpy)}"/>'
     if joint.axis is not None:
         yield f'<axis xyz="{numbers(joint.axis)}"/>'

@@ -10,8 +10,8 @@ import math
 from collections.abc import Iterable
 
 from urdfkin.errors import InputError
+from urdfkin.rotation.euler import rpy_of
 from urdfkin.tree import Joint, JointKind, KinematicTree, Limit
-from urdfkin.urdf.angles import rpy_from_matrix
 
 #: Kinds whose position limits a URDF must give.
 _BOUNDED = (JointKind.REVOLUTE, JointKind.PRISMATIC)
@@ -60,7 +60,7 @@ def _joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
     yield f'  <joint name="{attribute(joint.name)}" type="{joint.kind.value}">'
     yield f'    <parent link="{attribute(parent)}"/>'
     yield f'    <child link="{attribute(child)}"/>'
-    yield f'    <origin xyz="{numbers(T[:3, 3])}" rpy="{numbers(rpy_from_matrix(T[:3, :3]))}"/>'
+    yield f'    <origin xyz="{numbers(T[:3, 3])}" rpy="{numbers(rpy_of(T[:3, :3]))}"/>'
     if joint.kind.has_axis:
         yield f'    <axis xyz="{numbers(joint.axis)}"/>'
     elif joint.kind is JointKind.PLANAR:
