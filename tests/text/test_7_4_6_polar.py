@@ -51,3 +51,16 @@ def test_7_107_its_rate_has_a_part_across_and_a_part_along() -> None:
 def test_7_108_and_that_is_the_endpoints_velocity() -> None:
     assert close(velocities()[1, :3], -V[0] * D2 * X1 + V[1] * Z1)
     assert close(velocities()[1, :3], MOVING.vel(2))
+
+
+def test_figure_7_15_is_the_robots_standard_table() -> None:
+    table = robot("polar").dh("slider")
+    # i, a_i, d_i, alpha_i, theta_i, with the joint's coordinate for each *.
+    rows = [(row.a, row.d, row.alpha, row.theta) for row in table.rows]
+    assert rows == [(0.0, 0.0, -np.pi / 2, 0.0), (0.0, 0.0, np.pi / 2, 0.0)]
+    assert [row.kind.turns for row in table.rows] == [True, False]
+    assert np.array_equal(table.base, np.eye(4))
+    assert np.array_equal(table.tool, np.eye(4))
+    assert close(table.placement(Q)[:3, 3], MOVING.origin(2))
+    assert close(table.placement(Q)[:3, :3], MOVING.rotation(2))
+    assert close(table.jacobian(Q) @ V, np.concatenate((MOVING.vel(2), MOVING.w(2))))

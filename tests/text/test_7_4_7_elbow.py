@@ -138,3 +138,11 @@ def test_the_substitution_saves_two_thirds_of_the_multiplications() -> None:
         assert close(rows, jacobian()[:3])
     # Six for each cross product and interorigin vector; substituted: three crosses and two scaled axes.
     assert (all_of_them, with_zeros, substituted) == (72, 54, 24)
+
+
+def test_the_elbows_standard_table_has_the_rows_of_figure_7_16() -> None:
+    table = robot("elbow").dh("wrist")
+    found = [(row.a, row.d, row.alpha, row.theta) for row in table.rows]
+    expected = [(float(row.a), float(row.d), float(row.alpha), 0.0) for row in MOVING.rows]
+    assert close(found, expected)
+    assert close(table.jacobian(MOVING.q), jacobian())

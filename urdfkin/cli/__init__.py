@@ -26,7 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "dh": ("urdfkin.cli.dh", "Denavit-Hartenberg tables, checked, compared, in many forms"),
     "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
     "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),
-    "explain": ("urdfkin.cli.explain", "what a finding's code means, with a bad and a good example"),
+    "explain": ("urdfkin.cli.explain", "what a finding's code means, or an equation's number"),
 }
 
 

@@ -1,4 +1,4 @@
-"""`urdfkin explain`: the page of a code."""
+"""`urdfkin explain`: the page of a finding's code, or of an equation."""
 
 from __future__ import annotations
 
@@ -6,22 +6,27 @@ import click
 
 from urdfkin.diagnostics.codes import REGISTRY
 from urdfkin.diagnostics.explain import find_code, page
+from urdfkin.equations import explain
 
 
 @click.command("explain")
-@click.argument("topic", metavar="CODE", required=False)
+@click.argument("topic", metavar="CODE|EQUATION", required=False)
 def command(topic: str | None) -> None:
     """Explain a code: why it matters, a bad and a good example, and what other programs do with it.
 
-    CODE is a finding's code or its short name. Without one, all codes are listed.
+    CODE is a finding's code or its short name. EQUATION is a number of the chapter: what it says, which
+    function computes it, and what checks it. Without either, all codes are listed.
 
     \b
     Example:
       urdfkin explain URDF502
       urdfkin explain rounded-pi
+      urdfkin explain 7.130
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
     if topic is None:
         for code in REGISTRY.values():
             click.echo(f"{code.id}  {code.severity.value:7}  {code.slug:26}  {code.title}")
+    elif (equation := explain(topic)) is not None:
+        click.echo(equation)
     else:
         click.echo(page(find_code(topic)))

@@ -26,7 +26,7 @@ def judge_all(
         given: Robots, or what names them.
         samples: Configurations for each.
         seed: What they are drawn from.
-        **how: `mimic` and `root_joint`, as in `load`.
+        **how: `mimic`, `root_joint` and `xacro_args`, as in `load`.
     """
     from urdfkin.diagnostics import UrdfWarning  # noqa: PLC0415  keeps --help fast
     from urdfkin.judge import judge  # noqa: PLC0415

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -70,20 +70,19 @@ def command(
 
     if json_ is not None:
         write_file(json_, b"")  # fail before the work, not after it
-    given = [_once(robot, mimic, root_joint) if judged else robot for robot in robots or examples()]
+    how: dict[str, Any] = {"mimic": mimic, "root_joint": root_joint, "xacro_args": xacro_args()}
+    given = [_once(robot, how) if judged else robot for robot in robots or examples()]
     with compiling(), _progress() as progress:
         report = validate(
             given,
             samples=samples,
             seed=seed,
             jobs=jobs,
-            mimic=mimic,
-            root_joint=root_joint,
-            xacro_args=xacro_args(),
             progress=progress,
+            **how,
         )
     if judged:
-        found = judge_all(report, given, judge_samples, seed, mimic=mimic, root_joint=root_joint)
+        found = judge_all(report, given, judge_samples, seed, **how)
         report = replace(report, judgements=found)
     if json_ is not None:
         write_file(json_, (json.dumps(report.as_dict(), allow_nan=False) + "\n").encode())
@@ -92,11 +91,11 @@ def command(
     context.exit(report.exit_code)
 
 
-def _once(source: str, mimic: bool | None, root_joint: str | None) -> Robot | str:
+def _once(source: str, how: dict[str, Any]) -> Robot | str:
     """Standard input can be read once, and the judge comes second: load it now."""
     from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
 
-    return load(source, mimic=mimic, root_joint=root_joint) if source == "-" else source
+    return load(source, **how) if source == "-" else source
 
 
 @contextmanager

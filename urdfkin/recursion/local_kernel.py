@@ -16,9 +16,11 @@ from urdfkin.recursion.lanes import (
     copy_rows,
     cross,
     dot,
+    entry,
     lane_function,
     load,
     plus,
+    pointer_to,
     sine_cosine,
     store,
 )
@@ -103,7 +105,12 @@ def _turn_back_about_z(m, s, order):
 def _turn_back_by_quaternion(m, s, q, b, at, order):
     """Turn back: x <- R(quat)^T x for each vector, with (x, y, z, w) in columns `at` to `at + 3` of `q`."""
     for k in range(m):
-        x, y, z, w = q[b + k, at], q[b + k, at + 1], q[b + k, at + 2], q[b + k, at + 3]
+        x, y, z, w = (
+            entry(q, b + k, at),
+            entry(q, b + k, at + 1),
+            entry(q, b + k, at + 2),
+            entry(q, b + k, at + 3),
+        )
         first = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
         second = (2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x))
         third = (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y))
@@ -163,12 +170,12 @@ def _move_free(m, s, order):
 def _step_free(m, s, b, i, steps, q, v, a, order):
     at, rate_at, planar = steps[i, 3], steps[i, 4], steps[i, 0] == _PLANAR
     for k in range(m):
-        z = 0.0 if planar else q[b + k, at + 2]
-        store(s, D, k, plus(load(s, D, k), (q[b + k, at], q[b + k, at + 1], z)))
+        z = 0.0 if planar else entry(q, b + k, at + 2)
+        store(s, D, k, plus(load(s, D, k), (entry(q, b + k, at), entry(q, b + k, at + 1), z)))
     carry(m, s, 0, order)
     if planar:
         for k in range(m):
-            s[ANGLE * LANES + k] = q[b + k, at + 2]
+            s[ANGLE * LANES + k] = entry(q, b + k, at + 2)
         sine_cosine(m, s, ANGLE, SINE, COSINE)
         _turn_back_about_z(m, s, order)
     else:
@@ -203,11 +210,13 @@ def _step(m, s, b, i, steps, g, q, v, a, order):
 @lane_function
 def _write(m, s, b, place, order, out):
     linear, angular = (FRAME + V, FRAME + W) if order == 1 else (FRAME + A, FRAME + ALPHA)
+    frames, to = out.shape[1], pointer_to(out)
     for k in range(m):
         lin, ang = load(s, linear, k), load(s, angular, k)
+        here = ((b + k) * frames + place) * 6
         for row in range(3):
-            out[b + k, place, row] = lin[row]
-            out[b + k, place, 3 + row] = ang[row]
+            to[here + row] = lin[row]
+            to[here + 3 + row] = ang[row]
 
 
 @lane_function
@@ -223,9 +232,9 @@ def _block(m, b, order, steps, g, frames, offsets, base, q, v, a, out, s):
                 copy_rows(m, s, 0, SLOTS + STATE_ROWS * steps[i, 2], rows)
         while f < frames.shape[0] and frames[f, 0] == i:
             copy_rows(m, s, 0, FRAME, rows)
-            _turn_back_by_constant(m, s, FRAME, offsets, f, order)
-            _place(m, s, offsets, f)
+            _place(m, s, offsets, f)  # in the link's axes, as in `walk.frame_state`
             carry(m, s, FRAME, order)
+            _turn_back_by_constant(m, s, FRAME, offsets, f, order)
             _write(m, s, b, frames[f, 1], order, out)
             f += 1
 

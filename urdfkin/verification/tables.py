@@ -102,9 +102,9 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
     one = np.ones_like(off)
     pairs: dict[str, tuple[tuple[FloatArray, FloatArray, FloatArray], ...]] = {
         "placement": ((off, size.reach, metres), (turn, one, radians)),
-        "jacobian": ((J[0], size.reach, slack.jacobian), (J[1], one, slack.turn * one)),
+        "jacobian": ((J[0], size.reach + size.slides, slack.jacobian), (J[1], one, slack.turn * one)),
         "acceleration": (
-            (acc[0], size.reach * rates, slack.acceleration * rates),
+            (acc[0], (size.reach + size.slides) * rates, slack.acceleration * rates),
             (acc[1], rates, 4.0 * slack.turn * rates),
         ),
     }
@@ -160,9 +160,13 @@ def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples
 
 @dataclass(frozen=True, slots=True)
 class _Sizes:
-    """What rounding is measured by: (n,) metres, sums of rates, and the count of roundings times eps."""
+    """What rounding is measured by: (n,) metres, sums of rates, and the count of roundings times eps.
+
+    `slides` is 1 where a joint slides: its column z is of size one, however short the robot is.
+    """
 
     reach: FloatArray
+    slides: float
     rates: FloatArray
     accelerations: FloatArray
     rounding: float
@@ -172,6 +176,7 @@ def _sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> _Sizes:
     """Everything from the root to either end counts: Pinocchio goes there and back."""
     n = len(samples.q)
     reach, rates, accelerations, joints = np.zeros(n), np.zeros(n), np.zeros(n), 0
+    slides = 0.0
     for link in {tree.frame_link(table.base_frame), tree.frame_link(table.tip_frame)}:
         for i in tree.path(link):
             joint = tree.joints[i]
@@ -181,12 +186,14 @@ def _sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> _Sizes:
             v_at, q_at = tree.v_index[i], tree.q_index[i]
             rates += factor * np.abs(samples.v[:, v_at : v_at + joint.kind.nv]).sum(axis=-1)
             accelerations += factor * np.abs(samples.a[:, v_at : v_at + joint.kind.nv]).sum(axis=-1)
+            if joint.kind.has_axis and not joint.kind.turns:
+                slides = 1.0
             if not joint.kind.turns:
                 offset = abs(joint.mimic.offset) if joint.mimic else 0.0
                 reach += offset + factor * np.abs(samples.q[:, q_at : q_at + joint.kind.nq]).sum(axis=-1)
     # A table in strict rows may be far longer than the robot, and rounds accordingly.
     reach = np.maximum(reach, table.span + float(np.linalg.norm(table.base[:3, 3])))
-    return _Sizes(reach, rates, accelerations, _EPS * (8.0 + 8.0 * (joints + len(table.rows))))
+    return _Sizes(reach, slides, rates, accelerations, _EPS * (8.0 + 8.0 * (joints + len(table.rows))))
 
 
 class _Slack:
