@@ -90,8 +90,8 @@ class Plan:
         slots: How many slots of saved state the walk needs; slot 0 holds the base.
         frames: (frames, 2): the step after which a frame is met (-1: the base), and its place in the
             output; ordered by step.
-        offsets: (frames, 15): rotation (9) and offset (3) from the step's frame to the frame, the offset
-            in the frame's own axes as in `geometry`, and again (3) in the axes of the step.
+        offsets: (frames, 12): rotation (9) and offset (3) from the step's frame to the frame, the offset
+            in the axes of the step.
         columns: (columns, 4), columns `Column`: every rate of every step.
         multipliers: (columns,) the mimic multiplier of each column.
         uses: (frames, columns): 0 where the column is not the frame's ancestor, 1 where it is written
@@ -158,7 +158,7 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
         frames=np.array(
             [[end.step, place] for end, place in zip(ends, order, strict=True)], dtype=np.int64
         ).reshape(-1, 2),
-        offsets=np.array([(*_flat(end.T), *end.T[:3, 3]) for end in ends]).reshape(-1, 15),
+        offsets=np.array([(*end.T[:3, :3].ravel(), *end.T[:3, 3]) for end in ends]).reshape(-1, 12),
         columns=columns,
         multipliers=multipliers,
         uses=uses[order],

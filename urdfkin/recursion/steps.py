@@ -99,9 +99,9 @@ def turn_by_quaternion(m, s, q, b, at):
 
 
 @lane_function
-def interorigin(m, s, g, i, first):
-    """D = R p for the constant offset p that begins in column `first` of row `i`, in the axes of R."""
-    p = (g[i, first], g[i, first + 1], g[i, first + 2])
+def interorigin(m, s, g, i):
+    """D = R p for the constant offset p in row `i` of `g`, seen in the axes of R."""
+    p = (g[i, _OFFSET], g[i, _OFFSET + 1], g[i, _OFFSET + 2])
     for k in range(m):
         store(s, D, k, rotate(s, R, p, k))
 
@@ -252,7 +252,7 @@ def step_free(m, s, b, i, steps, q, v, a, order):
 def step(m, s, b, i, steps, g, q, v, a, order):
     """The state of link i-1 becomes the state of link i."""
     turn_by_constant(m, s, 0, g, i)
-    interorigin(m, s, g, i, _OFFSET)
+    interorigin(m, s, g, i)
     kind = steps[i, 0]
     if kind == _TURN:
         carry(m, s, 0, order)

@@ -28,8 +28,6 @@ __all__ = [
 COLUMN = FIXED_ROWS
 SLOTS = FIXED_ROWS + 9
 _RESUME, _SAVE = 1, 2
-# Where `Plan.offsets` has a frame's offset in the axes of the step.
-_IN_STEP = 12
 
 
 def scratch_rows(slots: int, columns: int) -> int:
@@ -53,7 +51,7 @@ def start(m, s, b, base, order):
 def frame_state(m, s, offsets, f, order, rows, turned):
     """The state of a frame that is fixed to the present link; its rotation only where it is `turned`."""
     copy_rows(m, s, 0, FRAME, rows)
-    interorigin(m, s, offsets, f, _IN_STEP)
+    interorigin(m, s, offsets, f)
     carry(m, s, FRAME, order)
     if turned:
         turn_by_constant(m, s, FRAME, offsets, f)
