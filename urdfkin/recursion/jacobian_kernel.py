@@ -106,15 +106,9 @@ def jacobian(reference, steps, g, slots, frames, offsets, columns, multipliers, 
     Shapes: base (1 or n, 24), q (n, nq), out (n, frames, 6, nv), s (rows * LANES,).
     """
     n = q.shape[0]
-    whole = n - n % LANES
-    lanes, one = LANES + 0 * n, 1 + 0 * n
-    for b in range(0, whole, LANES):
+    lanes = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    for b in range(0, n, LANES):
         _jacobian_block(
             lanes, b, reference, steps, g, slots, frames, offsets, columns, multipliers, uses, idle,
-            base, q, out, s,
-        )  # fmt: skip
-    for b in range(whole, n):
-        _jacobian_block(
-            one, b, reference, steps, g, slots, frames, offsets, columns, multipliers, uses, idle,
             base, q, out, s,
         )  # fmt: skip

@@ -146,15 +146,9 @@ def jacobian_rate(
     Shapes: base (1 or n, 24), q (n, nq), v (n, nv), out (n, frames, 6, nv), s (rows * LANES,).
     """
     n = q.shape[0]
-    whole = n - n % LANES
-    lanes, one = LANES + 0 * n, 1 + 0 * n
-    for b in range(0, whole, LANES):
+    lanes = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    for b in range(0, n, LANES):
         _rate_block(
             lanes, b, reference, steps, g, slots, frames, offsets, columns, multipliers, uses, idle,
-            base, q, v, out, s,
-        )  # fmt: skip
-    for b in range(whole, n):
-        _rate_block(
-            one, b, reference, steps, g, slots, frames, offsets, columns, multipliers, uses, idle,
             base, q, v, out, s,
         )  # fmt: skip

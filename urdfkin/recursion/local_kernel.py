@@ -246,9 +246,6 @@ def local_motion(order, steps, g, frames, offsets, base, q, v, a, out, s):
     Shapes: base (1 or n, 24), q (n, nq), v and a (n, nv), out (n, frames, 6), s (rows * LANES,).
     """
     n = q.shape[0]
-    whole = n - n % LANES
-    lanes, one = LANES + 0 * n, 1 + 0 * n
-    for b in range(0, whole, LANES):
+    lanes = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    for b in range(0, n, LANES):
         _block(lanes, b, order, steps, g, frames, offsets, base, q, v, a, out, s)
-    for b in range(whole, n):
-        _block(one, b, order, steps, g, frames, offsets, base, q, v, a, out, s)

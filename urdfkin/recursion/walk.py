@@ -1,7 +1,6 @@
 """What both walks share: initial conditions, going on from saved state, frames fixed to a link.
 
-Each kernel works through a batch in blocks of `LANES` configurations; what is left over goes one by one,
-compiled with a single lane.
+Each kernel works through a batch in whole blocks of `LANES` configurations; `batch` cuts and fills them.
 """
 
 from __future__ import annotations

@@ -1,0 +1,74 @@
+"""A batch in whole blocks of lanes, spread over threads.
+
+Kernels take whole blocks. What is left over is filled up with copies of its last configuration, so that
+each configuration is computed by the same instructions wherever it stands, and parts for threads are cut
+between blocks: results are equal for any number of threads, to the last bit.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+from urdfkin.recursion.lanes import LANES
+from urdfkin.tree import FloatArray
+
+#: A batch is spread over threads by itself only from here on: a thread costs some ten microseconds.
+_WORTH_THREADS = 4096
+
+#: Computes rows of inputs into rows of an output: (inputs, out).
+Compute = Callable[[Sequence[FloatArray], FloatArray], None]
+
+
+def default_threads(n: int) -> int:
+    """One thread for each processor this process may use, for batches that are worth it."""
+    return len(os.sched_getaffinity(0)) if n >= _WORTH_THREADS else 1
+
+
+def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> None:
+    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...) for all.
+
+    Args:
+        compute: A kernel for whole blocks; releases the interpreter's lock.
+        inputs: C-contiguous.
+        out: C-contiguous.
+        threads: How many; None for `default_threads`.
+    """
+    n = len(out)
+    whole = n - n % LANES
+    parts = _parts(whole, default_threads(n) if threads is None else threads)
+    if len(parts) > 1:
+        work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
+        for future in work:
+            future.result()
+    elif whole:
+        compute(_rows(inputs, n, 0, whole), out[:whole])
+    if whole < n:
+        filled = np.empty((LANES, *out.shape[1:]))
+        compute([_filled(x) for x in _rows(inputs, n, whole, n)], filled)
+        out[whole:] = filled[: n - whole]
+
+
+def _parts(whole: int, threads: int) -> list[tuple[int, int]]:
+    """Cut `whole` rows into at most `threads` runs of whole blocks."""
+    blocks = whole // LANES
+    edges = [LANES * (blocks * i // threads) for i in range(threads + 1)]
+    return [(a, b) for a, b in pairwise(edges) if a < b]
+
+
+def _rows(inputs: Sequence[FloatArray], n: int, start: int, stop: int) -> list[FloatArray]:
+    return [x[start:stop] if len(x) == n else x for x in inputs]
+
+
+def _filled(x: FloatArray) -> FloatArray:
+    return x if len(x) == 1 else np.concatenate((x, np.repeat(x[-1:], LANES - len(x), axis=0)))
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(len(os.sched_getaffinity(0)), thread_name_prefix="urdfkin")
