@@ -71,7 +71,7 @@ def _jacobian_block(
     order = 0 * b
     rows = start(m, s, b, base, order)
     first = SLOTS + STATE_ROWS * slots
-    f, c = 0, 0
+    f = c = order
     for i in range(-1, steps.shape[0]):
         if i >= 0:
             advance(m, s, b, i, steps, g, q, q, q, order, rows)

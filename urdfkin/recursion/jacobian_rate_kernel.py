@@ -108,7 +108,7 @@ def _rate_block(
     order = 1 + 0 * b
     rows = start(m, s, b, base, order)
     first = SLOTS + STATE_ROWS * slots
-    f, c = 0, 0
+    f = c = 0 * b
     for i in range(-1, steps.shape[0]):
         if i >= 0:
             advance(m, s, b, i, steps, g, q, v, v, order, rows)

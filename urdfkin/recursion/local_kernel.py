@@ -222,7 +222,7 @@ def _write(m, s, b, place, order, out):
 @lane_function
 def _block(m, b, order, steps, g, frames, offsets, base, q, v, a, out, s):
     rows = _start(m, s, b, base, order)
-    f = 0
+    f = 0 * b
     for i in range(-1, steps.shape[0]):
         if i >= 0:
             if steps[i, 1] >= 0:

@@ -49,7 +49,7 @@ def _write_motion(m, s, b, place, order, reference, out):
 @lane_function
 def _motion_block(m, b, order, reference, steps, g, frames, offsets, base, q, v, a, out, s):
     rows = start(m, s, b, base, order)
-    f = 0
+    f = 0 * b
     for i in range(-1, steps.shape[0]):
         if i >= 0:
             advance(m, s, b, i, steps, g, q, v, a, order, rows)

@@ -1,6 +1,8 @@
 """What both walks share: initial conditions, going on from saved state, frames fixed to a link.
 
 Each kernel works through a batch in whole blocks of `LANES` configurations; `batch` cuts and fills them.
+
+`0 * b` is 0 to the compiler but not a literal to Numba, which would compile what it is handed to once more.
 """
 
 from __future__ import annotations
