@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tests.random_chains import configurations, trees
@@ -42,9 +42,16 @@ def agree(table: DHTable, first: FloatArray, second: FloatArray, q: FloatArray) 
     assert (error[:, :3, :3].max(axis=(-1, -2)) <= 4 * radians).all()
 
 
+def taken_for_a_coordinate_axis(tree: KinematicTree) -> bool:
+    """Whether Pinocchio rounds an axis: it takes one within 1e-12 of x, y or z for that."""
+    off = [np.sort(np.abs(joint.axis))[1] for joint in tree.joints]
+    return any(0.0 < x < 1e-10 for x in off)
+
+
 @given(trees(min_joints=1, mimics=False), st.sampled_from(["standard", "modified"]))
 @settings(max_examples=60, deadline=None)
 def test_urdf_to_table_to_urdf_is_one_robot_to_pinocchio(tree: KinematicTree, convention: str) -> None:
+    assume(not taken_for_a_coordinate_axis(tree))
     table = dh_table(tree, "tip", convention=convention)
     q = configurations(tree.nq, 4)
     before = placements(to_urdf(tree), table.joint_names, q, "tip")

@@ -16,7 +16,8 @@ from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.chain import FrameChain, chain
 from urdfkin.dh.make import dh_table
-from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.row import Convention
+from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.tree import FloatArray, KinematicTree
 

@@ -11,7 +11,8 @@ from tests.oracle import TreeOracle
 from tests.random_chains import configurations, trees
 from urdfkin.chain import chain
 from urdfkin.dh.make import dh_table
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.row import Convention, DHRow
+from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.tree import FloatArray, JointKind, KinematicTree, Mimic
 

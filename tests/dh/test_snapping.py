@@ -60,7 +60,7 @@ def test_no_configuration_moves_the_tip_by_more_than_declared(
     q = configurations(tree.nq, 40, seed) * 2.0  # far beyond the limits too
     metres, radians = worst(table, tree, q)
     allowed_metres, allowed_radians = table.tolerance(q)
-    assert (metres <= allowed_metres).all()
+    assert (metres <= allowed_metres + 100 * EPS).all()
     assert (radians <= allowed_radians).all()
 
 
@@ -72,7 +72,9 @@ def test_snapping_any_chain_keeps_its_word(tree: KinematicTree, tolerance: float
     own = chain(tree, "tip").coupling.select(tree, q)
     metres, radians = worst(table, tree, own)
     allowed_metres, allowed_radians = table.tolerance(own)
-    assert (metres <= allowed_metres).all()
+    # Offsets of the URDF that cancel are in no cell, but were added up and rounded on the way.
+    rounding = 20 * EPS * (1 + len(tree.joints)) * chain(tree, "tip").lengths.sum()
+    assert (metres <= allowed_metres + rounding).all()
     assert (radians <= allowed_radians).all()
 
 

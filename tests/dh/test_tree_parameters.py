@@ -42,13 +42,13 @@ def test_every_link_is_placed_as_pinocchio_places_it(tree: KinematicTree) -> Non
     for j, link in enumerate(tree.links[1:]):
         error = np.abs(found[:, j] - oracle.placement(q, link, "l0"))
         assert error[:, :3, :3].max() <= EPS * table.roundings
-        assert (error[:, :3, 3].max(axis=-1) <= EPS * table.roundings * (reach[:, j] + 1e-12) * 4).all()
+        assert (error[:, :3, 3].max(axis=-1) <= EPS * table.roundings * reach[:, j] + 1e-300).all()
 
 
 @given(branching())
 @settings(max_examples=100, deadline=None)
 def test_no_length_exceeds_ten_times_the_reach(tree: KinematicTree) -> None:
-    reach = sum(float(np.linalg.norm(joint.T_parent_joint[:3, 3])) for joint in tree.joints)
+    reach = sum(math.hypot(*joint.T_parent_joint[:3, 3]) for joint in tree.joints)
     for row in tree_parameters(tree).rows:
         assert max(abs(row.b), abs(row.d), abs(row.r)) <= 10.0 * reach
 

@@ -3,9 +3,10 @@
 from urdfkin.dh.export import FORMATS, export
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.read import read_table
+from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.rows import table_from_mapping, table_from_rows
 from urdfkin.dh.statement import SnapChange, SnapStatement
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units, units_of
 
 __all__ = [

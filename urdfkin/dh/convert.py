@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from urdfkin.dh.elements import as_step
-from urdfkin.dh.table import Convention, DHTable, convention_of
+from urdfkin.dh.row import Convention, convention_of
+from urdfkin.dh.table import DHTable
 from urdfkin.tree import FloatArray
 
 

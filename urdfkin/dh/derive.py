@@ -27,7 +27,8 @@ from urdfkin.dh.normals import (
     cleaned_length,
     step_between,
 )
-from urdfkin.dh.table import Convention, DHRow, DHTable, convention_of
+from urdfkin.dh.row import Convention, DHRow, convention_of
+from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.tree import FloatArray
 

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.row import Convention
+from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.tree import FloatArray
 

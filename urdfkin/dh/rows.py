@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.table import DHRow, DHTable, convention_of
+from urdfkin.dh.row import DHRow, convention_of
+from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Angles, Lengths, Units, read_number, units_of
 from urdfkin.errors import InputError
 from urdfkin.tree import FloatArray, JointKind, Limit, Mimic

@@ -16,8 +16,9 @@ import numpy as np
 
 from urdfkin.chain import ChainJoint, FrameChain, chain, steps_between
 from urdfkin.dh.elements import EPS, nearest_twelfth, wrapped
+from urdfkin.dh.row import Convention
 from urdfkin.dh.statement import SnapChange, SnapStatement
-from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.rotation.euler import coordinate_rotation
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen

@@ -13,7 +13,8 @@ from typing import TypeGuard
 
 import numpy as np
 
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.row import Convention, DHRow
+from urdfkin.dh.table import DHTable
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
 
 #: A sliding joint that no file bounds: a kilometre either way, m and m/s and N.

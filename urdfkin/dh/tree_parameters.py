@@ -15,6 +15,7 @@ would need offsets of kilometres.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,7 +27,7 @@ from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.dh.normals import NearParallel, Step, cleaned_angle, cleaned_length, step_between
 from urdfkin.errors import InputError
 from urdfkin.rotation import axis_aligning
-from urdfkin.tree import FloatArray, JointKind, KinematicTree
+from urdfkin.tree import FloatArray, JointKind, KinematicTree, frozen
 
 _SIGMA = {
     JointKind.REVOLUTE: 0,
@@ -81,6 +82,7 @@ class TreeParameters:
         robot: The robot's name.
         root: The root link.
         rows: One for each joint, fixed ones too, in the tree's order.
+        ways: (joints,) metres: the URDF's own way from the root to each joint, all offsets added up.
         T_frame_link: (joints, 4, 4) pose of the URDF's link frame in the row's frame: a turn and a shift
             that make z the joint's axis and x the common normal.
     """
@@ -88,6 +90,7 @@ class TreeParameters:
     robot: str
     root: str
     rows: tuple[TreeRow, ...]
+    ways: FloatArray
     T_frame_link: FloatArray
 
     @cached_property
@@ -101,14 +104,18 @@ class TreeParameters:
         return 8.0 * (2.0 + max((len(self._way(j)) for j in range(len(self.rows))), default=0))
 
     def reach(self, q: FloatArray) -> FloatArray:
-        """(..., joints) metres: the length of the way from the root to each row's frame at `q`."""
+        """(..., joints) metres: the way from the root to each link at `q`, the URDF's or the table's."""
         values = np.abs(self._values(q))
         own = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
         own = own + np.where([row.sigma == 1 for row in self.rows], values, 0.0)
         own = own + np.linalg.norm(self.T_frame_link[:, :3, 3], axis=-1)
+        slides = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
         reach = np.zeros((*q.shape[:-1], len(self.rows)))
         for j in range(len(self.rows)):
-            reach[..., j] = own[..., self._way(j)].sum(axis=-1)
+            way = self._way(j)
+            reach[..., j] = np.maximum(
+                own[..., way].sum(axis=-1), self.ways[j] + slides[..., way].sum(axis=-1)
+            )
         return reach
 
     def _way(self, j: int) -> list[int]:
@@ -169,11 +176,14 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
             )
     links = _links(tree)
     steps, own = _steps(tree, links)
-    rows = tuple(_row(tree, links[j], j, steps[j], own) for j in range(len(tree.joints)))
+    ways = _ways(tree)
+    rows = tuple(
+        _row(tree, j, links[j].antecedent, steps[j], own, way=ways[j]) for j in range(len(tree.joints))
+    )
     poses = [
         np.linalg.inv(along_axis(*own.get(j, (0.0, 0.0)))) @ links[j].T_link_axis.T for j in range(len(rows))
     ]
-    return TreeParameters(tree.name, tree.links[0], rows, np.array(poses).reshape(-1, 4, 4))
+    return TreeParameters(tree.name, tree.links[0], rows, frozen(ways), frozen(np.reshape(poses, (-1, 4, 4))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,16 +216,16 @@ def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[in
 
     The first moving child of a link defines its x; a link without one keeps the x that makes theta zero.
     """
-    reach = _reach(tree)
+    ways = _ways(tree)
     steps, own = list[Step](), {-1: (0.0, 0.0)}
-    for link, joint in zip(links, tree.joints, strict=True):
+    for link, joint, way in zip(links, tree.joints, ways, strict=True):
         i = link.antecedent
         moving = joint.kind.has_axis
         defines = moving and i not in own
         before = steps[i].phi_next if i >= 0 else 0.0
         known = own.get(i, (-before, 0.0))[0]
         start = -before if defines else known
-        step = step_between(link.T_antecedent_axis, reach, NearParallel.HAYATI, start)
+        step = step_between(link.T_antecedent_axis, way, NearParallel.HAYATI, start)
         if abs(cleaned_angle(step.phi - start)) > np.pi / 2.0 + RIGHT_ANGLE_SLACK:
             step = step.turned()
         if defines:
@@ -228,10 +238,10 @@ def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[in
 
 
 def _row(
-    tree: KinematicTree, link: _Link, j: int, step: Step, own: dict[int, tuple[float, float]]
+    tree: KinematicTree, j: int, i: int, step: Step, own: dict[int, tuple[float, float]], *, way: float
 ) -> TreeRow:
-    reach = _reach(tree)
-    joint, i = tree.joints[j], link.antecedent
+    """The row of joint j with antecedent i."""
+    joint = tree.joints[j]
     turn, shift = own.get(i, (0.0, 0.0))
     own_turn, own_shift = own.get(j, (0.0, 0.0))
     rule = joint.mimic
@@ -241,21 +251,21 @@ def _row(
         antecedent=i,
         sigma=_SIGMA[joint.kind],
         gamma=cleaned_angle(step.phi - turn),
-        b=cleaned_length(step.delta - shift, reach),
+        b=cleaned_length(step.delta - shift, way),
         alpha=step.alpha + 0.0,
         d=step.a + 0.0,
         beta=step.beta + 0.0,
         theta=cleaned_angle(step.phi_next + own_turn),
-        r=cleaned_length(step.delta_next + own_shift, reach),
+        r=cleaned_length(step.delta_next + own_shift, way),
         leader=rule.leader if rule else joint.name,
         multiplier=rule.multiplier if rule else 1.0,
         offset=rule.offset if rule else 0.0,
     )
 
 
-def _reach(tree: KinematicTree) -> float:
-    """Metres: the longest way from the root to a link."""
+def _ways(tree: KinematicTree) -> list[float]:
+    """Metres from the root to each joint's origin, all offsets on the way added up."""
     ways = [0.0]
     for joint in tree.joints:
-        ways.append(ways[joint.parent] + float(np.linalg.norm(joint.T_parent_joint[:3, 3])))
-    return max(ways)
+        ways.append(ways[joint.parent] + math.hypot(*joint.T_parent_joint[:3, 3]))
+    return ways[1:]

@@ -12,8 +12,9 @@ from urdfkin.dh.compare.align import Alignment, align
 from urdfkin.dh.compare.fit import CELLS, Model, columns, fit_cells, fit_freedoms
 from urdfkin.dh.convert import to_standard
 from urdfkin.dh.elements import EPS
+from urdfkin.dh.row import Convention
 from urdfkin.dh.snapping import rotation_angle
-from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.tree import FloatArray, JointKind
 

@@ -8,7 +8,7 @@ from urdfkin.dh.compare.compare import Comparison
 from urdfkin.dh.elements import nearest_twelfth
 from urdfkin.dh.export.terminal import aligned
 from urdfkin.dh.export.words import added, pose_lines
-from urdfkin.dh.table import DHRow
+from urdfkin.dh.row import DHRow
 from urdfkin.dh.units import Units
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 
 from urdfkin.dh.export.words import at_most, cells, is_identity
-from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.row import Convention
+from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Angles, Units
 from urdfkin.tree import FloatArray
 

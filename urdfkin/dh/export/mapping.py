@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from urdfkin.dh.table import DHRow, DHTable
+from urdfkin.dh.row import DHRow
+from urdfkin.dh.table import DHTable
 
 
 def to_mapping(table: DHTable) -> dict[str, Any]:

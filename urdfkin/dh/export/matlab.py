@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from urdfkin.dh.export.code import header, identifier, numbers, row_numbers
-from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.row import Convention
+from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.tree import FloatArray
 

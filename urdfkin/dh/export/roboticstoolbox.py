@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from urdfkin.dh.export.code import header, is_coupled, numbers, plain
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.row import Convention, DHRow
+from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
 

@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.row import Convention, DHRow
+from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.tree import FloatArray
 
