@@ -76,7 +76,7 @@ class Robot(Manipulator, Tables):
         self.mimic = mimic
         self.root_joint = root_joint
         self.findings = findings
-        self.base_frame = base_frame or tree.links[0]
+        self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self.unverifiable = unverifiable
         self.ledger = Ledger()
@@ -145,7 +145,7 @@ class Robot(Manipulator, Tables):
             leaf = max(
                 self.tree.leaves(), key=lambda link: sum(self.tree.joints[i].nv for i in self.tree.path(link))
             )
-            self._tip_frame = self.tree.links[leaf]
+            self._tip_frame = self.tree.frame_name(leaf)
         return self._tip_frame
 
     def neutral(self) -> FloatArray:
