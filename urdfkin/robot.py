@@ -48,7 +48,7 @@ class Robot(Manipulator, Tables):
         urdf: The URDF text that Pinocchio checks against.
         source: The words that name it on a command line, for reproducing lines.
         verify: Whether results are checked unless a call says otherwise.
-        mimic: As it was given to `load`.
+        mimic: As it was given to `load`; False too where the catalogue turns it off.
         root_joint: As it was given to `load`.
         findings: What there was to say about the URDF; no errors.
         unverifiable: Why Pinocchio cannot check this robot; None if it can, as far as is known.
