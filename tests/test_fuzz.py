@@ -21,6 +21,7 @@ def test_a_mutant_depends_on_seed_and_number_alone() -> None:
     assert mutants != [mutant(1, number, robots) for number in range(50)]
 
 
+@pytest.mark.slow
 def test_every_mutator_is_used_and_nearly_all_change_something() -> None:
     robots = fuzz.files()
     originals = {path.stem: path.read_bytes() for path in robots}

@@ -55,6 +55,7 @@ def test_a_name_of_a_link_and_of_a_joint_elsewhere_must_be_told_apart() -> None:
     with pytest.raises(InputError, match=r"say 'link:b' or 'joint:b'"):
         tree.frame_link("b")
     assert (tree.frame_link("link:b"), tree.frame_link("joint:b")) == (2, 1)
+    assert [tree.frame_name(link) for link in range(3)] == ["a", "c", "link:b"]
 
 
 def test_the_path_leads_from_the_root_outwards(hand: KinematicTree) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, RangeError
 from urdfkin.recursion.base import STILL_STATE, BaseMotion
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
@@ -115,7 +115,7 @@ class Call:
         k, f = comparison.index
         bound = Bound(*(np.broadcast_to(x, ours.shape)[k, f] for x in (bound.scale, bound.k)))
         if not (np.isfinite(bound.scale).all() and np.isfinite(theirs[k, f]).all()):
-            raise InputError(
+            raise RangeError(
                 f"the {quantity} of {self.frames[f]} leaves the range of double precision",
                 where=f"sample {list(self._index(k))}" if self.shape else None,
                 remedy="give smaller numbers",

@@ -57,6 +57,10 @@ class InputError(UrdfkinError, ValueError):
     """A value handed to urdfkin cannot be used: wrong length, not finite, not a rotation, ..."""
 
 
+class RangeError(InputError):
+    """Numbers so large that what is computed from them leaves the range of double precision."""
+
+
 class UnknownNameError(UrdfkinError, LookupError):
     """A name that does not exist; the message offers the nearest ones that do.
 

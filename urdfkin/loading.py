@@ -60,7 +60,7 @@ def load(
         text.data.decode("utf-8-sig"),
         source=words,
         verify=verify,
-        mimic=given_mimic,
+        mimic=given_mimic if mimic else False,
         root_joint=root_joint,
         findings=findings,
         unverifiable=_unverifiable(findings),

@@ -48,7 +48,7 @@ class Robot(Manipulator, Tables):
         urdf: The URDF text that Pinocchio checks against.
         source: The words that name it on a command line, for reproducing lines.
         verify: Whether results are checked unless a call says otherwise.
-        mimic: As it was given to `load`.
+        mimic: As it was given to `load`; False too where the catalogue turns it off.
         root_joint: As it was given to `load`.
         findings: What there was to say about the URDF; no errors.
         unverifiable: Why Pinocchio cannot check this robot; None if it can, as far as is known.
@@ -76,7 +76,7 @@ class Robot(Manipulator, Tables):
         self.mimic = mimic
         self.root_joint = root_joint
         self.findings = findings
-        self.base_frame = base_frame or tree.links[0]
+        self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self.unverifiable = unverifiable
         self.ledger = Ledger()
@@ -145,7 +145,7 @@ class Robot(Manipulator, Tables):
             leaf = max(
                 self.tree.leaves(), key=lambda link: sum(self.tree.joints[i].nv for i in self.tree.path(link))
             )
-            self._tip_frame = self.tree.links[leaf]
+            self._tip_frame = self.tree.frame_name(leaf)
         return self._tip_frame
 
     def neutral(self) -> FloatArray:

@@ -284,6 +284,12 @@ class KinematicTree:
             )
         return joint + 1
 
+    def frame_name(self, link: int) -> str:
+        """A name by which `frame_link` finds a link: its own, or `link:NAME` where a joint has it too."""
+        name = self.links[link]
+        joint = self._joint_index.get(name)
+        return name if joint is None or joint + 1 == link else f"link:{name}"
+
     # -- walks ---------------------------------------------------------------------------------------
 
     def path(self, link: int) -> tuple[int, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 
 import urdfkin
 from urdfkin.diagnostics import Finding, Severity, UrdfError
-from urdfkin.errors import UrdfkinError
+from urdfkin.errors import RangeError, UrdfkinError
 from urdfkin.robot import Robot
 
 #: Findings about sizes that arithmetic cannot carry: a result that is no number is no surprise after them.
@@ -70,6 +70,9 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
         ]
     except urdfkin.VerificationError as error:
         word = "too large to compute, with a finding" if big else "disagrees with Pinocchio"
+        return Outcome(word, str(error))
+    except RangeError as error:
+        word = "too large to compute, with a finding" if big else "a result that is no number"
         return Outcome(word, str(error))
     certified = robot.certificate()
     if not all(np.isfinite(result).all() for result in results):

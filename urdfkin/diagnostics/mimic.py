@@ -82,7 +82,7 @@ class _Judge:
         nearest = self.report.nearest(mimic.leader, self.joints)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.obeyed:
-            remedy += " (with mimic off the joint moves freely)"
+            remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
         self.add(codes.MIMIC_UNKNOWN, "the joint to follow does not exist", mimic, "joint", remedy)
 
     def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:

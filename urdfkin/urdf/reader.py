@@ -118,7 +118,7 @@ def _resolve(joint: yourdf.Joint, joints: dict[str, yourdf.Joint]) -> Mimic:
                 "mimic leader",
                 rule.joint,
                 joints,
-                where=f"joint {follower.name} (load with mimic off to ignore it)",
+                where=f"joint {follower.name} (mimic=False, --no-mimic, lets it move freely)",
             )
         if rule.joint in met:
             raise InputError("mimic joints follow each other in a circle", where=f"joint {joint.name}")

@@ -3,6 +3,10 @@
 Replacing every vector of 7.127 to 7.130 by its length and every minus by a plus gives numbers that no
 intermediate value can exceed. Rounding errors are proportional to them, not to the result, which may be
 small because large terms cancel.
+
+One term is Pinocchio's alone: where 7.129 has v_i w_{i-1} x z it has v_i w_i x z. The joint's own share of
+w_i is parallel to z and adds nothing but rounding, v_i^2 |z x z|, which fast joints about an axis askew do
+show: the scale of alpha counts it.
 """
 
 from __future__ import annotations
@@ -72,7 +76,8 @@ def _step(
         if kind == Motion.TURN:
             p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i])
             follows = (multiplier, constant) != (1.0, 0.0)
-            return [p, w + rate, vel, alpha + rate_2 + rate * w, acc, angles + own if follows else angles]
+            turned = alpha + rate_2 + rate * (w + rate)
+            return [p, w + rate, vel, turned, acc, angles + own if follows else angles]
         p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i] + own)
         return [p, w, vel + rate, alpha, acc + rate_2 + 2.0 * rate * w, angles]
     slides, turns = (2, 1) if kind == Motion.PLANAR else (3, 3)
@@ -80,4 +85,4 @@ def _step(
     u, o = _norm(v[:, rate_at : rate_at + slides]), _norm(v[:, rate_at + slides : rate_at + slides + turns])
     u_rate = _norm(a[:, rate_at : rate_at + slides])
     o_rate = _norm(a[:, rate_at + slides : rate_at + slides + turns])
-    return [p, w + o, vel + u, alpha + o_rate + w * o, acc + u_rate + (2.0 * w + o) * u, angles]
+    return [p, w + o, vel + u, alpha + o_rate + (w + o) * o, acc + u_rate + (2.0 * w + o) * u, angles]

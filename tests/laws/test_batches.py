@@ -1,0 +1,194 @@
+"""A batch is its samples, whatever its shape, its memory and the thread that computes it."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.laws.subjects import EPS, NAMES, robot_of, state
+from urdfkin import load
+from urdfkin.errors import InputError
+from urdfkin.recursion.base import BaseMotion
+from urdfkin.robot import Robot
+from urdfkin.tree import FloatArray
+
+Compute = Callable[[Robot, FloatArray, FloatArray, FloatArray], FloatArray]
+
+QUANTITIES: dict[str, Compute] = {
+    "placement": lambda robot, q, v, a: robot.placement(q, robot.tip_frame),
+    "velocity": lambda robot, q, v, a: robot.velocity(q, v, robot.tip_frame),
+    "jacobian": lambda robot, q, v, a: robot.jacobian(q, robot.tip_frame, "local"),
+    "jacobian_rate": lambda robot, q, v, a: robot.jacobian_rate(q, v, robot.tip_frame, "world"),
+    "acceleration": lambda robot, q, v, a: robot.acceleration(q, v, a, robot.tip_frame, "world"),
+    "placements": lambda robot, q, v, a: robot.placements(q),
+    "velocities": lambda robot, q, v, a: robot.velocities(q, v),
+    "jacobians": lambda robot, q, v, a: robot.jacobians(q),
+    "accelerations": lambda robot, q, v, a: robot.accelerations(q, v, a),
+}
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def robot(request: pytest.FixtureRequest) -> Robot:
+    return robot_of(request.param)
+
+
+def agree(one: FloatArray, other: FloatArray) -> bool:
+    """Fused multiply-adds may be used in lanes and not in single samples; nothing else may differ."""
+    if one.shape != other.shape:
+        return False
+    return bool(np.abs(one - other).max(initial=0.0) <= 500 * EPS * (1.0 + np.abs(other).max(initial=0.0)))
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_a_batch_equals_a_loop_over_its_samples(robot: Robot, quantity: str) -> None:
+    compute = QUANTITIES[quantity]
+    q, v, a = state(robot, 39, 1)
+    batch = compute(robot, q, v, a)
+    loop = np.array([compute(robot, *row) for row in zip(q, v, a, strict=True)])
+    assert agree(batch, loop)
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (0,), (5,), (16,), (2, 0, 3), (2, 3), (1, 4, 1, 5)])
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_any_leading_shape_comes_back(quantity: str, shape: tuple[int, ...]) -> None:
+    robot = robot_of("tree_3")
+    compute = QUANTITIES[quantity]
+    n = int(np.prod(shape))
+    q, v, a = state(robot, n, 2)
+    flat = compute(robot, q, v, a)
+    shaped = compute(robot, *(x.reshape(*shape, x.shape[1]) for x in (q, v, a)))
+    assert agree(shaped, flat.reshape(*shape, *flat.shape[1:]))
+    assert shaped.flags.c_contiguous
+    assert shaped.dtype == np.float64
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(st.data())
+def test_q_v_a_and_base_broadcast_as_numpy_does(data: st.DataObject) -> None:
+    robot = load("panda", verify=False)
+    full = data.draw(st.lists(st.integers(0, 4), max_size=3).map(tuple), label="shape")
+    shapes = [_thinned(data, full) for _ in range(6)]
+    whole = np.broadcast_shapes(*shapes)
+    generator = np.random.default_rng(3)
+    q, v, a = (generator.normal(size=(*shape, robot.nv)) for shape in shapes[:3])
+    T = np.broadcast_to(np.eye(4), (*shapes[3], 4, 4)).copy()
+    T[..., :3, 3] = generator.normal(size=(*shapes[3], 3))
+    base = BaseMotion(T, *(generator.normal(size=(*shape, 6)) for shape in shapes[4:]))
+    result = robot.acceleration(q, v, a, "panda_hand", base=base)
+    assert result.shape == (*whole, 6)
+    q, v, a = (np.broadcast_to(x, (*whole, robot.nv)) for x in (q, v, a))
+    fields = ((T, (4, 4)), (base.velocity, (6,)), (base.acceleration, (6,)))
+    same = BaseMotion(*(np.broadcast_to(x, (*whole, *own)) for x, own in fields))
+    assert agree(result, robot.acceleration(q, v, a, "panda_hand", base=same))
+
+
+def _thinned(data: st.DataObject, shape: tuple[int, ...]) -> tuple[int, ...]:
+    """The shape with some axes 1 and some leading ones missing."""
+    cut = data.draw(st.integers(0, len(shape)))
+    return tuple(1 if data.draw(st.booleans()) else size for size in shape[cut:])
+
+
+def test_memory_of_any_layout_and_type_is_read_right() -> None:
+    robot = load("panda")
+    q = robot.sample(12, 4)
+    straight = robot.jacobian(q, "panda_hand")
+    wide = np.zeros((24, 16))
+    wide[::2, ::2] = q
+    read_only = q.copy()
+    read_only.setflags(write=False)
+    for other in (
+        np.asfortranarray(q),
+        wide[::2, ::2],
+        q[::-1][::-1],
+        read_only,
+        q.tolist(),
+        q.astype(">f8"),
+    ):
+        assert (robot.jacobian(other, "panda_hand") == straight).all()
+    single = q.astype(np.float32)
+    assert (robot.jacobian(single, "panda_hand") == robot.jacobian(single.astype(float), "panda_hand")).all()
+    whole = np.zeros(8, dtype=np.int64)
+    assert (robot.jacobian(whole, "panda_hand") == robot.jacobian(np.zeros(8), "panda_hand")).all()
+
+
+def test_inputs_are_left_as_they_were_and_results_belong_to_the_caller() -> None:
+    robot = load("ur5")
+    q = robot.sample(4, 5)
+    before = q.copy()
+    first = robot.jacobian(q, "tool0")
+    first[...] = 7.0
+    assert (q == before).all()
+    assert not (robot.jacobian(q, "tool0") == 7.0).any()
+
+
+@pytest.mark.parametrize("shape", [(), (3,), (2, 17)])
+def test_out_is_written_and_handed_back(shape: tuple[int, ...]) -> None:
+    robot = load("panda")
+    n = int(np.prod(shape))
+    q, v, a = (x.reshape(*shape, 8) for x in state(robot, n, 6))
+    frame = "panda_hand"
+    calls: list[tuple[tuple[int, ...], Callable[[FloatArray | None], FloatArray]]] = [
+        ((4, 4), lambda out: robot.placement(q, frame, out=out)),
+        ((6,), lambda out: robot.velocity(q, v, frame, out=out)),
+        ((6, 8), lambda out: robot.jacobian(q, frame, out=out)),
+        ((6, 8), lambda out: robot.jacobian_rate(q, v, frame, out=out)),
+        ((6,), lambda out: robot.acceleration(q, v, a, frame, out=out)),
+    ]
+    for own, call in calls:
+        out = np.full((*shape, *own), np.nan)
+        assert call(out) is out
+        assert (out == call(None)).all()
+
+
+def test_an_out_that_cannot_be_used_is_refused_and_left_alone() -> None:
+    robot = load("panda")
+    q = robot.sample(3, 7)
+    read_only = np.zeros((3, 6, 8))
+    read_only.setflags(write=False)
+    for out in (
+        np.zeros((3, 6, 9)),
+        np.zeros((6, 8)),
+        np.zeros((3, 6, 8), dtype=np.float32),
+        np.zeros((3, 6, 8), order="F"),
+        np.zeros((3, 6, 16))[..., ::2],
+        read_only,
+        [[0.0]],
+    ):
+        with pytest.raises(InputError, match=r"out must be a writable C-contiguous .*\(3, 6, 8\)"):
+            robot.jacobian(q, "panda_hand", out=out)  # type: ignore[arg-type]
+    six = load("ur5")
+    v = np.ones((3, 6))
+    with pytest.raises(InputError, match="share memory"):
+        six.velocity(six.sample(3, 8), v, "tool0", out=v)
+    assert (v == 1.0).all()
+
+
+def test_threads_get_what_a_single_one_gets() -> None:
+    robot = load("a1")
+    batches = [state(robot, n, n) for n in (1, 5, 16, 40, 100, 3, 64, 33) * 3]
+    frames = robot.link_names
+
+    def work(k: int) -> list[FloatArray]:
+        q, v, a = batches[k]
+        frame = frames[k % len(frames)]
+        return [
+            robot.placement(q, frame),
+            robot.velocity(q, v, frame, "local"),
+            robot.jacobian(q, frame),
+            robot.jacobian_rate(q, v, frame, "world"),
+            robot.acceleration(q, v, a, frame),
+        ]
+
+    serial = [work(k) for k in range(len(batches))]
+    fresh = load("a1")
+    robot = fresh  # nothing prepared: plans and Pinocchio's models are made by whichever thread comes first
+    with ThreadPoolExecutor(8) as pool:
+        threaded = list(pool.map(work, range(len(batches))))
+    for one, other in zip(serial, threaded, strict=True):
+        for x, y in zip(one, other, strict=True):
+            assert (x == y).all()
+    lines = {str(line.quantity): line.checked for line in fresh.certificate().lines}
+    assert set(lines.values()) == {sum(len(q) for q, _, _ in batches)}

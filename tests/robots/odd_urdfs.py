@@ -1,0 +1,212 @@
+"""Robots that no catalogue has, as URDF text: every joint kind everywhere, in odd company.
+
+Numbers are printed with six digits, as CAD exporters do: angles are nearly, not quite, right ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+_ODD_ANGLES = (0.0, 1.5708, -1.5708, 3.14159, 0.785398, -0.001047, 1e-6, 2.0944)
+
+
+@dataclass
+class Urdf:
+    """Builds a URDF joint by joint; link `links[0]` is the root."""
+
+    name: str
+    seed: int
+    links: list[str] = field(default_factory=lambda: ["base"])
+    joints: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._rng = np.random.default_rng(self.seed)
+
+    def add(
+        self,
+        kind: str,
+        parent: int | None = None,
+        *,
+        joint: str = "",
+        link: str = "",
+        mimic: tuple[str, float | None, float | None] | None = None,
+        axis: str | None = None,
+        origin: str | None = None,
+    ) -> str:
+        """Hang a joint and its child link from link `parent` (the last one if None); returns its name."""
+        number = len(self.joints)
+        joint, link = joint or f"joint_{number}", link or f"link_{number}"
+        parts = [
+            f"<parent link={quoteattr(self.links[-1 if parent is None else parent])}/>",
+            f"<child link={quoteattr(link)}/>",
+            self._origin() if origin is None else origin,
+        ]
+        if kind in ("revolute", "continuous", "prismatic", "planar"):
+            parts.append(self._axis(kind) if axis is None else axis)
+        if kind in ("revolute", "prismatic"):
+            reach = 0.6 if kind == "prismatic" else 2.5
+            parts.append(f'<limit lower="{-reach}" upper="{reach}" effort="1" velocity="2"/>')
+        if mimic is not None:
+            leader, multiplier, offset = mimic
+            given = "" if multiplier is None else f' multiplier="{multiplier!r}"'
+            given += "" if offset is None else f' offset="{offset!r}"'
+            parts.append(f"<mimic joint={quoteattr(leader)}{given}/>")
+        self.joints.append(f"<joint name={quoteattr(joint)} type={quoteattr(kind)}>{''.join(parts)}</joint>")
+        self.links.append(link)
+        return joint
+
+    def _origin(self) -> str:
+        rpy = self._rng.choice(_ODD_ANGLES, 3)
+        xyz = self._rng.uniform(-0.4, 0.4, 3)
+        return f'<origin xyz="{_numbers(xyz)}" rpy="{_numbers(rpy)}"/>'
+
+    def _axis(self, kind: str) -> str:
+        if kind == "planar":  # Pinocchio's planar joint moves in the joint frame's x-y plane
+            return '<axis xyz="0 0 1"/>'
+        plain = self._rng.random() < 0.3
+        axis = np.eye(3)[self._rng.integers(3)] * self._rng.choice((-1.0, 1.0)) if plain else None
+        return f'<axis xyz="{_numbers(self._rng.normal(size=3) if axis is None else axis)}"/>'
+
+    @property
+    def text(self) -> str:
+        """The whole document."""
+        links = "".join(f"<link name={quoteattr(link)}/>" for link in self.links)
+        return f"<robot name={quoteattr(self.name)}>{links}{''.join(self.joints)}</robot>"
+
+
+def _numbers(values: Sequence[float] | np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:
+    return " ".join(f"{value:.6g}" for value in values)
+
+
+def _chain(name: str, seed: int, kinds: Sequence[str]) -> str:
+    urdf = Urdf(name, seed)
+    for kind in kinds:
+        urdf.add(kind)
+    return urdf.text
+
+
+def _hand(name: str, seed: int, *, sliding: bool = False) -> str:
+    """Five fingers of eight joints: 40 joints, of which 10 lead and 30 follow, with odd rules."""
+    urdf, rng = Urdf(name, seed), np.random.default_rng(seed)
+    for finger in range(5):
+        parent, leaders = 0, list[str]()
+        for phalanx in range(8):
+            kind = "prismatic" if sliding and phalanx % 3 == 2 else ("revolute", "continuous")[phalanx % 2]
+            leads = phalanx in (0, 3)
+            rule = (
+                None
+                if leads
+                else (leaders[-1], float(rng.normal()), float(rng.normal()) if phalanx % 2 else None)
+            )
+            made = urdf.add(kind, parent, joint=f"f{finger}_{phalanx}", mimic=rule)
+            parent = len(urdf.links) - 1
+            if leads:
+                leaders.append(made)
+    return urdf.text
+
+
+def _random_tree(seed: int) -> str:
+    """Fourteen joints of every kind hung anywhere, some following one that came before."""
+    urdf, rng = Urdf(f"tree_{seed}", seed), np.random.default_rng(seed + 1000)
+    kinds = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
+    leaders: list[str] = []
+    for _ in range(14):
+        kind = str(rng.choice(kinds, p=(0.3, 0.15, 0.2, 0.15, 0.1, 0.1)))
+        single = kind in ("revolute", "continuous", "prismatic")
+        rule = None
+        if single and leaders and rng.random() < 0.3:
+            rule = (str(rng.choice(leaders)), float(rng.normal()), float(rng.normal()))
+        made = urdf.add(kind, int(rng.integers(len(urdf.links))), mimic=rule)
+        if single and rule is None:
+            leaders.append(made)
+    return urdf.text
+
+
+def _names() -> str:
+    urdf = Urdf("Roboter \u00e4\u00f6\u00fc \u65e5\u672c\u8a9e", 11)
+    for name in ("z\u00fcrich", "\u03b8\u2081", "\u95a2\u7bc0", "Arm", "arm", "a b", "x'y", "q&a", "10", "9"):
+        urdf.add("revolute", 0 if len(name) == 2 else None, joint=name, link=f"L {name}")
+    return urdf.text
+
+
+def _same_names() -> str:
+    """Joint `wrist` carries link `wrist`; joint `elbow` and link `elbow` are two different places."""
+    urdf = Urdf("same", 12)
+    urdf.add("revolute", joint="wrist", link="wrist")
+    urdf.add("revolute", joint="elbow", link="forearm")
+    urdf.add("prismatic", joint="slide", link="elbow")
+    return urdf.text
+
+
+def _default_everything() -> str:
+    """Nothing said that need not be: no origin, no axis, no rpy, no limits, axes that are no unit vectors."""
+    urdf = Urdf("terse", 13)
+    urdf.add("continuous", axis="", origin="")
+    urdf.add("continuous", axis='<axis xyz="0 3 4"/>', origin='<origin xyz="0.1 0.2 0.3"/>')
+    urdf.add("prismatic", axis='<axis xyz="0 0 2"/>', origin='<origin rpy="0.1 0.2 0.3"/>')
+    urdf.add("prismatic", axis='<axis xyz="-0.001 0 0.0005"/>', origin="")
+    return urdf.text
+
+
+def _followers_of_followers() -> str:
+    urdf = Urdf("relay", 14)
+    first = urdf.add("revolute", joint="z_leader")
+    second = urdf.add("revolute", joint="a_follower", mimic=(first, -0.5, 0.1))
+    third = urdf.add("continuous", joint="m_follower", mimic=(second, 3.0, None))
+    urdf.add("prismatic", joint="b_follower", mimic=(third, -0.02, 0.3))
+    return urdf.text
+
+
+def _sizes() -> str:
+    """A kilometre, a micrometre and half a turn of slide one after the other."""
+    urdf = Urdf("sizes", 15)
+    urdf.add("revolute", origin='<origin xyz="1000 -2000 500" rpy="1.5708 0 0"/>')
+    urdf.add("revolute", origin='<origin xyz="1e-06 2e-06 0" rpy="0 1e-06 0"/>')
+    urdf.add("prismatic", origin='<origin xyz="-1000 2000 -500" rpy="0.5 -1.5708 3.14159"/>')
+    urdf.add("revolute", origin='<origin xyz="0 0 0" rpy="100 -200 300"/>')
+    return urdf.text
+
+
+_SIX = ("revolute",) * 6
+
+_MAKERS: dict[str, Callable[[], str]] = {
+    "planar_root": lambda: _chain("planar_root", 1, ("planar", *_SIX)),
+    "floating_root": lambda: _chain("floating_root", 2, ("floating", *_SIX)),
+    "planar_and_floating_in_the_middle": lambda: _chain(
+        "middle", 3, ("revolute", "planar", "prismatic", "fixed", "floating", "continuous", "planar")
+    ),
+    "two_floating_in_a_row": lambda: _chain("twice", 4, ("floating", "fixed", "floating", "revolute")),
+    "continuous": lambda: _chain("continuous", 5, ("continuous",) * 7),
+    "sliding_only": lambda: _chain("gantry", 6, ("prismatic",) * 5),
+    "deep_with_fixed": lambda: _chain(
+        "deep", 7, [("revolute", "fixed", "fixed", "prismatic", "fixed")[i % 5] for i in range(90)]
+    ),
+    "mimic_hand_40": lambda: _hand("hand", 8),
+    "mimic_hand_40_sliding": lambda: _hand("gripper", 9, sliding=True),
+    "single_link": lambda: Urdf("stone", 0).text,
+    "fixed_only": lambda: _chain("statue", 10, ("fixed",) * 6),
+    "one_joint": lambda: _chain("door", 16, ("revolute",)),
+    "odd_names": _names,
+    "same_names": _same_names,
+    "default_everything": _default_everything,
+    "followers_of_followers": _followers_of_followers,
+    "sizes": _sizes,
+    **{f"tree_{seed}": partial(_random_tree, seed) for seed in range(12)},
+}
+
+NAMES = tuple(_MAKERS)
+
+
+def urdf_of(name: str) -> str:
+    """The text of one of them."""
+    return _MAKERS[name]()
+
+
+def random_tree(seed: int) -> str:
+    """Another tree for each seed."""
+    return _random_tree(seed)

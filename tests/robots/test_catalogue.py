@@ -1,0 +1,173 @@
+"""Every robot of the catalogue: found, loaded, laid out and computed as Pinocchio does."""
+
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import urdfkin
+from tests.robots.against_pinocchio import ask, model_of
+from urdfkin.catalogue import catalogue, examples
+from urdfkin.reference import Reference
+from urdfkin.resources import example_robots_dir
+from urdfkin.robot import Robot
+from urdfkin.tree import JointKind
+from urdfkin.validation.report import Verdict
+from urdfkin.verification.bounds import Quantity
+
+#: Pinocchio 4.1 builds no model with mimic=True of these: it does not find their leaders.
+WITHOUT_MIMIC_MODEL = frozenset({"alex_psyonic_hands", "romeo", "talos", "talos_box"})
+
+
+@pytest.fixture(scope="module", params=examples())
+def robot(request: pytest.FixtureRequest) -> Robot:
+    return urdfkin.load(request.param)
+
+
+def test_it_holds_every_urdf_of_example_robot_data_but_the_one_that_is_none() -> None:
+    shipped = {path.relative_to(example_robots_dir()) for path in example_robots_dir().rglob("*.urdf")}
+    listed = [catalogue()[name].relative_path for name in examples()]
+    assert len(listed) == len(set(listed)) == 68
+    assert {path.name for path in shipped - set(listed)} == {"ur3.urdf"}
+
+
+def test_it_is_found_without_importing_pinocchio() -> None:
+    code = (
+        "import sys; from urdfkin.catalogue import catalogue; "
+        "assert all(entry.path.is_file() for entry in catalogue().values()); "
+        "print(sorted({'pinocchio', 'example_robot_data', 'yourdfpy', 'numpy', 'numba'} & set(sys.modules)))"
+    )
+    root = Path(__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_its_limbs_name_frames_that_exist_and_move(robot: Robot) -> None:
+    entry = catalogue()[robot.source.split()[0]]
+    for base, tip in entry.limbs.values():
+        above = robot.tree.path(robot.tree.frame_link(base))
+        path = robot.tree.path(robot.tree.frame_link(tip))
+        assert path[: len(above)] == above
+        assert any(robot.tree.joints[i].kind.nv for i in path[len(above) :])
+    if entry.limbs:
+        assert (robot.base_frame, robot.tip_frame) == next(iter(entry.limbs.values()))
+
+
+def test_every_quantity_of_every_frame_agrees(robot: Robot) -> None:
+    report = urdfkin.validate(robot, samples=1).robots[0]
+    assert (report.verdict, report.failed) == (Verdict.VERIFIED, 0)
+    frames, moving = len(robot.all_frames), len(robot.joint_names)
+    results = {quantity: sum(tally.results for tally in report.of(quantity)) for quantity in Quantity}
+    assert results[Quantity.PLACEMENT] == 4 * frames
+    assert results[Quantity.ACCELERATION] == 3 * 4 * frames
+    assert results[Quantity.JOINT_JACOBIAN] == 3 * 4 * moving
+
+
+@pytest.mark.slow
+def test_every_quantity_agrees_on_many_samples(robot: Robot) -> None:
+    report = urdfkin.validate(robot, samples=50, seed=1).robots[0]
+    assert (report.verdict, report.failed) == (Verdict.VERIFIED, 0)
+
+
+def test_a_robots_calls_agree_when_pinocchio_is_asked_directly(robot: Robot) -> None:
+    generator = np.random.default_rng(2)
+    q, v, a = robot.sample(1, 2)[0], generator.normal(size=robot.nv), generator.normal(size=robot.nv)
+    frame = robot.tree.frame_name(robot.tree.frame_link(robot.tip_frame))
+    body = robot.tree.links[robot.tree.frame_link(frame)]
+    for reference in Reference:
+        theirs = ask(robot, q, v, a, body, reference)
+        room = 1e-12 * (1.0 + np.abs(theirs.acceleration).max())
+        assert np.abs(robot.placement(q, frame) - theirs.placement).max() < room
+        assert np.abs(robot.velocity(q, v, frame, reference) - theirs.velocity).max() < room
+        assert np.abs(robot.jacobian(q, frame, reference) - theirs.jacobian).max(initial=0.0) < room
+        ours = robot.acceleration(q, v, a, frame, reference)
+        assert np.abs(ours - theirs.acceleration).max() < 10 * room
+
+
+def test_joints_rates_and_frames_have_pinocchios_order_and_names(robot: Robot) -> None:
+    free = urdfkin.load(robot.source.split()[0], mimic=False)
+    model = model_of(free)
+    assert free.joint_names == tuple(model.names)[1:]
+    assert free.nv == model.nv
+    for i, joint in enumerate(free.tree.joints):
+        if joint.kind.nv:
+            assert free.tree.v_index[i] == model.joints[model.getJointId(joint.name)].idx_v
+    kinds = (pin.FrameType.BODY, pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
+    theirs = [frame.name for frame in model.frames if frame.type in kinds and frame.name != "universe"]
+    assert list(robot.frame_names) == list(dict.fromkeys(theirs))
+
+
+def test_configurations_convert_to_pinocchios_default_model_and_back(robot: Robot) -> None:
+    q, model = robot.sample(4, 3), model_of(robot)
+    full = robot.to_pinocchio(q)
+    assert full.shape == (4, model.nq)
+    for row in full:
+        assert pin.isNormalized(model, row, 1e-14)
+    back = robot.from_pinocchio(full)
+    assert np.abs(back - q).max(initial=0.0) < 1e-14
+    assert np.array_equal(robot.to_pinocchio(robot.neutral()), pin.neutral(model)) or any(
+        joint.mimic and joint.mimic.offset for joint in robot.tree.joints
+    )
+
+
+def test_configurations_and_rates_are_those_of_pinocchios_mimic_model(robot: Robot) -> None:
+    if robot.source in WITHOUT_MIMIC_MODEL:
+        with pytest.raises((ValueError, RuntimeError), match="mimic"):
+            model_of(robot, mimic=True)
+        return
+    model = model_of(robot, mimic=True)
+    assert robot.nv == model.nv
+    q = robot.sample(3, 4)
+    full = robot.to_pinocchio(q, mimic=True)
+    assert full.shape == (3, model.nq)
+    assert np.abs(robot.from_pinocchio(full, mimic=True) - q).max(initial=0.0) < 1e-14
+    data, v = model.createData(), np.random.default_rng(5).normal(size=robot.nv)
+    link = robot.tree.links[robot.tree.frame_link(robot.tip_frame)]
+    index = model.getFrameId(link, pin.FrameType.BODY)
+    pin.forwardKinematics(model, data, full[0], v)
+    T = pin.updateFramePlacement(model, data, index).homogeneous
+    assert np.abs(robot.placement(q[0], f"link:{link}") - T).max() < 1e-12
+    velocity = pin.getFrameVelocity(model, data, index, pin.LOCAL_WORLD_ALIGNED).vector
+    assert np.abs(robot.velocity(q[0], v, f"link:{link}") - velocity).max() < 1e-11
+
+
+@pytest.mark.parametrize("root_joint", ["floating", "planar"])
+@pytest.mark.parametrize("name", ["panda", "ur5", "a1", "icub", "talos"])
+def test_a_root_joint_is_laid_out_as_pinocchios(name: str, root_joint: str) -> None:
+    robot = urdfkin.load(name, root_joint=root_joint)
+    model, q = model_of(robot), robot.sample(2, 6)
+    full = robot.to_pinocchio(q)
+    assert full.shape == (2, model.nq)
+    assert np.abs(robot.from_pinocchio(full) - q).max() < 1e-14
+    kind = JointKind.FLOATING if root_joint == "floating" else JointKind.PLANAR
+    assert robot.tree.joints[0].kind is kind
+    assert robot.rate_names[0] == "root_joint.vx"
+    assert urdfkin.validate(robot, samples=2).passed
+
+
+def test_it_can_be_pickled_and_then_computes_the_same(robot: Robot) -> None:
+    copy = pickle.loads(pickle.dumps(robot))
+    q = robot.sample(3, 7)
+    assert np.array_equal(copy.jacobian(q, robot.tip_frame), robot.jacobian(q, robot.tip_frame))
+    assert (copy.name, copy.frame_names, copy.source) == (robot.name, robot.frame_names, robot.source)
+    for joint in copy.tree.joints:
+        assert not joint.T_parent_joint.flags.writeable
+        assert not joint.axis.flags.writeable
+
+
+def test_the_robot_with_mimic_leaders_that_do_not_exist_says_so_and_how_to_load_it() -> None:
+    assert urdfkin.load("alex_psyonic_hands").findings
+    with pytest.raises(urdfkin.UrdfError) as caught:
+        urdfkin.load("alex_psyonic_hands", mimic=True)
+    assert "mimic" in str(caught.value)
+    assert "mimic=False" in str(caught.value) or "--no-mimic" in str(caught.value)
+
+
+def test_an_unknown_name_offers_the_nearest_ones() -> None:
+    with pytest.raises(urdfkin.UnknownNameError, match="did you mean") as caught:
+        urdfkin.load("pnda")
+    assert "panda" in caught.value.nearest

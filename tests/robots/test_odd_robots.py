@@ -1,0 +1,134 @@
+"""Robots that no one chose agree with Pinocchio in every quantity, frame and reference."""
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import urdfkin
+from tests.robots.against_pinocchio import ask
+from tests.robots.odd_urdfs import NAMES, random_tree, urdf_of
+from urdfkin.reference import Reference
+from urdfkin.robot import Robot
+from urdfkin.tree import FloatArray
+from urdfkin.validation.report import RobotReport, Verdict
+from urdfkin.verification.bounds import Quantity
+
+#: Rounding seldom conspires: what is measured stays below this share of the bound, on every robot here.
+USUAL_SHARE = 0.25
+
+
+def load(text: str, **options: str) -> Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(text, root_joint=options.get("root_joint"))
+
+
+def rates(robot: Robot, n: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    generator = np.random.default_rng(seed)
+    return robot.sample(n, seed), *generator.standard_normal((2, n, robot.nv))
+
+
+def assert_verified(report: RobotReport, robot: Robot, samples: int) -> None:
+    """Nothing failed, and nothing was left out: results are counted from the robot, not from the report."""
+    assert (report.verdict, report.failed, report.reason) == (Verdict.VERIFIED, 0, None)
+    frames = len(robot.tree.links) + len(robot.tree.joints)
+    moving = [joint for joint in robot.tree.joints if joint.kind.nv]
+    counts = {quantity: sum(tally.results for tally in report.of(quantity)) for quantity in Quantity}
+    assert counts[Quantity.PLACEMENT] == samples * frames
+    for quantity in (Quantity.VELOCITY, Quantity.ACCELERATION, Quantity.JACOBIAN, Quantity.JACOBIAN_RATE):
+        assert counts[quantity] == 3 * samples * frames, quantity
+    assert counts[Quantity.JOINT_JACOBIAN] == 3 * samples * len(moving)
+    assert counts[Quantity.SCREWS] == samples * sum(joint.kind.nv for joint in moving)
+    assert max(tally.share for tally in report.tallies.values()) < USUAL_SHARE
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_quantity_of_every_frame_agrees(name: str) -> None:
+    text = urdf_of(name)
+    report = urdfkin.validate(text, samples=5).robots[0]
+    assert_verified(report, load(text), samples=5 + 3)
+
+
+@pytest.mark.parametrize("root_joint", ["planar", "floating"])
+@pytest.mark.parametrize("name", ["mimic_hand_40", "tree_3", "single_link", "one_joint", "fixed_only"])
+def test_hung_from_a_root_joint_they_agree_as_well(name: str, root_joint: str) -> None:
+    text = urdf_of(name)
+    report = urdfkin.validate(text, samples=5, root_joint=root_joint).robots[0]
+    assert_verified(report, load(text, root_joint=root_joint), samples=5 + 3)
+
+
+@pytest.mark.parametrize("reference", list(Reference))
+@pytest.mark.parametrize("name", NAMES)
+def test_a_robots_calls_give_what_pinocchio_gives_when_asked_directly(
+    name: str, reference: Reference
+) -> None:
+    robot = load(urdf_of(name))
+    q, v, a = (x[0] for x in rates(robot, 1, 3))
+    frame = robot.tip_frame
+    theirs = ask(robot, q, v, a, frame, reference)
+    room = 1e-12 * (1.0 + np.abs(theirs.acceleration).max() + np.abs(theirs.placement).max())
+    assert np.abs(robot.placement(q, frame, verify=False) - theirs.placement).max() < room
+    assert np.abs(robot.velocity(q, v, frame, reference, verify=False) - theirs.velocity).max() < room
+    ours = robot.acceleration(q, v, a, frame, reference, verify=False)
+    assert np.abs(ours - theirs.acceleration).max() < 1e3 * room
+    ours = robot.jacobian(q, frame, reference, verify=False)
+    assert np.abs(ours - theirs.jacobian).max(initial=0.0) < room
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_call_is_checked_and_the_certificate_counts_it(name: str) -> None:
+    robot = load(urdf_of(name))
+    q, v, a = rates(robot, 2, 4)
+    frame = robot.tip_frame
+    robot.placement(q, frame)
+    for reference in Reference:
+        robot.velocity(q, v, frame, reference)
+        robot.jacobian(q, frame, reference)
+        robot.jacobian_rate(q, v, frame, reference)
+        robot.acceleration(q, v, a, frame, reference)
+    certificate = robot.certificate()
+    assert certificate.verified
+    assert {line.quantity: (line.checked, line.unchecked) for line in certificate.lines} == {
+        Quantity.PLACEMENT: (2, 0),
+        Quantity.VELOCITY: (6, 0),
+        Quantity.JACOBIAN: (6, 0),
+        Quantity.JACOBIAN_RATE: (6, 0),
+        Quantity.ACCELERATION: (6, 0),
+    }
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(st.integers(1000, 10**6))
+def test_any_tree_agrees(seed: int) -> None:
+    text = random_tree(seed)
+    assert_verified(urdfkin.validate(text, samples=3, seed=seed).robots[0], load(text), samples=6)
+
+
+@pytest.mark.slow
+@settings(max_examples=500, deadline=None, derandomize=True)
+@given(st.integers(1000, 10**9))
+def test_any_of_many_trees_agrees(seed: int) -> None:
+    text = random_tree(seed)
+    assert_verified(urdfkin.validate(text, samples=10, seed=seed).robots[0], load(text), samples=13)
+
+
+def test_a_name_of_two_places_must_be_told_apart_and_then_gives_both() -> None:
+    robot = load(urdf_of("same_names"))
+    q = robot.sample(1, 5)[0]
+    with pytest.raises(urdfkin.InputError, match=r"say 'link:elbow' or 'joint:elbow'"):
+        robot.placement(q, "elbow")
+    assert (robot.placement(q, "joint:elbow") == robot.placement(q, "forearm")).all()
+    assert (robot.placement(q, "link:elbow") == robot.placement(q, "slide")).all()
+    assert (robot.placement(q, "wrist") == robot.placement(q, "joint:wrist")).all()
+
+
+def test_a_prismatic_axis_of_length_two_slides_no_further_than_its_coordinate_says() -> None:
+    robot = load(urdf_of("default_everything"))
+    q = np.zeros(4)
+    slide = robot.joint_names.index("joint_2")
+    at_rest = robot.placement(q, "link_2")[:3, 3]
+    q[slide] = 0.25
+    assert np.linalg.norm(robot.placement(q, "link_2")[:3, 3] - at_rest) == pytest.approx(0.25, abs=1e-15)
