@@ -68,9 +68,12 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
                 robot.acceleration(q, v, a, frame),
             )
         ]
-    except urdfkin.VerificationError as error:
-        word = "too large to compute, with a finding" if big else "disagrees with Pinocchio"
-        return Outcome(word, str(error))
+    except (urdfkin.VerificationError, urdfkin.InputError) as error:
+        words = {True: "too large to compute, with a finding", False: "disagrees with Pinocchio"}
+        overflow = isinstance(error, urdfkin.InputError)
+        return Outcome(
+            "overflows, and no finding says why" if overflow and not big else words[big], str(error)
+        )
     certified = robot.certificate()
     if not all(np.isfinite(result).all() for result in results):
         return Outcome("too large to compute, with a finding" if big else "a result that is no number")
