@@ -29,6 +29,7 @@ FAMILIES = {
 
 #: Code -> what the warning means for the robots that have it, in a few words.
 REMARKS = {
+    "URDF207": "A link has no origin of its own; the pose is lost, as it is for every reader.",
     "URDF405": "A slash in a name is legal; urdfkin never uses names as paths.",
     "URDF508": "Limits were left out or set to zero, so samples within them leave the joint at rest.",
     "URDF510": "The value has no effect, and none is expected.",

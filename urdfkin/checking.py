@@ -7,9 +7,9 @@ from pathlib import Path
 
 from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Limits
 from urdfkin.diagnostics.check import check_robot, read_document
-from urdfkin.diagnostics.meshes import check_meshes
 from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.sources import Source, Text, read_source
+from urdfkin.urdf.meshes import check_meshes
 
 
 def check(

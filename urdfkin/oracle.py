@@ -20,7 +20,7 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import IntArray
 from urdfkin.reference import Reference
-from urdfkin.tree import FloatArray, JointKind, KinematicTree
+from urdfkin.tree import FloatArray, KinematicTree
 
 #: Pinocchio recurses over links: less than 4 kB of stack for each was measured (4.1.0), room for more.
 _STACK_FOR_A_LINK = 16_384
@@ -51,17 +51,22 @@ class Oracle:
         text: The URDF, as Pinocchio is to read it.
         tree: urdfkin's reading of the same text: names and layout only are taken from it.
         moving_base: Build the model on a free-flyer, so that a base's motion can be given.
+        root_joint: `"floating"` or `"planar"` when the tree was hung from such a joint, which the text does
+            not know. The names alone do not tell: a file may use them itself.
 
     Raises:
         OracleError: Pinocchio does not accept the text, or finds other joints in it.
     """
 
-    def __init__(self, text: str, tree: KinematicTree, *, moving_base: bool = False) -> None:
+    def __init__(
+        self, text: str, tree: KinematicTree, *, moving_base: bool = False, root_joint: str | None = None
+    ) -> None:
         import pinocchio as pin  # noqa: PLC0415  heavy: only when something is checked
 
         self._pin = pin
         self._tree = tree
         self._moving_base = moving_base
+        self._root_joint = root_joint
         self._root = 0  # Pinocchio's index of the frame that the robot stands on
         self._model = self._build(text)
         self._layout = _Layout(self._model, tree, 7 if moving_base else 0, 6 if moving_base else 0)
@@ -88,10 +93,10 @@ class Oracle:
 
     def _parse(self, text: str) -> Any:
         pin, tree = self._pin, self._tree
-        roots = {JointKind.FLOATING: pin.JointModelFreeFlyer, JointKind.PLANAR: pin.JointModelPlanar}
+        roots = {"floating": pin.JointModelFreeFlyer, "planar": pin.JointModelPlanar}
         try:
-            if tree.joints and tree.joints[0].name == "root_joint" and tree.links[0] == "universe":
-                model = pin.buildModelFromXML(text, roots[tree.joints[0].kind](), mimic=False)
+            if self._root_joint is not None:
+                model = pin.buildModelFromXML(text, roots[self._root_joint](), mimic=False)
             else:
                 model = pin.buildModelFromXML(text, mimic=False)
         except (ValueError, RuntimeError) as error:

@@ -302,7 +302,9 @@ class Robot(Manipulator, Tables):
         """Pinocchio's model of the robot, made once; on a free-flyer if the base moves."""
         moving = base is not None
         if moving not in self._oracles:
-            self._oracles[moving] = Oracle(self.urdf, self.tree, moving_base=moving)
+            self._oracles[moving] = Oracle(
+                self.urdf, self.tree, moving_base=moving, root_joint=self.root_joint
+            )
         return self._oracles[moving]
 
     def wants(self, verify: bool | None, quantity: Quantity, n: int, base: BaseMotion | None) -> bool:

@@ -38,6 +38,7 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Local processes.")
 @click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow (the default).")
 @click.option("--root-joint", type=click.Choice(["floating", "planar"]), help="Hang the root from a joint.")
+@click.option("--isolate", is_flag=True, help="Each robot in a process of its own, whose death is a result.")
 @xacro_option
 @click.option("--judge", "judged", is_flag=True, help="Say whose last digits are right, at 50 digits.")
 @click.option("--judge-samples", type=click.IntRange(1), default=5, show_default=True, help="For --judge.")
@@ -55,6 +56,7 @@ def command(
     root_joint: str | None,
     judged: bool,
     judge_samples: int,
+    isolate: bool,
     json_: Path | None,
     cases: bool,
 ) -> None:
@@ -78,6 +80,7 @@ def command(
             samples=samples,
             seed=seed,
             jobs=jobs,
+            isolate=isolate,
             progress=progress,
             **how,
         )

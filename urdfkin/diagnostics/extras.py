@@ -44,6 +44,7 @@ def check_extras(report: Reporter, robot: RobotRecord) -> None:
         for shape in element.children:
             if shape.tag in ("visual", "collision"):
                 _check_shape(report, shape, numbers)
+                _check_capsule(report, shape, robot.version)
             if shape.tag == "visual":
                 _check_material(report, shape, defined)
 
@@ -102,6 +103,14 @@ def _check_mass(
 
 def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass: float | None) -> None:
     kilograms = 1.0 if mass is None else abs(mass)
+    if mass == 0.0 and any(moments):
+        report.add(
+            codes.INERTIAL_IMPOSSIBLE,
+            "the body has moments of inertia and no mass",
+            tensor,
+            remedy="write kilograms, or no moments",
+        )
+        return
     if 0.0 < kilograms < NEGLIGIBLE:
         return
     small, middle, large = principal_moments(moments)
@@ -177,6 +186,19 @@ def _check_shape(report: Reporter, owner: Element, numbers: NumberReader) -> Non
             numbers.vector(shape, attribute, count)
     if shape.tag == "mesh":
         _check_mesh(report, owner, shape)
+
+
+def _check_capsule(report: Reporter, owner: Element, version: tuple[int, int]) -> None:
+    """A capsule is a shape from version 1.1 on; before, readers skip it."""
+    geometry = owner.first("geometry")
+    capsule = None if geometry is None else geometry.first("capsule")
+    if capsule is not None and version < (1, 1):
+        report.add(
+            codes.GEOMETRY,
+            'a capsule needs version="1.1" and is ignored',
+            capsule,
+            remedy="use a cylinder and two spheres",
+        )
 
 
 def _missing(report: Reporter, owner: Element, shape: Element, attribute: str) -> None:

@@ -14,6 +14,32 @@ from urdfkin.diagnostics.reporter import Reporter
 #: Extensions that may hold anything, `<joint>` and `<link>` included.
 OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
 
+#: Elements and attributes that simulators and vendors add, seen in robots that many people use.
+EXTENSIONS = frozenset(
+    {
+        *(
+            "contact",
+            "collision_checking",
+            "self_filter",
+            "surface",
+            "gravity",
+            "kinematic",
+            "drake",
+            "group",
+        ),
+        *(
+            "dont_collapse",
+            "D",
+            "K",
+            "mu_coulomb",
+            "mu_viscous",
+            "current",
+            "command_effort",
+            "gear_velocity",
+        ),
+    }
+)
+
 #: Element -> the elements it may hold. An element that is not a key is not looked into.
 CHILDREN: dict[str, frozenset[str]] = {
     "robot": frozenset({"link", "joint", "material"}),
@@ -84,9 +110,6 @@ _VALUES = {"origin", "axis", "limit", "mimic", "parent", "child"}
 #: Elements whose text can only be their value, put in the wrong place.
 _VECTORS = ("origin", "axis")
 
-#: Attributes whose misspelling loses something about motion.
-_KINEMATIC = {"origin", "axis", "limit", "mimic", "parent", "child", "joint", "link", "robot"}
-
 
 def check_vocabulary(report: Reporter, root: Element) -> None:
     """Unknown, misplaced and repeated elements, unknown attributes, and text where URDF has none."""
@@ -134,13 +157,15 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
         )
         return
     foreign = element.tag in _FOREIGN
-    remedy = f"write {_EXAMPLES['origin']}" if foreign else f"did you mean <{close}>?" if close else None
+    remedy = (
+        f"write {_EXAMPLES['origin']}" if foreign else f"did you mean <{close}>?" if close else "remove it"
+    )
     report.add(
         codes.UNKNOWN_ELEMENT,
         f"<{element.tag}> means nothing in <{parent.tag if parent else ''}> and is skipped",
         element,
         remedy=remedy,
-        severity=Severity.WARNING if close or foreign else Severity.NOTE,
+        severity=Severity.NOTE if element.tag in EXTENSIONS else None,
     )
 
 
@@ -177,7 +202,6 @@ def _check_attributes(report: Reporter, element: Element) -> None:
         if attribute in known or ":" in attribute or attribute == "xmlns":
             continue
         close = nearest(attribute, known)
-        serious = (close is not None or attribute in _FOREIGN) and element.tag in _KINEMATIC
         report.add(
             codes.UNKNOWN_ATTRIBUTE,
             f"<{element.tag}> has no attribute of this name; it is skipped",
@@ -185,7 +209,7 @@ def _check_attributes(report: Reporter, element: Element) -> None:
             attribute=attribute,
             found=f"{attribute}={quoted(element.attributes[attribute])}",
             remedy=f"did you mean {close}?" if close else f"known are {', '.join(sorted(known))}",
-            severity=Severity.WARNING if serious else Severity.NOTE,
+            severity=Severity.NOTE if attribute in EXTENSIONS else None,
         )
 
 

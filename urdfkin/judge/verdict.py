@@ -128,7 +128,7 @@ class _Work:
         self.links = range(len(robot.tree.links))
         self.frames = [f"link:{name}" for name in robot.tree.links]
         self.plan = robot.plan(self.links)
-        self.oracle = Oracle(robot.urdf, robot.tree)
+        self.oracle = Oracle(robot.urdf, robot.tree, root_joint=robot.root_joint)
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
         self.motions = self._motions(read_exact(robot.urdf, robot.tree))
 

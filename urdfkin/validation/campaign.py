@@ -11,7 +11,9 @@ import hashlib
 import multiprocessing
 import os
 import signal
+import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 
@@ -21,6 +23,7 @@ from urdfkin.recursion.announcing import load_kernels
 from urdfkin.robot import Robot
 from urdfkin.sources import Source, is_xacro, read_source
 from urdfkin.validation.chunk import SPECIAL, Chunk, ChunkResult, Subject, chunks, run_chunk
+from urdfkin.validation.isolation import DiedError, run_isolated
 from urdfkin.validation.report import RobotReport, ValidationReport, Verdict
 from urdfkin.validation.tally import Key, Tally
 
@@ -37,6 +40,7 @@ def validate(
     mimic: bool | None = None,
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
+    isolate: bool = False,
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> ValidationReport:
@@ -51,6 +55,8 @@ def validate(
         mimic: As in `load`.
         root_joint: As in `load`.
         xacro_args: As in `load`, for each .xacro file among the robots.
+        isolate: Each robot is checked in a process of its own, `jobs` at a time; when one dies, that robot is
+            reported as not verified with the reason, and the others go on.
         executor: Runs the chunks instead of local processes.
         progress: Told after each chunk.
 
@@ -75,6 +81,8 @@ def validate(
     try:
         if executor is not None:
             run.spread(executor)
+        elif isolate:
+            run.isolated(jobs)
         elif jobs == 1:
             run.here()
         else:
@@ -174,6 +182,37 @@ class _Run:
                 future.cancel()
             raise
 
+    def isolated(self, jobs: int) -> None:
+        """One child process a robot, `jobs` of them at a time; a death is that robot's result."""
+        waiting = deque(range(len(self._subjects)))
+        lock = threading.Lock()
+
+        def work() -> None:
+            while True:
+                with lock:
+                    if not waiting:
+                        return
+                    i = waiting.popleft()
+                mine = [chunk for j, chunk in self._work if j == i]
+                try:
+                    for result in run_isolated(mine):
+                        with lock:
+                            self._enter(i, result)
+                            self._tell(i)
+                except UrdfkinError as error:
+                    with lock:
+                        self._failures[i] = error
+
+        threads = [threading.Thread(target=work) for _ in range(jobs)]
+        for thread in threads:
+            thread.start()
+        try:
+            for thread in threads:
+                thread.join()
+        except BaseException:
+            waiting.clear()
+            raise
+
     def _enter(self, i: int, result: ChunkResult) -> None:
         self._results.setdefault(i, []).append(result)
 
@@ -192,7 +231,7 @@ class _Run:
 
 
 def _refused(subject: Subject, error: UrdfkinError) -> RobotReport:
-    verdict = Verdict.NOT_VERIFIED if isinstance(error, OracleError) else Verdict.BAD_INPUT
+    verdict = Verdict.NOT_VERIFIED if isinstance(error, OracleError | DiedError) else Verdict.BAD_INPUT
     return RobotReport(subject.label, subject.label, verdict, str(error), (), (), {}, 0, 0.0)
 
 

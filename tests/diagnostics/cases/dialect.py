@@ -45,9 +45,9 @@ def dialect_cases() -> list[Case]:
             ACCEPT,
         ),
         Case("links-in-gazebo", arm(more='<gazebo><model><link name="g"/></model></gazebo>'), ACCEPT),
-        Case(
-            "loop-joint-extension", arm(more='<loop_joint name="c" type="ball"/>'), ACCEPT, [("URDF207", 8)]
-        ),
+        Case("loop-joint-extension", arm(more='<loop_joint name="c" type="ball"/>'), WARN, [("URDF207", 8)]),
+        Case("known-extension", arm(base='<link name="base"><contact/></link>'), ACCEPT, [("URDF207", 3)]),
+        Case("unknown-attribute", arm(attributes='type="fixed" colour="red"'), WARN, [("URDF208", 6)]),
         Case("misspelt-origin", arm(origin='<orign xyz="1 0 0"/>'), WARN, [("URDF207", 6)]),
         Case("capital-origin", arm(origin='<Origin xyz="1 0 0"/>'), WARN, [("URDF207", 6)]),
         Case("misspelt-rpy", arm(origin='<origin rp="1 0 0"/>'), WARN, [("URDF208", 6)]),

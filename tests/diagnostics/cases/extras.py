@@ -22,12 +22,19 @@ def extras_cases() -> list[Case]:
         Case("inertial-triangle", inertial(ball.replace('izz="1"', 'izz="9"')), WARN, [("URDF702", 3)]),
         Case("inertial-products", inertial(ball.replace('ixy="0"', 'ixy="5"')), WARN, [("URDF702", 3)]),
         Case("inertial-zero", inertial(ball.replace('"1"', '"0"'), '<mass value="0"/>'), ACCEPT),
+        Case("inertial-no-mass-but-moments", inertial(ball, '<mass value="0"/>'), WARN, [("URDF702", 3)]),
         Case("inertial-rounding", inertial(ball.replace('"1"', '"-1e-20"')), ACCEPT),
         Case("visual-no-geometry", link("<visual/>"), WARN, [("URDF705", 3)]),
         Case("visual-no-shape", link(shape.format("")), WARN, [("URDF705", 3)]),
         Case("visual-unknown-shape", link(shape.format("<cone/>")), WARN, [("URDF705", 3)]),
         Case("visual-bad-number", link(shape.format('<sphere radius="big"/>')), WARN, [("URDF704", 3)]),
         Case("visual-no-radius", link(shape.format('<cylinder length="1"/>')), WARN, [("URDF705", 3)]),
+        Case(
+            "capsule-too-early",
+            link(shape.format('<capsule radius="1" length="1"/>')),
+            WARN,
+            [("URDF705", 3)],
+        ),
         Case("mesh-no-file", link(shape.format("<mesh/>")), WARN, [("URDF705", 3)]),
         Case(
             "mesh-https", link(shape.format('<mesh filename="https://x.org/a.stl"/>')), WARN, [("URDF707", 3)]

@@ -65,6 +65,7 @@ def structure_cases() -> list[Case]:
             WARN,
             [("URDF406", 8)],
         ),
+        Case("name-shell", arm(more='<link name="$(rm x)"/>' + fixed("k", "tool", "$(rm x)")), WARN),
         Case("name-html", arm(more='<link name="&lt;b&gt;"/>' + fixed("k", "tool", "&lt;b&gt;")), WARN),
         Case(
             "name-very-long", arm(more=f'<link name="{"n" * 5000}"/>' + fixed("k", "tool", "n" * 5000)), WARN

@@ -1,6 +1,6 @@
 """URDF2xx: whether it is a URDF at all, and which elements and attributes it is made of."""
 
-from urdfkin.diagnostics.codes.base import ERROR, NOTE, WARNING, Code
+from urdfkin.diagnostics.codes.base import ERROR, WARNING, Code
 
 NOT_URDF = Code(
     "URDF201",
@@ -79,10 +79,10 @@ MISPLACED = Code(
 UNKNOWN_ELEMENT = Code(
     "URDF207",
     "unknown-element",
-    NOTE,
+    WARNING,
     "an element that URDF does not define",
-    why="Readers skip it. Extensions are fine; a misspelt element loses what it says, so urdfkin warns when"
-    " the name is close to a known one.",
+    why="Readers skip it, so a misspelt element loses what it says. Extensions that simulators and vendors"
+    " are known to add are a note.",
     bad='<joint name="j" type="fixed">\n  <parent link="base"/>\n  <child link="tip"/>\n'
     '  <orgin xyz="0 0 1"/>\n</joint>\n',
     good='<joint name="j" type="fixed">\n  <parent link="base"/>\n  <child link="tip"/>\n'
@@ -93,10 +93,10 @@ UNKNOWN_ELEMENT = Code(
 UNKNOWN_ATTRIBUTE = Code(
     "URDF208",
     "unknown-attribute",
-    NOTE,
+    WARNING,
     "an attribute that URDF does not define",
-    why="Readers skip it. urdfkin warns when the name is close to a known one, because then the value that"
-    " was meant is lost.",
+    why="Readers skip it, so the value that was meant is lost when the name is misspelt. Extensions that"
+    " simulators and vendors are known to add are a note.",
     bad='<joint name="j" type="fixed">\n  <parent link="base"/>\n  <child link="tip"/>\n'
     '  <origin xyz="0 0 1" rpyy="0 0 1"/>\n</joint>\n',
     good='<joint name="j" type="fixed">\n  <parent link="base"/>\n  <child link="tip"/>\n'

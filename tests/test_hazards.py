@@ -1,0 +1,74 @@
+"""What would kill the process is not asked of Pinocchio, and the result says that it was not checked."""
+
+import threading
+import warnings
+
+import numpy as np
+import pytest
+
+import urdfkin
+from urdfkin.robot import NotVerifiedWarning
+from urdfkin.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
+from urdfkin.urdf.reader import read_tree
+from urdfkin.urdf.writer import to_urdf
+
+
+def chain(count: int, kind: JointKind = JointKind.FIXED) -> KinematicTree:
+    T = np.eye(4)
+    T[0, 3] = 0.5
+    joints = [
+        (Joint(f"j{i}", kind, 0, T, np.array([0.0, 0.0, 1.0])), f"l{i}", f"l{i + 1}") for i in range(count)
+    ]
+    return build_tree("chain", "l0", joints)
+
+
+@pytest.mark.parametrize("where", ["main thread", "another thread"])
+def test_a_chain_deeper_than_any_stack_is_verified(where: str) -> None:
+    """Pinocchio's parser kills a process at about 3,800 links, at 480 on a thread with 1 MB of stack."""
+    robot = urdfkin.load(to_urdf(chain(5_000)))
+    answers = []
+
+    def ask() -> None:
+        answers.append(robot.placement(robot.neutral(), "l5000"))
+
+    if where == "main thread":
+        ask()
+    else:
+        thread = threading.Thread(target=ask)
+        thread.start()
+        thread.join()
+    assert answers[0][0, 3] == 2500.0
+    assert robot.certificate().verified
+
+
+def test_too_many_rates_for_the_memory_are_computed_and_say_why_they_are_not_verified() -> None:
+    tree = chain(500, JointKind.CONTINUOUS)
+    robot = urdfkin.load(to_urdf(tree))
+    with pytest.warns(NotVerifiedWarning, match="500, which would take 8 GB"):
+        J = robot.jacobian(robot.neutral(), "l500")
+    assert J.shape == (6, 500)
+    assert not robot.certificate().verified
+
+
+def test_validate_reports_what_cannot_be_verified() -> None:
+    report = urdfkin.validate([to_urdf(chain(500, JointKind.CONTINUOUS))], samples=1)
+    assert not report.passed
+    assert "500, which" in str(report.robots[0].reason)
+
+
+@pytest.mark.parametrize("kind", [JointKind.FLOATING, JointKind.PLANAR])
+def test_a_file_whose_own_root_is_called_universe_is_verified(kind: JointKind) -> None:
+    """The names are those of a hung robot, but nobody hung it."""
+    text = to_urdf(with_root_joint(chain(2), kind))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        robot = urdfkin.load(text)
+    robot.placement(robot.sample(2, seed=0), "l2")
+    assert robot.certificate().verified
+    assert read_tree(text.encode()).links[0] == "universe"
+
+
+def test_a_hung_robot_is_verified() -> None:
+    robot = urdfkin.load(to_urdf(chain(2)), root_joint="planar")
+    robot.placement(robot.sample(2, seed=0), "l2")
+    assert robot.certificate().verified
