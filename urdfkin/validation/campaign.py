@@ -15,12 +15,14 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 
+from urdfkin.diagnostics import UrdfError
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.oracle import OracleError
 from urdfkin.recursion.announcing import load_kernels
 from urdfkin.robot import Robot
 from urdfkin.sources import Source, is_xacro, read_source
 from urdfkin.validation.chunk import SPECIAL, Chunk, ChunkResult, Subject, chunks, run_chunk
+from urdfkin.validation.portrait import NO_PORTRAIT, Portrait, as_data
 from urdfkin.validation.report import RobotReport, ValidationReport, Verdict
 from urdfkin.validation.tally import Key, Tally
 
@@ -193,7 +195,19 @@ class _Run:
 
 def _refused(subject: Subject, error: UrdfkinError) -> RobotReport:
     verdict = Verdict.NOT_VERIFIED if isinstance(error, OracleError) else Verdict.BAD_INPUT
-    return RobotReport(subject.label, subject.label, verdict, str(error), (), (), {}, 0, 0.0)
+    portrait = _portrait(subject, error)
+    name = portrait.model["name"] if portrait.model else subject.label
+    return RobotReport(subject.label, name, verdict, str(error), (), (), {}, 0, 0.0, portrait)
+
+
+def _portrait(subject: Subject, error: UrdfkinError) -> Portrait:
+    """What can be told of a robot that was not checked: its parts if it can be read, else the findings."""
+    if isinstance(error, UrdfError):
+        return Portrait(findings=as_data(error.findings))
+    try:
+        return Portrait.of(subject.read())
+    except UrdfkinError:
+        return NO_PORTRAIT
 
 
 def _report(subject: Subject, results: Sequence[ChunkResult], samples: int) -> RobotReport:
@@ -213,4 +227,5 @@ def _report(subject: Subject, results: Sequence[ChunkResult], samples: int) -> R
         tallies=tallies,
         samples=samples + SPECIAL,
         seconds=sum(result.seconds for result in results),
+        portrait=next((result.portrait for result in results if result.portrait), NO_PORTRAIT),
     )

@@ -23,6 +23,7 @@ from urdfkin.recursion.plan import Plan, make_plan
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray, KinematicTree, freed
+from urdfkin.validation.portrait import Portrait
 from urdfkin.validation.tally import Key, Tally, tally
 from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Bound, Quantity
@@ -63,15 +64,19 @@ class Subject:
         """How to call it while it is not loaded."""
         return self.words or (self.source if isinstance(self.source, str) else "<bytes>")
 
+    def read(self) -> Robot:
+        """The robot; its warnings are in its portrait."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UrdfWarning)
+            return load(self.source, mimic=self.mimic, root_joint=self.root_joint)
+
     def load(self) -> Robot:
-        """The robot; its warnings belong to `check`, not here.
+        """The robot, to be checked.
 
         Raises:
             OracleError: a finding says that Pinocchio refuses it or reads another robot.
         """
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UrdfWarning)
-            robot = load(self.source, mimic=self.mimic, root_joint=self.root_joint)
+        robot = self.read()
         if robot.unverifiable is not None:
             raise OracleError(robot.unverifiable, where=self.label)
         return robot
@@ -99,7 +104,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """What a chunk found, about whom, and how long it took."""
+    """What a chunk found, about whom, and how long it took; the first chunk also says what it is."""
 
     source: str
     name: str
@@ -107,6 +112,7 @@ class ChunkResult:
     frames: tuple[str, ...]
     tallies: dict[Key, Tally]
     seconds: float
+    portrait: Portrait | None = None
 
 
 def chunks(subject: Subject, samples: int, seed: int) -> Iterator[Chunk]:
@@ -135,6 +141,7 @@ def run_chunk(chunk: Chunk) -> ChunkResult:
         frames=robot.all_frames,
         tallies=dict(work.tallies()),
         seconds=time.perf_counter() - begin,
+        portrait=Portrait.of(robot) if chunk.index == 0 else None,
     )
 
 
