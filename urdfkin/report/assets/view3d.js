@@ -139,7 +139,7 @@
         const length = origin(joint.T).length();
         if (length > 1e-6 * this.reach) for (const link of [joint.parent, joint.child]) near[link] = Math.min(near[link], length);
       }
-      this.size = near.map((length) => Math.min(0.03 * this.reach, Math.max(0.005 * this.reach, 0.28 * (Number.isFinite(length) ? length : this.reach))));
+      this.size = near.map((length) => Math.min(0.024 * this.reach, Math.max(0.005 * this.reach, 0.26 * (Number.isFinite(length) ? length : this.reach))));
     }
 
     build() {
@@ -284,16 +284,28 @@
       this.moveDh();
       this.invalidate();
     }
+    // From the same side always, as near as every link's origin allows.
     look() {
-      const centre = this.box.getCenter(new THREE.Vector3()), radius = 0.5 * this.box.getSize(new THREE.Vector3()).length();
-      const distance = (0.86 * radius) / Math.sin((this.camera.fov * Math.PI) / 360);
+      this.touched = false;
+      const width = this.canvas.clientWidth || 1, height = this.canvas.clientHeight || 1, margin = 1.16;
+      const away = new THREE.Vector3(1.0, -1.35, 0.62).normalize(), centre = this.box.getCenter(new THREE.Vector3());
+      const right = new THREE.Vector3().crossVectors(Z, away).normalize(), up = new THREE.Vector3().crossVectors(away, right);
+      const tall = Math.tan((this.camera.fov * Math.PI) / 360), wide = (tall * width) / height, p = new THREE.Vector3();
+      let distance = 0.1 * this.reach;
+      for (const T of this.robot.poses) {
+        origin(T, p).sub(centre);
+        const needed = margin * Math.max(Math.abs(p.dot(right)) / wide, Math.abs(p.dot(up)) / tall);
+        distance = Math.max(distance, p.dot(away) + needed);
+      }
+      distance += 0.05 * this.reach;
       this.controls.target.copy(centre);
-      this.camera.position.copy(new THREE.Vector3(1.0, -1.35, 0.62).setLength(distance)).add(centre);
+      this.camera.position.copy(away.multiplyScalar(distance)).add(centre);
       Object.assign(this.camera, { near: distance / 200, far: distance * 20 });
       this.controls.update();
       this.invalidate();
     }
     turn(azimuth, polar, zoom = 1) {
+      this.touched = true;
       const away = this.camera.position.clone().sub(this.controls.target);
       const ball = new THREE.Spherical().setFromCartesianCoords(away.x, away.z, -away.y);
       ball.theta += azimuth;
@@ -328,7 +340,8 @@
       section.querySelector("[data-do=random]").addEventListener("click", () => this.random());
       section.querySelector("[data-do=view]").addEventListener("click", () => this.look());
       document.addEventListener("themechange", () => this.theme());
-      new ResizeObserver(() => this.invalidate()).observe(canvas);
+      this.controls.addEventListener("start", () => { this.touched = true; });
+      new ResizeObserver(() => (this.touched ? this.invalidate() : this.look())).observe(canvas);
       this.buildDh();
       this.show();
     }
