@@ -1,10 +1,11 @@
-"""The border to matplotlib: figures without a display, saved as files or as SVG that a page can take in.
+"""The border to matplotlib (the extra `urdfkin[plots]`): figures without a display, as files or inline SVG.
 
 Inline SVG takes its colours from the page's style, so that one drawing serves light, dark and print.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import io
 import re
 from pathlib import Path
@@ -36,17 +37,33 @@ _STYLE: dict[Any, Any] = {
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, inches; it belongs to no window and no global state."""
+    """An empty figure, inches; it belongs to no window and no global state.
+
+    Raises:
+        InputError: matplotlib is not installed.
+    """
+    _needed()
     from matplotlib.figure import Figure  # noqa: PLC0415  keeps other commands fast
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def style() -> Any:
-    """The context to draw in."""
+def style(**more: Any) -> Any:
+    """The context to draw in: text stays text, and the same drawing gives the same file."""
+    _needed()
     import matplotlib as mpl  # noqa: PLC0415
 
-    return mpl.rc_context(_STYLE)
+    return mpl.rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
+
+
+def installed() -> bool:
+    """Whether matplotlib is there."""
+    return importlib.util.find_spec("matplotlib") is not None
+
+
+def _needed() -> None:
+    if not installed():
+        raise InputError("drawing needs matplotlib", remedy="pip install 'urdfkin[plots]'")
 
 
 def save(figure: Figure, path: Path) -> bytes:

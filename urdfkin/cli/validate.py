@@ -12,7 +12,7 @@ import click
 
 from urdfkin.catalogue import examples
 from urdfkin.cli.arguments import xacro_args, xacro_option
-from urdfkin.cli.judgement import judge_all, print_judgements
+from urdfkin.cli.judgement import judge_all
 from urdfkin.cli.output import compiling, console
 from urdfkin.cli.reports import check_writable, report_options, write_reports
 
@@ -91,7 +91,6 @@ def command(
     document = cast("Document", report.as_dict())
     write_reports(document, json_=json_, html=html, junit=junit, markdown=markdown)
     print_report(document, console(), cases=cases)
-    print_judgements(report.judgements)
     context.exit(report.exit_code)
 
 

@@ -107,13 +107,41 @@ class Table(TypedDict):
 class Chain(TypedDict):
     """A chain and its tables."""
 
+    limb: str | None
     base: str
     tip: str
     standard: Table
     modified: Table
     samples: int
+    metres: float | None
     worst: Units
     share_of_bound: Units
+
+
+class Errors(TypedDict):
+    """True errors of one side."""
+
+    worst: float
+    typical: float
+
+
+class Judged(TypedDict):
+    """One quantity in one reference, judged."""
+
+    quantity: str
+    reference: str | None
+    numbers: int
+    urdfkin: Errors
+    pinocchio: Errors
+
+
+class Judgement(TypedDict):
+    """Both sides against values that are right to fifty digits."""
+
+    robot: str
+    samples: int
+    seed: int
+    lines: list[Judged]
 
 
 class Case(TypedDict):
@@ -173,6 +201,7 @@ class Robot(TypedDict):
     findings: list[Finding]
     chains: list[Chain]
     checks: list[Check]
+    judge: Judgement | None
 
 
 class Document(TypedDict):

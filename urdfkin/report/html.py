@@ -6,16 +6,16 @@ from datetime import datetime
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from urdfkin.figure import installed
 from urdfkin.report import pages
 from urdfkin.report.distributions import distributions
 from urdfkin.report.document import Document, Robot, asset
 from urdfkin.report.scene import scene
 from urdfkin.report.words import (
+    columns,
     counted,
     percent,
     pinocchio,
-    quantities,
-    quantity_name,
     share_of,
     summary,
     units,
@@ -51,7 +51,7 @@ def as_html(document: Document) -> str:
     from markupsafe import Markup  # noqa: PLC0415
 
     robots = document["robots"]
-    names = quantities(robots)
+    quantities = columns(robots)
     return (
         _environment()
         .get_template("report.html.j2")
@@ -62,8 +62,8 @@ def as_html(document: Document) -> str:
             pinocchio=pinocchio(document),
             totals=_totals(document),
             verdicts=verdict_counts(document),
-            quantities=[quantity_name(name) for name in names],
-            overview=[pages.overview(robot, names) for robot in robots],
+            quantities=list(quantities),
+            overview=[pages.overview(robot, list(quantities.values())) for robot in robots],
             robots=[_robot(robot, i, document) for i, robot in enumerate(robots)],
             opened=len(robots) <= _OPEN,
             heat_steps=pages.HEAT_STEPS,
@@ -106,16 +106,26 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
                 "data": chain,
                 "beta": pages.has_beta(chain),
                 "tables": {kind: pages.chain_rows(chain, kind) for kind in ("standard", "modified")},
+                "agrees": (chain["share_of_bound"] or 0.0) <= 1.0,
+                "metres": f"{chain['metres'] or 0.0:.2g}",
                 "worst": units(chain["worst"]),
                 "share": percent(chain["share_of_bound"]),
             }
             for chain in robot["chains"]
         ],
         "checks": pages.check_rows(robot),
+        "judged": pages.judged_rows(robot["judge"]) if robot["judge"] else [],
         "heat_heads": heads,
         "heat": heat,
-        "plot": Markup(distributions(robot, document["histogram_edges"], f"p{index}-")),
+        "plot": Markup(_plot(robot, index, document)),
     }
+
+
+def _plot(robot: Robot, index: int, document: Document) -> str:
+    """Empty where matplotlib is not installed: the tables say the same."""
+    if not installed():
+        return ""
+    return distributions(robot, document["histogram_edges"], f"p{index}-")
 
 
 def _when(started: str) -> str:

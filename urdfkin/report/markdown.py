@@ -8,10 +8,9 @@ from urdfkin.report.document import Document, Robot
 from urdfkin.report.words import (
     VERDICTS,
     check_name,
+    columns,
     counted,
     percent,
-    quantities,
-    quantity_name,
     share_of,
     summary,
     units,
@@ -51,13 +50,13 @@ def as_markdown(document: Document, limit: int = LIMIT) -> str:
 
 
 def _body(robots: list[Robot], room: int) -> list[str]:
-    names = quantities(robots)
-    columns = ["robot", "joints", "frames", "results", *map(quantity_name, names), "of bound", "verdict"]
-    lines = [_row(columns), _row(["---", *["---:"] * (len(columns) - 2), "---"])]
+    quantities = columns(robots)
+    heads = ["robot", "joints", "frames", "results", *quantities, "of bound", "verdict"]
+    lines = [_row(heads), _row(["---", *["---:"] * (len(heads) - 2), "---"])]
     left = room - sum(len(line) + 1 for line in lines) - 200
     tails: list[str] = []
     for shown, robot in enumerate(robots):
-        row, tail = _row(_cells(robot, names)), _details(robot)
+        row, tail = _row(_cells(robot, list(quantities.values()))), _details(robot)
         left -= len(row) + sum(len(line) + 1 for line in tail) + 1
         if left < 0:
             rest = robots[shown:]
@@ -69,7 +68,7 @@ def _body(robots: list[Robot], room: int) -> list[str]:
     return lines + tails
 
 
-def _cells(robot: Robot, names: list[str]) -> list[str]:
+def _cells(robot: Robot, quantities: list[tuple[str, ...]]) -> list[str]:
     verdict = robot["verdict"]
     share = percent(share_of(robot)) if robot["checks"] else ""
     return [
@@ -77,7 +76,7 @@ def _cells(robot: Robot, names: list[str]) -> list[str]:
         str(len(robot["joints"])),
         str(len(robot["frames"])),
         f"{robot['results']:,}",
-        *(worst_of(robot, name) for name in names),
+        *(worst_of(robot, names) for names in quantities),
         share,
         f"{_MARKS[verdict]} {verdict}",
     ]

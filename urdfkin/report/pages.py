@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
-from urdfkin.report.document import Chain, Check, Joint, Limit, Model, Robot, Row, Units
+from urdfkin.dh.units import Units as DisplayUnits
+from urdfkin.report.document import Chain, Check, Joint, Judgement, Limit, Model, Robot, Row, Units
 from urdfkin.report.words import (
+    SIDES,
+    column,
     in_order,
+    nearer,
     of_quantity,
     percent,
     quantities,
@@ -20,6 +22,8 @@ from urdfkin.report.words import (
     worst,
     worst_of,
 )
+
+_READABLE = DisplayUnits(digits=6)
 
 #: Upper edges of the heat map's steps, eps * scale; what is above the last has a step of its own.
 HEAT_STEPS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
@@ -33,7 +37,7 @@ class Cell:
     step: int
 
 
-def overview(robot: Robot, names: Sequence[str]) -> dict[str, Any]:
+def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, Any]:
     """A line of the overview table, with numbers to sort by."""
     checks = robot["checks"]
     largest, share = worst(check["worst"] for check in checks), share_of(robot)
@@ -44,7 +48,7 @@ def overview(robot: Robot, names: Sequence[str]) -> dict[str, Any]:
         "frames": len(robot["frames"]),
         "results": robot["results"],
         "failed": robot["failed"],
-        "quantities": [(worst_of(robot, name), _key(robot, name)) for name in names],
+        "quantities": [(worst_of(robot, names), _key(robot, names)) for names in quantities_of],
         "worst": units(largest, compared=bool(checks)),
         "worst_key": _sortable(largest) if checks else -1.0,
         "share": percent(share) if checks else "",
@@ -54,8 +58,8 @@ def overview(robot: Robot, names: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _key(robot: Robot, name: str) -> float:
-    checks = of_quantity(robot, name)
+def _key(robot: Robot, names: Sequence[str]) -> float:
+    checks = column(robot, names)
     return _sortable(worst(check["worst"] for check in checks)) if checks else -1.0
 
 
@@ -189,20 +193,27 @@ def _plus(constant: str, variable: str) -> str:
 
 def metres(value: float) -> str:
     """A length, metres."""
-    return "0" if value == 0 else f"{value:.6g}".replace("-", "−")
+    return _READABLE.length(value).replace("-", "−")
 
 
 def angle(value: float) -> str:
-    """An angle, radians; a multiple of pi/12 to rounding is shown as one."""
-    if value == 0:
-        return "0"
-    twelfths = round(value / math.pi * 12)
-    if twelfths and abs(value - twelfths * math.pi / 12) <= 4 * math.ulp(abs(value)):
-        part = Fraction(abs(twelfths), 12)
-        top = "π" if part.numerator == 1 else f"{part.numerator}π"
-        text = top if part.denominator == 1 else f"{top}/{part.denominator}"
-        return f"{'−' if twelfths < 0 else ''}{text}"
-    return f"{value:.6g}".replace("-", "−")
+    """An angle, radians; what is a multiple of pi/12 to the last bit is shown as one."""
+    return _READABLE.angle(value, pi="π").replace("-", "−")
+
+
+def judged_rows(judgement: Judgement) -> list[dict[str, Any]]:
+    """Both sides' true errors, and who is nearer."""
+    return [
+        {
+            "quantity": quantity_name(line["quantity"]),
+            "reference": line["reference"] or "",
+            "numbers": line["numbers"],
+            "worst": [f"{line[side]['worst']:.2f}" for side in SIDES],
+            "typical": [f"{line[side]['typical']:.3f}" for side in SIDES],
+            "nearer": nearer(line),
+        }
+        for line in judgement["lines"]
+    ]
 
 
 def check_rows(robot: Robot) -> list[dict[str, Any]]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from urdfkin.report.document import Check, Document, Robot
+from urdfkin.report.document import Check, Document, Judgement, Robot
 from urdfkin.report.words import (
+    SIDES,
     check_name,
+    columns,
     counted,
     in_order,
+    nearer,
     of_quantity,
     percent,
     pinocchio,
@@ -29,17 +32,6 @@ if TYPE_CHECKING:
 #: From this width on a column for each quantity fits beside the robots.
 _WIDE = 100
 _ROBOT_WIDTH = 20
-#: Column heads short enough for the wide table.
-_SHORT = {
-    "placement": "\nplace",
-    "velocity": "\nvel",
-    "jacobian": "\nJ",
-    "jacobian rate": "\nJ-dot",
-    "acceleration": "\nacc",
-    "joint jacobian": "joint\nJ",
-    "joint jacobian rate": "joint\nJ-dot",
-    "screws": "data\nJ",
-}
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
@@ -89,10 +81,18 @@ def _counts(robot: Robot) -> list[str]:
 
 
 def _wide(robots: Sequence[Robot]) -> Table:
-    names = quantities(robots)
-    heads = ["\nrobot", "\njoints", "\nframes", "\nresults", *(_SHORT.get(name, name) for name in names)]
-    rows = ([*_counts(robot), *(worst_of(robot, q) for q in names), robot["verdict"]] for robot in robots)
-    return plain_table([*heads, "\nverdict"], rows, words=(0, len(heads)))
+    quantities_of = columns(robots)
+    heads = ["robot", "joints", "frames", "results", *quantities_of, "of bound", "verdict"]
+    rows = (
+        [
+            *_counts(robot),
+            *(worst_of(robot, names) for names in quantities_of.values()),
+            percent(share_of(robot)) if robot["checks"] else "",
+            robot["verdict"],
+        ]
+        for robot in robots
+    )
+    return plain_table(heads, rows, words=(0, len(heads) - 1))
 
 
 def _robots(robots: Sequence[Robot]) -> Table:
@@ -147,6 +147,29 @@ def _checks(robot: Robot) -> Table:
     return plain_table(heads, rows, words=(0,))
 
 
+def _judged(judgement: Judgement) -> Table:
+    """Both sides' true errors, a row for each quantity and reference."""
+    heads = [
+        "quantity, reference",
+        "numbers",
+        "worst\nurdfkin",
+        "\nPinocchio",
+        "typical\nurdfkin",
+        "\nPinocchio",
+    ]
+    rows = (
+        [
+            line["quantity"] + (f", {line['reference']}" if line["reference"] else ""),
+            f"{line['numbers']:,}",
+            *(f"{line[side]['worst']:.2f}" for side in SIDES),
+            *(f"{line[side]['typical']:.3f}" for side in SIDES),
+            nearer(line),
+        ]
+        for line in judgement["lines"]
+    )
+    return plain_table([*heads, "\nnearer"], rows, words=(0,))
+
+
 def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
     if robot["reason"]:
         out.print(f"{robot['source']}: {robot['verdict']}: {robot['reason']}")
@@ -155,6 +178,13 @@ def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
         out.print(
             f"{robot['source']}: {counted(len(noted), 'warning')}, see: urdfkin check {robot['source']}"
         )
+    if robot["judge"] is not None:
+        out.print(
+            f"{robot['source']}: true errors in eps*scale, at 50 digits, on"
+            f" {counted(robot['judge']['samples'], 'sample')}",
+            style="bold",
+        )
+        out.print(_judged(robot["judge"]))
     for check in robot["checks"]:
         case = check["worst_case"]
         if case is None or not (cases or check["failed"]):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Literal
 
-from urdfkin.report.document import Check, Document, Robot, Units
+from urdfkin.report.document import Check, Document, Judged, Robot, Units
 
 #: Quantities as a reader knows them, in the order of a report.
 QUANTITIES = {
@@ -17,6 +18,16 @@ QUANTITIES = {
     "joint jacobian rate": "joint Jacobian rate",
     "screws": "data.J",
 }
+#: Column heads short enough for a line of all robots, and the quantities whose worst stands below them.
+COLUMNS = {
+    "place": ("placement",),
+    "vel": ("velocity",),
+    "J": ("jacobian", "joint jacobian"),
+    "J-dot": ("jacobian rate", "joint jacobian rate"),
+    "acc": ("acceleration",),
+    "data.J": ("screws",),
+}
+SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
 #: Worse verdicts first.
 VERDICTS = ("bad input", "not verified", "disagrees", "verified")
 
@@ -74,10 +85,28 @@ def in_order(robot: Robot) -> list[Check]:
     return [check for quantity in quantities([robot]) for check in of_quantity(robot, quantity)]
 
 
-def worst_of(robot: Robot, quantity: str) -> str:
-    """The worst disagreement of a quantity over its references, as a cell."""
-    checks = of_quantity(robot, quantity)
+def columns(robots: Sequence[Robot]) -> dict[str, tuple[str, ...]]:
+    """The columns of `COLUMNS` that any robot fills; a quantity of no column has its own."""
+    found = quantities(robots)
+    known = {name for names in COLUMNS.values() for name in names}
+    heads = {head: names for head, names in COLUMNS.items() if any(name in found for name in names)}
+    return heads | {name: (name,) for name in found if name not in known}
+
+
+def column(robot: Robot, names: Sequence[str]) -> list[Check]:
+    """A robot's checks of several quantities."""
+    return [check for name in names for check in of_quantity(robot, name)]
+
+
+def worst_of(robot: Robot, names: Sequence[str]) -> str:
+    """The worst disagreement of quantities over their references, as a cell."""
+    checks = column(robot, names)
     return units(worst(check["worst"] for check in checks), compared=bool(checks))
+
+
+def nearer(line: Judged) -> str:
+    """Whose typical error is the smaller."""
+    return "urdfkin" if line["urdfkin"]["typical"] <= line["pinocchio"]["typical"] else "Pinocchio"
 
 
 def share_of(robot: Robot) -> Units:

@@ -22,6 +22,7 @@ from urdfkin.recursion.announcing import load_kernels
 from urdfkin.robot import Robot
 from urdfkin.sources import Source, is_xacro, read_source
 from urdfkin.validation.chunk import SPECIAL, Chunk, ChunkResult, Subject, chunks, run_chunk
+from urdfkin.validation.clock import total
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait, as_data
 from urdfkin.validation.report import RobotReport, ValidationReport, Verdict
 from urdfkin.validation.tally import Key, Tally
@@ -205,7 +206,7 @@ def _portrait(subject: Subject, error: UrdfkinError) -> Portrait:
     if isinstance(error, UrdfError):
         return Portrait(findings=as_data(error.findings))
     try:
-        return Portrait.of(subject.read())
+        return Portrait.of(subject.read(), None)
     except UrdfkinError:
         return NO_PORTRAIT
 
@@ -215,7 +216,8 @@ def _report(subject: Subject, results: Sequence[ChunkResult], samples: int) -> R
     for result in results:
         for key, tally in result.tallies.items():
             tallies[key] = tallies[key] + tally if key in tallies else tally
-    failed = any(tally.failed for tally in tallies.values())
+    portrait = next((result.portrait for result in results if result.portrait), NO_PORTRAIT)
+    failed = any(tally.failed for tally in tallies.values()) or not portrait.chains_agree
     first = results[0]
     return RobotReport(
         source=first.source,
@@ -227,5 +229,6 @@ def _report(subject: Subject, results: Sequence[ChunkResult], samples: int) -> R
         tallies=tallies,
         samples=samples + SPECIAL,
         seconds=sum(result.seconds for result in results),
-        portrait=next((result.portrait for result in results if result.portrait), NO_PORTRAIT),
+        portrait=portrait,
+        clock=total(result.clock for result in results),
     )

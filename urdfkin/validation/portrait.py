@@ -11,7 +11,9 @@ from typing import Any
 
 from urdfkin.description import describe
 from urdfkin.diagnostics import Finding
+from urdfkin.oracle import Oracle
 from urdfkin.robot import Robot
+from urdfkin.validation.chains import chains_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +31,14 @@ class Portrait:
     chains: tuple[dict[str, Any], ...] = ()
 
     @classmethod
-    def of(cls, robot: Robot) -> Portrait:
-        """The portrait of a robot that was loaded."""
-        return cls(describe(robot), as_data(robot.findings))
+    def of(cls, robot: Robot, oracle: Oracle | None) -> Portrait:
+        """The portrait of a robot that was loaded; its tables are checked where Pinocchio can."""
+        return cls(describe(robot), as_data(robot.findings), chains_of(robot, oracle))
+
+    @property
+    def chains_agree(self) -> bool:
+        """Whether no table that was checked lies outside its bound."""
+        return all((chain["share_of_bound"] or 0.0) <= 1.0 for chain in self.chains)
 
 
 #: Of a robot nothing is known about.

@@ -14,6 +14,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.catalogue import examples
+from urdfkin.validation.clock import Clock
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
 from urdfkin.validation.tally import HISTOGRAM_EDGES, Key, Tally, WorstCase
 from urdfkin.verification.bounds import Quantity
@@ -49,6 +50,7 @@ class RobotReport:
         samples: How many configurations.
         seconds: Time spent computing and comparing.
         portrait: What it is made of and what was found in its file.
+        clock: Where the time went; None if nothing was computed.
     """
 
     source: str
@@ -61,6 +63,7 @@ class RobotReport:
     samples: int
     seconds: float
     portrait: Portrait = NO_PORTRAIT
+    clock: Clock | None = None
 
     @property
     def results(self) -> int:
@@ -99,7 +102,7 @@ class RobotReport:
             "results": self.results,
             "failed": self.failed,
             "seconds": round(self.seconds, 3),
-            "timings": None,
+            "timings": self.clock.as_dict() if self.clock else None,
             "model": self.portrait.model,
             "findings": list(self.portrait.findings),
             "chains": list(self.portrait.chains),
@@ -238,9 +241,17 @@ class ValidationReport:
             "interrupted": self.interrupted,
             "passed": self.passed,
             "command": self.command,
-            "robots": [robot.as_dict() for robot in self.robots],
-            "judge": [judgement.as_dict() for judgement in self.judgements],
+            "robots": self._robots(),
         }
+
+    def _robots(self) -> list[dict[str, Any]]:
+        """Each with its judgement: those that were compared were judged, in their order."""
+        judgements = iter(self.judgements)
+        entries = []
+        for robot in self.robots:
+            found = next(judgements, None) if robot.tallies else None
+            entries.append(robot.as_dict() | {"judge": found.as_dict() if found else None})
+        return entries
 
 
 def versions() -> dict[str, str]:
@@ -253,4 +264,4 @@ def _version(package: str) -> str:
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
-        return "not installed"
+        return "a checkout" if package == "urdfkin" else "not installed"
