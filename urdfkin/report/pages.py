@@ -11,11 +11,10 @@ from urdfkin.report.document import Chain, Check, Joint, Judgement, Limit, Model
 from urdfkin.report.words import (
     SIDES,
     column,
+    columns,
     in_order,
     nearer,
-    of_quantity,
     percent,
-    quantities,
     quantity_name,
     share_of,
     units,
@@ -118,30 +117,30 @@ def _limits(limit: Limit | None, kind: str) -> dict[str, str]:
 
 def heat_map(robot: Robot, model: Model) -> tuple[list[str], list[tuple[str, list[Cell]]]]:
     """Column heads, and for each moving joint its name and cells: the worst over all references."""
-    names = quantities([robot])
+    quantities_of = columns([robot])
     frame = {name: i for i, name in enumerate(robot["frames"])}
     moving = {name: i for i, name in enumerate(robot["joints"])}
-    columns = _columns(model)
+    own = _columns(model)
     rows = []
     for joint in robot["joints"]:
         where = {
             "frames": [frame[f"joint:{joint}"]] if f"joint:{joint}" in frame else [],
             "joints": [moving[joint]],
-            "columns": columns.get(joint, []),
+            "columns": own.get(joint, []),
         }
-        rows.append((joint, [_cell(of_quantity(robot, name), where) for name in names]))
-    return [quantity_name(name) for name in names], rows
+        rows.append((joint, [_cell(column(robot, names), where) for names in quantities_of.values()]))
+    return list(quantities_of), rows
 
 
 def _columns(model: Model) -> dict[str, list[int]]:
     """Which columns of all joints' rates belong to each joint, followers too."""
-    columns: dict[str, list[int]] = {}
+    own: dict[str, list[int]] = {}
     at = 0
     for joint in model["joints"]:
         size = {"fixed": 0, "planar": 3, "floating": 6}.get(joint["kind"], 1)
-        columns[joint["name"]] = list(range(at, at + size))
+        own[joint["name"]] = list(range(at, at + size))
         at += size
-    return columns
+    return own
 
 
 def _cell(checks: Sequence[Check], where: dict[str, list[int]]) -> Cell:

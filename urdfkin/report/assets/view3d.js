@@ -251,7 +251,7 @@
       this.dhState = null;
       const chosen = this.chosen();
       if (!chosen) return;
-      const { frames, normals, offsets } = this.robot.dh(...chosen), length = 0.075 * this.reach, thick = 0.0035 * this.reach;
+      const { frames, normals, offsets } = this.robot.dh(...chosen), length = 0.09 * this.reach, thick = 0.0045 * this.reach;
       const rods = (segments, material) => segments.map(([from, to]) => this.rod(from, to, thick, material));
       this.dhState = {
         frames: frames.map(() => this.triadArrows(length)),
@@ -287,7 +287,7 @@
     // From the same side always, as near as every link's origin allows.
     look() {
       this.touched = false;
-      const width = this.canvas.clientWidth || 1, height = this.canvas.clientHeight || 1, margin = 1.16;
+      const width = this.canvas.clientWidth || 1, height = this.canvas.clientHeight || 1, margin = 1.28;
       const away = new THREE.Vector3(1.0, -1.35, 0.62).normalize(), centre = this.box.getCenter(new THREE.Vector3());
       const right = new THREE.Vector3().crossVectors(Z, away).normalize(), up = new THREE.Vector3().crossVectors(away, right);
       const tall = Math.tan((this.camera.fov * Math.PI) / 360), wide = (tall * width) / height, p = new THREE.Vector3();
@@ -351,6 +351,10 @@
       for (const part of this.frameLines) part.visible = on("frames");
       this.grid.visible = on("grid");
       this.dhParts.visible = on("dh");
+      // The tables' frames stand inside the joints: the robot fades while they are looked at.
+      for (const name of ["bone", "fixed", "turn", "slide", "free"]) {
+        Object.assign(this.materials[name], { transparent: on("dh"), opacity: on("dh") ? 0.22 : 1, depthWrite: !on("dh"), needsUpdate: true });
+      }
       this.update();
     }
     theme() {
