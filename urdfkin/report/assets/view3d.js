@@ -351,9 +351,11 @@
       for (const part of this.frameLines) part.visible = on("frames");
       this.grid.visible = on("grid");
       this.dhParts.visible = on("dh");
+      const legend = this.section.querySelector(".dhkey");
+      if (legend) legend.hidden = !on("dh");
       // The tables' frames stand inside the joints: the robot fades while they are looked at.
       for (const name of ["bone", "fixed", "turn", "slide", "free"]) {
-        Object.assign(this.materials[name], { transparent: on("dh"), opacity: on("dh") ? 0.22 : 1, depthWrite: !on("dh"), needsUpdate: true });
+        Object.assign(this.materials[name], { transparent: on("dh"), opacity: on("dh") ? 0.32 : 1, depthWrite: !on("dh"), needsUpdate: true });
       }
       this.update();
     }
