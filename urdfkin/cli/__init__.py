@@ -27,6 +27,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
     "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),
     "explain": ("urdfkin.cli.explain", "what a finding's code means, or an equation's number"),
+    "report": ("urdfkin.cli.report", "show or write the report of an earlier validation"),
+    "compare": ("urdfkin.cli.compare", "what changed between two validations"),
 }
 
 

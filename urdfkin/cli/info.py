@@ -28,7 +28,9 @@ def command(robot: str, mimic: bool | None, root_joint: str | None, format_: str
     """
     loaded = load_robot(robot, mimic, root_joint)
     if format_ == "json":
-        json.dump(_as_dict(loaded), sys.stdout, indent=2, allow_nan=False)
+        from urdfkin.description import describe  # noqa: PLC0415  keeps --help fast
+
+        json.dump(describe(loaded), sys.stdout, indent=2, allow_nan=False)
         click.echo()
         return
     _print(loaded)
@@ -75,53 +77,3 @@ def _limits(joint: Joint) -> tuple[str, str]:
 
 def _bound(value: float) -> str:
     return "" if math.isinf(value) else f"{value:.6g}"
-
-
-def _as_dict(robot: Robot) -> dict[str, object]:
-    tree = robot.tree
-    return {
-        "name": robot.name,
-        "source": robot.source,
-        "nq": robot.nq,
-        "nv": robot.nv,
-        "base": robot.base_frame,
-        "tip": robot.tip_frame,
-        "coordinates": list(robot.coordinate_names),
-        "rates": list(robot.rate_names),
-        "frames": list(robot.frame_names),
-        "joints": [_joint(robot, i) for i in range(len(tree.joints))],
-    }
-
-
-def _joint(robot: Robot, i: int) -> dict[str, object]:
-    tree = robot.tree
-    joint = tree.joints[i]
-    limit = joint.limit
-    return {
-        "name": joint.name,
-        "kind": joint.kind.value,
-        "parent": tree.links[joint.parent],
-        "child": tree.links[i + 1],
-        "placement": joint.T_parent_joint.tolist(),
-        "axis": joint.axis.tolist() if joint.kind.has_axis else None,
-        "q": tree.q_index[i] if joint.kind.nq else None,
-        "v": tree.v_index[i] if joint.kind.nv else None,
-        "limit": None
-        if limit is None
-        else {
-            name: value if math.isfinite(value) else None
-            for name, value in (
-                ("lower", limit.lower),
-                ("upper", limit.upper),
-                ("velocity", limit.velocity),
-                ("effort", limit.effort),
-            )
-        },
-        "mimic": None
-        if joint.mimic is None
-        else {
-            "leader": joint.mimic.leader,
-            "multiplier": joint.mimic.multiplier,
-            "offset": joint.mimic.offset,
-        },
-    }

@@ -6,14 +6,10 @@ import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from urdfkin.cli.output import console, make_table
-
 if TYPE_CHECKING:
     from urdfkin.judge import Judgement
     from urdfkin.robot import Robot
     from urdfkin.validation.report import ValidationReport
-
-_COLUMNS = ("quantity", "reference", "numbers", "urdfkin", "Pinocchio", "urdfkin", "Pinocchio", "nearer")
 
 
 def judge_all(
@@ -33,35 +29,11 @@ def judge_all(
     from urdfkin.loading import load  # noqa: PLC0415
 
     judgements = []
-    for robot, source in zip(report.robots, given, strict=True):
+    # An interrupted run reports on fewer robots than were given.
+    for robot, source in zip(report.robots, given, strict=False):
         if robot.tallies:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", UrdfWarning)  # said already
                 loaded = load(source, **how) if isinstance(source, str) else source
             judgements.append(judge(loaded, samples=samples, seed=seed))
     return tuple(judgements)
-
-
-def print_judgements(judgements: Sequence[Judgement]) -> None:
-    """A table for each robot: worst and typical true errors of both sides."""
-    out = console()
-    for judgement in judgements:
-        out.print(
-            f"{judgement.robot}: true errors in eps*scale, at 50 digits, {judgement.samples} samples: "
-            "worst, then typical (root mean square)",
-            style="bold",
-        )
-        rows = [
-            (
-                line.quantity.value,
-                line.reference,
-                f"{line.numbers:,}",
-                f"{line.urdfkin.worst:.2f}",
-                f"{line.pinocchio.worst:.2f}",
-                f"{line.urdfkin.typical:.3f}",
-                f"{line.pinocchio.typical:.3f}",
-                "urdfkin" if line.urdfkin.typical <= line.pinocchio.typical else "Pinocchio",
-            )
-            for line in judgement.lines
-        ]
-        out.print(make_table(_COLUMNS, rows, words=2))

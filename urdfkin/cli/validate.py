@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
 from urdfkin.catalogue import examples
 from urdfkin.cli.arguments import xacro_args, xacro_option
-from urdfkin.cli.judgement import judge_all, print_judgements
-from urdfkin.cli.output import compiling, console, make_table, write_file
+from urdfkin.cli.judgement import judge_all
+from urdfkin.cli.output import compiling, console
+from urdfkin.cli.reports import check_writable, report_options, write_reports
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.validation.campaign import Progress
-    from urdfkin.validation.report import RobotReport, ValidationReport
 
 EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 
@@ -43,6 +42,7 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @click.option("--judge", "judged", is_flag=True, help="Say whose last digits are right, at 50 digits.")
 @click.option("--judge-samples", type=click.IntRange(1), default=5, show_default=True, help="For --judge.")
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as data.")
+@report_options
 @click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case.")
 @click.pass_context
 def command(
@@ -58,6 +58,9 @@ def command(
     judge_samples: int,
     isolate: bool,
     json_: Path | None,
+    html: Path | None,
+    junit: Path | None,
+    markdown: Path | None,
     cases: bool,
 ) -> None:
     """Compare every quantity, frame, joint and reference with Pinocchio's, on many samples.
@@ -68,10 +71,11 @@ def command(
     """
     if bool(robots) == all_:
         raise click.UsageError("name robots, or say --all for the whole catalogue")
-    from urdfkin.validation.campaign import validate  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.document import Document  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.terminal import print_report  # noqa: PLC0415
+    from urdfkin.validation.campaign import validate  # noqa: PLC0415
 
-    if json_ is not None:
-        write_file(json_, b"")  # fail before the work, not after it
+    check_writable(json_, html, junit, markdown)
     how: dict[str, Any] = {"mimic": mimic, "root_joint": root_joint, "xacro_args": xacro_args()}
     given = [_once(robot, how) if judged else robot for robot in robots or examples()]
     with compiling(), _progress() as progress:
@@ -87,10 +91,9 @@ def command(
     if judged:
         found = judge_all(report, given, judge_samples, seed, **how)
         report = replace(report, judgements=found)
-    if json_ is not None:
-        write_file(json_, (json.dumps(report.as_dict(), allow_nan=False) + "\n").encode())
-    _print(report, cases=cases)
-    print_judgements(report.judgements)
+    document = cast("Document", report.as_dict())
+    write_reports(document, json_=json_, html=html, junit=junit, markdown=markdown)
+    print_report(document, console(), cases=cases)
     context.exit(report.exit_code)
 
 
@@ -111,70 +114,3 @@ def _progress() -> Iterator[Progress]:
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task("", total=None)
         yield lambda done, total, label: bar.update(task, completed=done, total=total, description=label)
-
-
-def _print(report: ValidationReport, *, cases: bool) -> None:
-    from urdfkin.validation.report import Verdict  # noqa: PLC0415
-
-    out = console()
-    out.print("worst disagreement with Pinocchio in eps*scale, for each quantity", style="bold")
-    columns = ["robot", "joints", "frames", "results", *_COLUMNS, "verdict"]
-    rows = (
-        [
-            *_counts(robot),
-            *(_worst(robot, quantities) for quantities in _COLUMNS.values()),
-            robot.verdict.value,
-        ]
-        for robot in report.robots
-    )
-    out.print(make_table(columns, rows))
-    for robot in report.robots:
-        if robot.reason:
-            out.print(f"{robot.source}: {robot.verdict.value}: {robot.reason}")
-        if robot.verdict is Verdict.DISAGREES or cases:
-            _print_cases(robot, cases=cases)
-    results = sum(robot.results for robot in report.robots)
-    failed = sum(robot.failed for robot in report.robots)
-    state = "interrupted: " if report.interrupted else ""
-    out.print(
-        f"{state}{len(report.robots)} robots, {results:,} results compared, {failed:,} outside their bound,"
-        f" {report.seconds:.1f} s, seed {report.seed}",
-        style="bold green" if report.passed else "bold red",
-    )
-
-
-#: Column heads, and the quantities whose worst stands below them: frames and joints share a column.
-_COLUMNS = {
-    "place": ("placement",),
-    "vel": ("velocity",),
-    "J": ("jacobian", "joint jacobian"),
-    "J'": ("jacobian rate", "joint jacobian rate"),
-    "acc": ("acceleration",),
-    "data.J": ("screws",),
-}
-
-
-def _counts(robot: RobotReport) -> list[str]:
-    return [robot.source, str(len(robot.joints)), str(len(robot.frames)), f"{robot.results:,}"]
-
-
-def _worst(robot: RobotReport, quantities: tuple[str, ...]) -> str:
-    from urdfkin.verification.bounds import Quantity  # noqa: PLC0415
-
-    found = [robot.worst(Quantity(quantity)) for quantity in quantities]
-    return _number(max((value for value in found if value is not None), default=None))
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.2f}" if value < 1000 else f"{value:.2g}"
-
-
-def _print_cases(robot: RobotReport, *, cases: bool) -> None:
-    for key, tally in robot.tallies.items():
-        if tally.case is not None and (cases or tally.failed):
-            quantity, reference = key
-            click.echo(
-                f"  {quantity} {reference}: {tally.failed} of {tally.results} outside the bound,"
-                f" worst {tally.worst:.3g} eps*scale, {tally.share:.1%} of the bound"
-            )
-            click.echo(f"    {robot.replay(key)}")

@@ -1,6 +1,6 @@
 """A chain drawn with its Denavit-Hartenberg frames, joint axes and common normals, as SVG.
 
-The only module that imports matplotlib (the extra `urdfkin[plots]`). The picture is an orthographic view:
+Needs the extra `urdfkin[plots]`. The picture is an orthographic view:
 joint axes are dashed lines along z, the offsets d run along them in grey, the lengths a along the common
 normals in orange; each frame shows its x and z. Arrows that end at one place share a label.
 """
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from urdfkin.dh.row import Convention
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
+from urdfkin.figure import new_figure, style
 from urdfkin.tree import FloatArray
 
 _X, _Z, _D, _A, _AXIS, _TEXT = "#c0392b", "#2456a6", "#6b7280", "#d97904", "#9aa7b5", "#222222"
@@ -44,17 +45,11 @@ def drawing(
     Raises:
         InputError: matplotlib is not installed, or `q` has the wrong length.
     """
-    try:
-        import matplotlib as mpl  # noqa: PLC0415 - an extra
-        from matplotlib.figure import Figure  # noqa: PLC0415
-    except ImportError:
-        raise InputError("drawing needs matplotlib", remedy="pip install 'urdfkin[plots]'") from None
     frames = table.frames(q)
     if frames.ndim != 3:
         raise InputError("a drawing shows one configuration", found=f"a batch of shape {frames.shape[:-3]}")
-    # Text stays text, and the same table gives the same file.
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "urdfkin", "font.size": 9}):
-        axes: Any = Figure(figsize=(10.0, 9.0)).add_subplot()
+    with style(font_size=9):
+        axes: Any = new_figure(10.0, 9.0).add_subplot()
         tip = frames[-1] @ table.tool
         points = np.concatenate(
             [frames[:, :3, 3], _corners(table, frames), tip[None, :3, 3], np.zeros((1, 3))]

@@ -17,13 +17,16 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 
+from urdfkin.diagnostics import UrdfError
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.oracle import OracleError
 from urdfkin.recursion.announcing import load_kernels
 from urdfkin.robot import Robot
 from urdfkin.sources import Source, is_xacro, read_source
 from urdfkin.validation.chunk import SPECIAL, Chunk, ChunkResult, Subject, chunks, run_chunk
+from urdfkin.validation.clock import total
 from urdfkin.validation.isolation import DiedError, run_isolated
+from urdfkin.validation.portrait import NO_PORTRAIT, Portrait, as_data
 from urdfkin.validation.report import RobotReport, ValidationReport, Verdict
 from urdfkin.validation.tally import Key, Tally
 
@@ -232,7 +235,19 @@ class _Run:
 
 def _refused(subject: Subject, error: UrdfkinError) -> RobotReport:
     verdict = Verdict.NOT_VERIFIED if isinstance(error, OracleError | DiedError) else Verdict.BAD_INPUT
-    return RobotReport(subject.label, subject.label, verdict, str(error), (), (), {}, 0, 0.0)
+    portrait = _portrait(subject, error)
+    name = portrait.model["name"] if portrait.model else subject.label
+    return RobotReport(subject.label, name, verdict, str(error), (), (), {}, 0, 0.0, portrait)
+
+
+def _portrait(subject: Subject, error: UrdfkinError) -> Portrait:
+    """What can be told of a robot that was not checked: its parts if it can be read, else the findings."""
+    if isinstance(error, UrdfError):
+        return Portrait(findings=as_data(error.findings))
+    try:
+        return Portrait.of(subject.read(), None)
+    except UrdfkinError:
+        return NO_PORTRAIT
 
 
 def _report(subject: Subject, results: Sequence[ChunkResult], samples: int) -> RobotReport:
@@ -240,7 +255,8 @@ def _report(subject: Subject, results: Sequence[ChunkResult], samples: int) -> R
     for result in results:
         for key, tally in result.tallies.items():
             tallies[key] = tallies[key] + tally if key in tallies else tally
-    failed = any(tally.failed for tally in tallies.values())
+    portrait = next((result.portrait for result in results if result.portrait), NO_PORTRAIT)
+    failed = any(tally.failed for tally in tallies.values()) or not portrait.chains_agree
     first = results[0]
     return RobotReport(
         source=first.source,
@@ -252,4 +268,6 @@ def _report(subject: Subject, results: Sequence[ChunkResult], samples: int) -> R
         tallies=tallies,
         samples=samples + SPECIAL,
         seconds=sum(result.seconds for result in results),
+        portrait=portrait,
+        clock=total(result.clock for result in results),
     )

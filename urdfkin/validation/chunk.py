@@ -23,6 +23,8 @@ from urdfkin.recursion.plan import Plan, make_plan
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray, KinematicTree, freed
+from urdfkin.validation.clock import Clock
+from urdfkin.validation.portrait import Portrait
 from urdfkin.validation.tally import Key, Tally, tally
 from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Bound, Quantity
@@ -63,15 +65,19 @@ class Subject:
         """How to call it while it is not loaded."""
         return self.words or (self.source if isinstance(self.source, str) else "<bytes>")
 
+    def read(self) -> Robot:
+        """The robot; its warnings are in its portrait."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UrdfWarning)
+            return load(self.source, mimic=self.mimic, root_joint=self.root_joint)
+
     def load(self) -> Robot:
-        """The robot; its warnings belong to `check`, not here.
+        """The robot, to be checked.
 
         Raises:
             OracleError: a finding says that Pinocchio refuses it or reads another robot.
         """
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UrdfWarning)
-            robot = load(self.source, mimic=self.mimic, root_joint=self.root_joint)
+        robot = self.read()
         if robot.unverifiable is not None:
             raise OracleError(robot.unverifiable, where=self.label)
         return robot
@@ -99,7 +105,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """What a chunk found, about whom, and how long it took."""
+    """What a chunk found, about whom, and how long it took; the first chunk also says what it is."""
 
     source: str
     name: str
@@ -107,6 +113,8 @@ class ChunkResult:
     frames: tuple[str, ...]
     tallies: dict[Key, Tally]
     seconds: float
+    clock: Clock
+    portrait: Portrait | None
 
 
 def chunks(subject: Subject, samples: int, seed: int) -> Iterator[Chunk]:
@@ -125,38 +133,48 @@ def _loaded(subject: Subject) -> tuple[Robot, Oracle, Plan]:
 
 def run_chunk(chunk: Chunk) -> ChunkResult:
     """Compute every quantity of every frame in all references, and compare."""
-    begin = time.perf_counter()
+    begin, clock = time.perf_counter(), Clock()
     robot, oracle, plan = _loaded(chunk.subject)
-    work = _Work(robot, oracle, plan, chunk.draw(robot.tree), chunk.first_sample)
+    portrait = Portrait.of(robot, oracle) if chunk.index == 0 else None
+    clock.read = time.perf_counter() - begin
+    work = _Work(robot, oracle, plan, chunk.draw(robot.tree), chunk.first_sample, clock)
+    tallies = dict(work.tallies())
+    seconds = time.perf_counter() - begin
+    clock.close(seconds)
     return ChunkResult(
         source=chunk.subject.words or robot.source,
         name=robot.name,
         joints=robot.joint_names,
         frames=robot.all_frames,
-        tallies=dict(work.tallies()),
-        seconds=time.perf_counter() - begin,
+        tallies=tallies,
+        seconds=seconds,
+        clock=clock,
+        portrait=portrait,
     )
 
 
 class _Work:
     """The comparisons of one chunk."""
 
-    def __init__(self, robot: Robot, oracle: Oracle, plan: Plan, x: Samples, first_sample: int) -> None:
+    def __init__(
+        self, robot: Robot, oracle: Oracle, plan: Plan, x: Samples, first_sample: int, clock: Clock
+    ) -> None:
         self.robot, self.oracle, self.plan, self.x, self.first = robot, oracle, plan, x, first_sample
+        self.clock = clock
         self.size = magnitudes(plan, x.q, x.v, x.a, STILL_STATE)
 
     def tallies(self) -> Iterator[tuple[Key, Tally]]:
         x, oracle, plan, frames = self.x, self.oracle, self.plan, self.robot.all_frames
-        theirs = oracle.placements(x.q, frames)
-        ours = evaluate.placements(plan, x.q)
+        theirs = self.clock.theirs(oracle.placements, x.q, frames)
+        ours = self.clock.ours(evaluate.placements, plan, x.q)
         yield self._tally(Quantity.PLACEMENT, None, ours, theirs, bounds.placement_bound(self.size), frames)
         for reference in Reference:
-            velocity = evaluate.velocities(plan, x.q, x.v, reference)
-            theirs = oracle.velocities(x.q, x.v, frames, [reference])[:, :, 0]
+            velocity = self.clock.ours(evaluate.velocities, plan, x.q, x.v, reference)
+            theirs = self.clock.theirs(oracle.velocities, x.q, x.v, frames, [reference])[:, :, 0]
             bound = bounds.velocity_bound(self.size, reference)
             yield self._tally(Quantity.VELOCITY, reference, velocity, theirs, bound, frames)
-            acceleration = evaluate.accelerations(plan, x.q, x.v, x.a, reference)
-            theirs = oracle.accelerations(x.q, x.v, x.a, frames, [reference])[:, :, 0]
+            acceleration = self.clock.ours(evaluate.accelerations, plan, x.q, x.v, x.a, reference)
+            theirs = self.clock.theirs(oracle.accelerations, x.q, x.v, x.a, frames, [reference])[:, :, 0]
             bound = bounds.acceleration_bound(self.size, reference)
             yield self._tally(Quantity.ACCELERATION, reference, acceleration, theirs, bound, frames)
             yield from self._jacobians(reference)
@@ -165,21 +183,21 @@ class _Work:
 
     def _jacobians(self, reference: Reference) -> Iterator[tuple[Key, Tally]]:
         q, frames, tree = self.x.q, self.robot.all_frames, self.robot.tree
-        ours = evaluate.jacobians(self.plan, q, reference)
-        theirs = self.oracle.jacobians(q, frames, [reference])[:, :, 0]
+        ours = self.clock.ours(evaluate.jacobians, self.plan, q, reference)
+        theirs = self.clock.theirs(self.oracle.jacobians, q, frames, [reference])[:, :, 0]
         bound = bounds.jacobian_bound(self.plan, self.size, reference)
         yield self._tally(Quantity.JACOBIAN, reference, ours, theirs, bound, frames)
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         part = Bound(bound.scale[:, moving], bound.k[:, moving])
-        theirs = self.oracle.joint_jacobians(q, [reference])[:, :, 0]
+        theirs = self.clock.theirs(self.oracle.joint_jacobians, q, [reference])[:, :, 0]
         yield self._tally(
             Quantity.JOINT_JACOBIAN, reference, ours[:, moving], theirs, part, self.robot.joint_names
         )
 
     def _jacobian_rates(self, reference: Reference) -> Iterator[tuple[Key, Tally]]:
         q, v, frames, tree = self.x.q, self.x.v, self.robot.all_frames, self.robot.tree
-        ours = evaluate.jacobian_rates(self.plan, q, v, reference)
-        theirs, of_joints = self.oracle.jacobian_rates_of_all(q, v, frames, reference)
+        ours = self.clock.ours(evaluate.jacobian_rates, self.plan, q, v, reference)
+        theirs, of_joints = self.clock.theirs(self.oracle.jacobian_rates_of_all, q, v, frames, reference)
         bound = bounds.jacobian_rate_bound(self.plan, self.size, reference)
         yield self._tally(Quantity.JACOBIAN_RATE, reference, ours, theirs, bound, frames)
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
@@ -200,13 +218,13 @@ class _Work:
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         plan = make_plan(tree, [i + 1 for i in moving])
         size = magnitudes(plan, q_free, *(np.zeros((len(q_free), tree.nv)),) * 2, STILL_STATE)
-        J = evaluate.jacobians(plan, q_free, Reference.WORLD)
+        J = self.clock.ours(evaluate.jacobians, plan, q_free, Reference.WORLD)
         bound = bounds.jacobian_bound(plan, _followed(size, self.size, moving), Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(moving) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
         ours = J[:, frame, :, column].swapaxes(0, 1)
         scale = bound.scale[:, frame, :, column].swapaxes(0, 1)
-        theirs = self.oracle.screws(self.x.q).swapaxes(1, 2)
+        theirs = self.clock.theirs(self.oracle.screws, self.x.q).swapaxes(1, 2)
         names = tuple(tree.joints[moving[f]].name for f, _ in own)
         return self._tally(
             Quantity.SCREWS, Reference.WORLD, ours, theirs, Bound(scale, bound.k[:, frame, 0]), names

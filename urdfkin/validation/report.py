@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,13 +13,16 @@ from enum import StrEnum
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
-from urdfkin.validation.tally import Key, Tally, WorstCase
+from urdfkin.catalogue import examples
+from urdfkin.validation.clock import Clock
+from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
+from urdfkin.validation.tally import HISTOGRAM_EDGES, Key, Tally, WorstCase
 from urdfkin.verification.bounds import Quantity
 
 if TYPE_CHECKING:
     from urdfkin.judge import Judgement
 
-#: Name and version of the JSON layout; documented in docs/validation.md.
+#: Name and version of the JSON layout: urdfkin/report/assets/validation-1.schema.json, docs/reports.md.
 SCHEMA = "urdfkin-validation/1"
 
 
@@ -45,6 +49,8 @@ class RobotReport:
         tallies: What was compared.
         samples: How many configurations.
         seconds: Time spent computing and comparing.
+        portrait: What it is made of and what was found in its file.
+        clock: Where the time went; None if nothing was computed.
     """
 
     source: str
@@ -56,6 +62,8 @@ class RobotReport:
     tallies: dict[Key, Tally]
     samples: int
     seconds: float
+    portrait: Portrait = NO_PORTRAIT
+    clock: Clock | None = None
 
     @property
     def results(self) -> int:
@@ -94,6 +102,10 @@ class RobotReport:
             "results": self.results,
             "failed": self.failed,
             "seconds": round(self.seconds, 3),
+            "timings": self.clock.as_dict() if self.clock else None,
+            "model": self.portrait.model,
+            "findings": list(self.portrait.findings),
+            "chains": list(self.portrait.chains),
             "checks": [self._check(key) for key in self.tallies],
         }
 
@@ -106,18 +118,20 @@ class RobotReport:
             "reference": reference or None,
             "results": tally.results,
             "failed": tally.failed,
-            "median": tally.percentile(50.0),
-            "p99": tally.percentile(99.0),
-            "worst": tally.worst,
-            "share_of_bound": tally.share,
+            "median": _finite(tally.percentile(50.0)),
+            "p99": _finite(tally.percentile(99.0)),
+            "worst": _finite(tally.worst),
+            "share_of_bound": _finite(tally.share),
+            "bound": [_finite(k) for k in tally.bounds],
             "histogram": list(tally.histogram),
-            "worst_by_frame": list(tally.by_frame),
+            "subjects": _subjects(quantity),
+            "worst_by_subject": [_finite(units) for units in tally.by_frame],
             "worst_case": None
             if case is None
             else {
                 "sample": case.sample,
                 "frame": case.frame,
-                "disagreement": case.units,
+                "disagreement": _finite(case.units),
                 "q": list(case.q),
                 "v": list(case.v),
                 "a": list(case.a),
@@ -135,10 +149,22 @@ _COMMANDS = {
 }
 
 
+def _subjects(quantity: Quantity) -> str:
+    """What a quantity was compared of."""
+    if quantity is Quantity.SCREWS:
+        return "columns"
+    return "joints" if quantity.startswith("joint ") else "frames"
+
+
+def _finite(units: float) -> float | None:
+    """JSON has no infinity: None stands for a result that is no number or must agree exactly and does not."""
+    return units if math.isfinite(units) else None
+
+
 def replay(source: str, quantity: Quantity, reference: str, case: WorstCase) -> str:
     """The command for one case; numbers are written so that they read back exactly."""
     command = _COMMANDS.get(quantity, quantity.value)
-    words = ["urdfkin", command, source, "--frame", _quoted(case.frame)]
+    words = ["urdfkin", command, _quoted(source), "--frame", _quoted(case.frame)]
     if reference:
         words += ["--reference", reference]
     given = {"placement": "q", "jacobian": "q", "acceleration": "qva"}.get(command, "qv")
@@ -176,6 +202,20 @@ class ValidationReport:
     judgements: tuple[Judgement, ...] = ()
 
     @property
+    def command(self) -> str:
+        """The command that repeats the run; the options of its first robot stand for all."""
+        sources = tuple(robot.source for robot in self.robots)
+        whole = sources == examples()
+        words = ["urdfkin", "validate", *(["--all"] if whole else map(_quoted, sources))]
+        words += ["--samples", str(self.samples), "--seed", str(self.seed)]
+        models = [robot.portrait.model for robot in self.robots if robot.portrait.model]
+        if models and models[0]["mimic"] is not None and not whole:
+            words.append("--mimic" if models[0]["mimic"] else "--no-mimic")
+        if models and models[0]["root_joint"]:
+            words += ["--root-joint", models[0]["root_joint"]]
+        return " ".join(words)
+
+    @property
     def passed(self) -> bool:
         """Whether every robot was verified and the run was finished."""
         return not self.interrupted and all(robot.verdict is Verdict.VERIFIED for robot in self.robots)
@@ -197,11 +237,21 @@ class ValidationReport:
             "seconds": round(self.seconds, 3),
             "seed": self.seed,
             "samples": self.samples,
+            "histogram_edges": HISTOGRAM_EDGES.tolist(),
             "interrupted": self.interrupted,
             "passed": self.passed,
-            "robots": [robot.as_dict() for robot in self.robots],
-            "judge": [judgement.as_dict() for judgement in self.judgements],
+            "command": self.command,
+            "robots": self._robots(),
         }
+
+    def _robots(self) -> list[dict[str, Any]]:
+        """Each with its judgement: those that were compared were judged, in their order."""
+        judgements = iter(self.judgements)
+        entries = []
+        for robot in self.robots:
+            found = next(judgements, None) if robot.tallies else None
+            entries.append(robot.as_dict() | {"judge": found.as_dict() if found else None})
+        return entries
 
 
 def versions() -> dict[str, str]:
@@ -214,4 +264,4 @@ def _version(package: str) -> str:
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
-        return "not installed"
+        return "a checkout" if package == "urdfkin" else "not installed"

@@ -6,6 +6,7 @@ wins; the sum does not depend on how the work was cut.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -48,6 +49,7 @@ class Tally:
             between each two, above the last.
         by_frame: The largest disagreement of each frame, in the robot's order.
         case: Where the largest share was.
+        bounds: The tightest and the widest bound, in eps * scale: it grows with the joints before a frame.
     """
 
     results: int
@@ -57,6 +59,7 @@ class Tally:
     histogram: tuple[int, ...]
     by_frame: tuple[float, ...]
     case: WorstCase | None
+    bounds: tuple[float, float] = (math.inf, 0.0)
 
     def __add__(self, other: Tally) -> Tally:
         first, second = self.case, other.case
@@ -70,6 +73,7 @@ class Tally:
             tuple(a + b for a, b in zip(self.histogram, other.histogram, strict=True)),
             tuple(max(a, b) for a, b in zip(self.by_frame, other.by_frame, strict=True)),
             first,
+            (min(self.bounds[0], other.bounds[0]), max(self.bounds[1], other.bounds[1])),
         )
 
     def percentile(self, percent: float) -> float:
@@ -126,6 +130,7 @@ def tally(
         histogram=tuple(int(x) for x in histogram),
         by_frame=tuple(float(x) for x in units.max(axis=0)),
         case=case,
+        bounds=(float(bound.k.min()), float(bound.k.max())),
     )
 
 

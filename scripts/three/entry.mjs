@@ -1,0 +1,8 @@
+// What the report's 3D view uses of three.js; everything else is left out of the bundle.
+export {
+  AmbientLight, Box3, BoxGeometry, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight,
+  Float32BufferAttribute, GridHelper, Group, HemisphereLight, LineBasicMaterial, LineDashedMaterial,
+  LineSegments, Matrix4, Mesh, MeshLambertMaterial, OctahedronGeometry, PerspectiveCamera, Quaternion,
+  REVISION, Scene, SphereGeometry, Spherical, Vector3, WebGLRenderer,
+} from "three";
+export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";

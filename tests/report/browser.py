@@ -1,0 +1,105 @@
+"""Debian's Chromium, driven through selenium: offline, headless, with a software renderer for WebGL."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from selenium import webdriver
+
+ARTEFACTS = Path(__file__).parents[2] / "artefacts"
+_PROBES = (Path(__file__).parent / "probes.js").read_text()
+_FLAGS = (
+    "--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run",
+    "--disable-default-apps", "--disable-extensions", "--hide-scrollbars", "--disable-dev-shm-usage",
+)  # fmt: skip
+
+
+def chromium() -> tuple[str, str] | None:
+    """Chromium and its driver; None where they are not installed."""
+    browser, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    return (browser, driver) if browser and driver else None
+
+
+def require_chromium() -> tuple[str, str]:
+    """Skip where there is no Chromium, but never in CI."""
+    found = chromium()
+    if found is None:
+        if os.environ.get("CI"):
+            pytest.fail("CI needs Debian's chromium and chromium-driver")
+        pytest.skip("Debian's chromium and chromium-driver are not installed")
+    return found
+
+
+@contextmanager
+def opened(profile: Path, *, width: int = 1280, height: int = 1000, dark: bool = False) -> Iterator[Browser]:
+    """A browser with an empty profile."""
+    binary, driver = require_chromium()
+    options = webdriver.ChromeOptions()
+    options.binary_location = binary
+    for flag in (*_FLAGS, f"--user-data-dir={profile}", f"--window-size={width},{height}"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    chrome = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    try:
+        chrome.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600},
+        )
+        theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+        chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": theme})
+        yield Browser(chrome)
+    finally:
+        chrome.quit()
+
+
+class Browser:
+    """What the tests do with a browser."""
+
+    def __init__(self, chrome: webdriver.Chrome) -> None:
+        self.chrome = chrome
+
+    def open(self, path: Path) -> None:
+        """Load a file, then put the probes into it."""
+        self.chrome.get(path.as_uri())
+        self.js(_PROBES)
+
+    def js(self, code: str, *arguments: Any) -> Any:
+        """Run a function's body in the page."""
+        return self.chrome.execute_script(code, *arguments)
+
+    def probe(self, name: str, *arguments: Any) -> Any:
+        """Ask one of the probes of `probes.js`."""
+        return self.js("return probe[arguments[0]](...arguments[1])", name, arguments)
+
+    def settle(self) -> None:
+        """Wait until everything that was to be drawn next is drawn."""
+        self.chrome.execute_async_script(
+            "const done = arguments[0], next = requestAnimationFrame;"
+            "next(() => next(() => setTimeout(done, 50)))"
+        )
+
+    def screenshot(self, name: str) -> None:
+        """Keep a picture among the artefacts."""
+        ARTEFACTS.mkdir(exist_ok=True)
+        self.chrome.save_screenshot(str(ARTEFACTS / f"{name}.png"))
+
+    def errors(self) -> list[str]:
+        """What the console holds against the page."""
+        return [entry["message"] for entry in self._log("browser") if entry["level"] == "SEVERE"]
+
+    def requests(self) -> list[str]:
+        """Every address that was asked for since the last call."""
+        events = [json.loads(entry["message"])["message"] for entry in self._log("performance")]
+        return [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]
+
+    def _log(self, kind: str) -> list[dict[str, Any]]:
+        return list(self.chrome.get_log(kind))  # type: ignore[no-untyped-call]

@@ -1,0 +1,76 @@
+"""Reports to test with: real runs on a few robots, one of them hostile, and runs that went wrong."""
+
+from __future__ import annotations
+
+import copy
+import json
+from functools import cache
+from typing import cast
+
+from urdfkin.report.document import Document
+from urdfkin.validation.campaign import validate
+
+#: What must never become an element, an attribute or a line of code.
+HOSTILE_ROBOT = "<script>window.hacked=1</script>"
+HOSTILE_JOINT = "j\"'><img src=x onerror=window.hacked=1>"
+HOSTILE_LINK = "</script><script>window.hacked=1</script>&amp;{{7*7}}`|*\u2028"
+
+_ESCAPED = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
+
+
+def _attribute(name: str) -> str:
+    return "".join(_ESCAPED.get(letter, letter) for letter in name)
+
+
+HOSTILE_URDF = f"""<?xml version="1.0"?>
+<robot name="{_attribute(HOSTILE_ROBOT)}">
+  <link name="base"/><link name="{_attribute(HOSTILE_LINK)}"/><link name="tip"/>
+  <joint name="{_attribute(HOSTILE_JOINT)}" type="revolute">
+    <parent link="base"/><child link="{_attribute(HOSTILE_LINK)}"/>
+    <origin xyz="0 0 0.4"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+  <joint name="slide" type="prismatic">
+    <parent link="{_attribute(HOSTILE_LINK)}"/><child link="tip"/>
+    <origin xyz="0.3 0 0"/><axis xyz="1 0 0"/><limit lower="0" upper="0.5" effort="1" velocity="1"/>
+  </joint>
+</robot>
+"""
+
+
+@cache
+def _arms() -> str:
+    return json.dumps(validate(["panda", "ur5"], samples=6).as_dict(), allow_nan=False)
+
+
+def arms() -> Document:
+    """A run over two arms; a fresh copy each time."""
+    return cast("Document", json.loads(_arms()))
+
+
+@cache
+def _hostile() -> str:
+    return json.dumps(validate([HOSTILE_URDF, "ur5"], samples=4).as_dict(), allow_nan=False)
+
+
+def hostile() -> Document:
+    """A run over a robot whose names are attacks, and one that is sane."""
+    document = cast("Document", json.loads(_hostile()))
+    document["robots"][0]["source"] = HOSTILE_ROBOT  # the words that named it are the whole URDF
+    return document
+
+
+def failing() -> Document:
+    """A run in which the Panda's local velocity disagrees, once beyond numbers, and a file was no URDF."""
+    document = arms()
+    panda, ur5 = document["robots"]
+    check = next(c for c in panda["checks"] if c["quantity"] == "velocity" and c["reference"] == "local")
+    check |= {"failed": 3, "worst": None, "p99": 1e7, "share_of_bound": None}
+    check["worst_by_subject"][4] = None
+    panda |= {"verdict": "disagrees", "failed": 3}
+    broken = copy.deepcopy(ur5)
+    broken |= {"source": "broken.urdf", "name": "broken.urdf", "verdict": "bad input", "model": None}
+    broken |= {"reason": "broken.urdf: the URDF has an error\n  broken.urdf:3:1: URDF502", "checks": []}
+    broken |= {"joints": [], "frames": [], "chains": [], "results": 0, "timings": None}
+    document["robots"].append(broken)
+    document["passed"] = False
+    return document

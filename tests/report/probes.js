@@ -1,0 +1,103 @@
+// What the browser tests ask of a page; put into it after it has loaded.
+window.probe = {
+  // How many pixels of the first view are drawn on, a sum that changes when they do, and how many there are.
+  pixels() {
+    const canvas = document.querySelector("canvas"), { width, height } = canvas;
+    const data = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+    let drawn = 0, sum = 0;
+    for (let i = 3; i < data.length; i += 4) {
+      if (!data[i]) continue;
+      drawn += 1;
+      sum = (sum + i * (data[i - 3] + data[i - 2] + data[i - 1])) % 1e12;
+    }
+    return [drawn, sum, width * height];
+  },
+
+  // Pixels of joints (blue) and of bones (grey).
+  colours() {
+    const canvas = document.querySelector("canvas");
+    const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+    let blue = 0, grey = 0;
+    for (let i = 0; i < data.length; i += 4) {
+      if (data[i + 3] < 200) continue;
+      if (data[i + 2] > data[i] + 60) blue += 1;
+      else if (Math.abs(data[i] - data[i + 2]) < 40) grey += 1;
+    }
+    return [blue, grey];
+  },
+
+  slide(index, value) {
+    const slider = document.querySelectorAll(".sliders input")[index];
+    slider.value = value;
+    slider.dispatchEvent(new Event("input"));
+    return document.querySelectorAll(".sliders output")[index].textContent;
+  },
+
+  press(key) {
+    const canvas = document.querySelector("canvas");
+    canvas.focus();
+    canvas.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+  },
+
+  showTable(convention) {
+    const view = document.querySelector(".view"), box = view.querySelector("[data-show=dh]");
+    box.checked = true;
+    box.dispatchEvent(new Event("change"));
+    const choice = view.querySelector("select[data-convention]");
+    choice.value = convention;
+    choice.dispatchEvent(new Event("change"));
+  },
+  visibleTables() {
+    const tables = [...document.querySelectorAll("#robot-0 .chain:not([hidden]) table")];
+    return tables.filter((table) => table.checkVisibility()).map((table) => table.caption.textContent.split(" ")[0]);
+  },
+
+  heads: () => [...document.querySelectorAll("#overview thead th")].map((head) => head.textContent),
+  column: (index) => [...document.querySelectorAll("#overview tbody tr")].map((row) => row.cells[index].textContent),
+  sortBy(index) {
+    document.querySelectorAll("#overview thead button")[index].click();
+    return document.querySelectorAll("#overview thead th")[index].ariaSort;
+  },
+  find(words) {
+    const input = document.querySelector("#find");
+    input.value = words;
+    input.dispatchEvent(new Event("input"));
+    const hidden = [...document.querySelectorAll("details.robot")].map((robot) => robot.hidden);
+    return [document.querySelector("#shown").textContent, hidden];
+  },
+  unfoldAll: () => document.querySelectorAll("details").forEach((part) => { part.open = true; }),
+
+  // Texts whose WCAG contrast with what they stand on is below 4.5.
+  poorContrast() {
+    const context = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true }), known = new Map();
+    const rgba = (colour) => {
+      if (!known.has(colour)) {
+        context.clearRect(0, 0, 1, 1);
+        context.fillStyle = colour;
+        context.fillRect(0, 0, 1, 1);
+        known.set(colour, [...context.getImageData(0, 0, 1, 1).data]);
+      }
+      return known.get(colour);
+    };
+    const linear = (x) => (x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4);
+    const light = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+    const behind = (element) => {
+      for (; element; element = element.parentElement) {
+        const colour = rgba(getComputedStyle(element).backgroundColor);
+        if (colour[3] > 250) return colour;
+      }
+      return [255, 255, 255];
+    };
+    const low = new Map(), walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    let count = 0;
+    while (walker.nextNode()) {
+      const words = walker.currentNode.textContent.trim(), element = walker.currentNode.parentElement;
+      if (!words || !element.checkVisibility() || element.closest("svg, script, style, noscript, select")) continue;
+      count += 1;
+      const levels = [light(rgba(getComputedStyle(element).color)), light(behind(element))].sort((a, b) => b - a);
+      const ratio = (levels[0] + 0.05) / (levels[1] + 0.05);
+      if (ratio < 4.5) low.set(`${element.tagName}.${element.className}: ${words.slice(0, 30)}`, ratio);
+    }
+    return [count, [...low]];
+  },
+};

@@ -1,0 +1,156 @@
+"""The page in a real browser: it loads alone, draws, moves, sorts, filters, changes its theme, is safe."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.report.browser import Browser, opened
+from tests.report.documents import arms, failing, hostile
+from urdfkin.report.html import as_html
+
+pytestmark = [pytest.mark.slow, pytest.mark.browser]
+
+PAGES = {"arms": arms, "failing": failing, "hostile": hostile}
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("pages")
+    for name, make in PAGES.items():
+        (folder / f"{name}.html").write_text(as_html(make()), encoding="utf-8")
+    return {name: folder / f"{name}.html" for name in PAGES}
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with opened(tmp_path_factory.mktemp("profile")) as browser:
+        yield browser
+
+
+@pytest.fixture
+def browser(desk: Browser, pages: dict[str, Path]) -> Browser:
+    """The page of the two arms, the first unfolded, its view drawn."""
+    desk.requests()
+    desk.errors()
+    desk.open(pages["arms"])
+    desk.js("document.querySelector('details.robot').open = true; scrollTo(0, 0)")
+    desk.js("document.querySelector('.stage').scrollIntoView({block: 'center'})")
+    desk.settle()
+    return desk
+
+
+def test_the_page_loads_without_errors_and_asks_for_nothing_but_itself(
+    browser: Browser, pages: dict[str, Path]
+) -> None:
+    asked = [url for url in browser.requests() if not url.startswith("data:")]
+    assert asked == [pages["arms"].as_uri()]
+    assert browser.errors() == []
+
+
+def test_the_view_draws_a_robot_on_part_of_its_canvas(browser: Browser) -> None:
+    drawn, _, whole = browser.probe("pixels")
+    assert 0.01 * whole < drawn < 0.9 * whole
+    assert min(browser.probe("colours")) > 200  # joints and bones
+
+
+def test_a_slider_moves_the_robot_and_neutral_brings_it_back(browser: Browser) -> None:
+    before = browser.probe("pixels")
+    assert browser.probe("slide", 1, 1.2) == "68.8°"
+    browser.settle()
+    assert browser.probe("pixels")[1] != before[1]
+    browser.js("document.querySelector('[data-do=neutral]').click()")
+    browser.settle()
+    assert browser.probe("pixels") == before
+
+
+def test_the_keyboard_turns_the_view(browser: Browser) -> None:
+    before = browser.probe("pixels")
+    browser.probe("press", "ArrowLeft")
+    browser.settle()
+    assert browser.probe("pixels")[1] != before[1]
+
+
+def test_the_tables_frames_can_be_shown_in_both_conventions(browser: Browser) -> None:
+    plain, shown = browser.probe("pixels")[1], []
+    for convention in ("standard", "modified"):
+        browser.probe("showTable", convention)
+        browser.settle()
+        shown.append(browser.probe("pixels")[1])
+        assert browser.probe("visibleTables") == [convention.capitalize()]
+    browser.screenshot("report-dh")
+    assert len({plain, *shown}) == 3
+
+
+def test_the_overview_sorts_both_ways(browser: Browser) -> None:
+    results = browser.probe("heads").index("results")
+    for order in ("descending", "ascending"):
+        assert browser.probe("sortBy", results) == order
+        numbers = [int(cell.replace(",", "")) for cell in browser.probe("column", results)]
+        assert len(set(numbers)) == 2
+        assert numbers == sorted(numbers, reverse=order == "descending")
+    browser.probe("sortBy", 0)
+    assert browser.probe("column", 0) == ["panda", "ur5"]
+    browser.probe("sortBy", 0)
+    assert browser.probe("column", 0) == ["ur5", "panda"]
+
+
+def test_the_overview_filters_rows_and_robots(browser: Browser) -> None:
+    assert browser.probe("find", "UR") == ["1 of 2", [True, False]]
+    assert browser.probe("find", "") == ["2 of 2", [False, False]]
+
+
+def test_a_link_unfolds_its_robot(browser: Browser) -> None:
+    browser.js("document.querySelectorAll('#overview a')[1].click()")
+    browser.settle()
+    assert browser.js("return document.querySelector('#robot-1').open")
+
+
+def test_the_theme_goes_round_and_colours_the_page_and_the_view(browser: Browser) -> None:
+    paper = "return getComputedStyle(document.body).backgroundColor"
+    seen, pixels = [], []
+    for _ in range(3):
+        seen.append((browser.js("return document.querySelector('#theme').textContent"), browser.js(paper)))
+        pixels.append(browser.probe("pixels")[1])
+        browser.js("document.querySelector('#theme').click()")
+        browser.settle()
+    assert [words for words, _ in seen] == ["Theme: as the system", "Theme: light", "Theme: dark"]
+    assert seen[0][1] == seen[1][1] != seen[2][1]
+    assert pixels[0] == pixels[1] != pixels[2]
+    assert browser.js(paper) == seen[0][1]
+
+
+def test_a_hostile_name_does_nothing(desk: Browser, pages: dict[str, Path]) -> None:
+    desk.open(pages["hostile"])
+    desk.probe("unfoldAll")
+    desk.settle()
+    assert desk.js("return window.hacked") is None
+    assert desk.js("return document.images.length") == 0
+    assert desk.errors() == []
+    assert desk.js("return document.querySelector('details.robot h3').textContent").startswith("<script>")
+    desk.screenshot("report-hostile")
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 390], ids=["desk", "phone"])
+def test_it_reads_well_in_both_themes_at_both_widths(
+    dark: bool, width: int, pages: dict[str, Path], tmp_path: Path
+) -> None:
+    """Contrast of all text, nothing wider than the screen, and pictures to look at."""
+    name = f"report-{'dark' if dark else 'light'}-{'desk' if width > 600 else 'phone'}"
+    with opened(tmp_path, width=width, height=1000, dark=dark) as browser:
+        browser.open(pages["failing"])
+        browser.screenshot(f"{name}-top")
+        browser.probe("unfoldAll")
+        browser.settle()
+        texts, poor = browser.probe("poorContrast")
+        assert texts > 500
+        assert poor == []
+        assert browser.js("return document.documentElement.scrollWidth") <= width
+        for part in (".view", ".pair", ".dh", ".cases"):
+            browser.js("document.querySelector(arguments[0]).scrollIntoView()", part)
+            browser.settle()
+            browser.screenshot(f"{name}-{part[1:]}")
+        assert browser.errors() == []

@@ -1,0 +1,132 @@
+"""A comparison finds every kind of change, and calls a regression what is one and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from tests.report.documents import arms, failing
+from urdfkin.report.compare import compare
+from urdfkin.report.comparison import markdown_of
+
+
+def words(old: Any, new: Any, **how: Any) -> list[tuple[bool, str]]:
+    return [(change.regression, str(change)) for change in compare(old, new, **how).changes]
+
+
+def test_a_report_equals_itself() -> None:
+    assert compare(arms(), arms()).changes == ()
+
+
+def _drop_robot(d: Any) -> None:
+    del d["robots"][1]
+
+
+def _fail(d: Any) -> None:
+    d["robots"][0]["checks"][0]["failed"] = 2
+
+
+def _forget_quantity(d: Any) -> None:
+    del d["robots"][0]["checks"][0]
+
+
+def _fewer_results(d: Any) -> None:
+    d["robots"][0]["checks"][0]["results"] -= 1
+
+
+def _worse(d: Any) -> None:
+    d["robots"][0]["checks"][0]["worst"] = 100.0
+
+
+def _beyond_numbers(d: Any) -> None:
+    d["robots"][0]["checks"][0]["worst"] = None
+
+
+def _verdict(d: Any) -> None:
+    d["robots"][0]["verdict"] = "not verified"
+
+
+def _interrupt(d: Any) -> None:
+    d["interrupted"] = True
+
+
+WORSE: list[tuple[Callable[[Any], None], str]] = [
+    (_drop_robot, "ur5: robot: verified -> nothing"),
+    (_fail, "panda: placement: 0 outside the bound -> 2 outside the bound"),
+    (_forget_quantity, "panda: placement: compared -> nothing"),
+    (_fewer_results, "panda: placement: 225 results -> 224 results"),
+    (_worse, "-> 100.00 eps*scale"),
+    (_beyond_numbers, "-> inf eps*scale"),
+    (_verdict, "panda: verdict: verified -> not verified"),
+    (_interrupt, "run: finished -> interrupted"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "line"), WORSE, ids=[spoil.__name__ for spoil, _ in WORSE])
+def test_what_got_worse_is_a_regression_and_its_return_is_not(
+    spoil: Callable[[Any], None], line: str
+) -> None:
+    spoiled = arms()
+    spoil(spoiled)
+    there = compare(arms(), spoiled)
+    assert there.exit_code == 1
+    assert any(change.regression and line in str(change) for change in there.changes), words(arms(), spoiled)
+    back = compare(spoiled, arms())
+    assert back.exit_code == 0
+    assert len(back.changes) >= (0 if spoil is _fewer_results else 1)
+
+
+def test_versions_settings_and_new_robots_are_changes_and_no_regressions() -> None:
+    new = arms()
+    new["versions"]["pin"] = "4.2.0"
+    new["seed"] = 7
+    old = arms()
+    del old["robots"][1]
+    lines = words(old, new)
+    assert (False, "version of pin: 4.1.0 -> 4.2.0") in lines
+    assert (False, "seed: 0 -> 7") in lines
+    assert (False, "ur5: robot: nothing -> verified") in lines
+    assert compare(old, new).exit_code == 0
+
+
+def test_fewer_samples_asked_for_are_a_setting() -> None:
+    new = arms()
+    new["samples"] = 2
+    _fewer_results(new)
+    assert compare(arms(), new).exit_code == 0
+
+
+def test_growth_counts_from_the_factor_on_and_above_a_single_rounding() -> None:
+    old, new = arms(), arms()
+    for worst_old, worst_new, factor, regression in (
+        (3.0, 5.9, 2.0, False),
+        (3.0, 6.1, 2.0, True),
+        (3.0, 6.1, 3.0, False),
+        (0.1, 1.9, 2.0, False),
+        (0.1, 2.1, 2.0, True),
+    ):
+        old["robots"][0]["checks"][0]["worst"] = worst_old
+        new["robots"][0]["checks"][0]["worst"] = worst_new
+        assert bool(compare(old, new, factor).regressions) is regression, (worst_old, worst_new, factor)
+
+
+def test_findings_are_counted_by_code() -> None:
+    new = arms()
+    new["robots"][0]["findings"].append(
+        {
+            "code": "URDF999", "severity": "warning", "message": "m", "found": None, "remedy": None,
+            "file": "f", "line": 1, "column": 1, "element": None, "name": None, "oracle": None, "also": [7],
+        }
+    )  # fmt: skip
+    assert (False, "panda: warning URDF999: nothing -> 2") in words(arms(), new)
+
+
+def test_the_markdown_leads_with_regressions_and_fits_a_comment() -> None:
+    found = compare(arms(), failing())
+    markdown = markdown_of(arms(), failing(), found)
+    lines = [line for line in markdown.splitlines() if "→" in line or line.startswith("| ")]
+    assert markdown.startswith("## ❌ ")
+    assert "❌ regression" in lines[lines.index("| --- | --- | --- | --- |") + 1]
+    assert len(markdown_of(arms(), failing(), found, limit=900)) <= 900

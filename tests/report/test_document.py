@@ -1,0 +1,101 @@
+"""The JSON document keeps to its published schema, and nothing else is read."""
+
+from __future__ import annotations
+
+import copy
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from tests.report.documents import arms, failing, hostile
+from urdfkin.errors import InputError, SourceError
+from urdfkin.judge import judge
+from urdfkin.loading import load
+from urdfkin.report.document import Document, checked, read_document, schema
+from urdfkin.validation.campaign import validate
+
+REFUSED = b'<?xml version="1.0"?><robot name="r"><link name="a"/><joint name="j" type="bent"/></robot>'
+
+
+def errors(document: object) -> list[str]:
+    return [
+        f"{error.json_path}: {error.message}"
+        for error in Draft202012Validator(schema()).iter_errors(document)
+    ]
+
+
+def test_the_schema_is_a_schema() -> None:
+    Draft202012Validator.check_schema(schema())
+
+
+@pytest.mark.parametrize("make", [arms, failing, hostile])
+def test_every_report_keeps_to_the_schema(make: Any) -> None:
+    assert errors(make()) == []
+
+
+def test_a_robot_that_cannot_be_read_keeps_to_the_schema_and_brings_its_findings() -> None:
+    document = validate(REFUSED, samples=1).as_dict()
+    assert errors(document) == []
+    robot = document["robots"][0]
+    assert robot["verdict"] == "bad input"
+    assert robot["model"] is None
+    assert {finding["severity"] for finding in robot["findings"]} >= {"error"}
+
+
+def test_a_judged_run_keeps_to_the_schema() -> None:
+    report = validate("panda", samples=0)
+    judged = replace(report, judgements=(judge(load("panda"), samples=1),))
+    document = judged.as_dict()
+    assert errors(document) == []
+    assert len(document["robots"][0]["judge"]["lines"]) > 5
+
+
+def test_the_schema_describes_everything_that_is_written() -> None:
+    strict = copy.deepcopy(schema())
+    for part in [strict, *strict["$defs"].values()]:
+        if part.get("properties") and "additionalProperties" not in part:
+            part["additionalProperties"] = False
+    for document in (arms(), hostile()):
+        assert [e.message for e in Draft202012Validator(strict).iter_errors(document)] == []
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda d: d.pop("seed"),
+        lambda d: d["robots"][0].pop("verdict"),
+        lambda d: d["robots"][0]["checks"][0].update(results="many"),
+        lambda d: d["robots"][0].update(verdict="fine"),
+        lambda d: d["robots"][0]["model"]["joints"][0].update(placement=[[1.0]]),
+    ],
+)
+def test_a_spoiled_document_is_refused_with_its_place(spoil: Any) -> None:
+    document = cast("dict[str, Any]", arms())
+    spoil(document)
+    with pytest.raises(InputError, match=r"breaks the layout urdfkin-validation/1: found \$"):
+        checked(document, "results.json")
+
+
+@pytest.mark.parametrize("data", [{}, [], "text", {"schema": "urdfkin-validation/9"}])
+def test_another_layout_is_refused_by_name(data: object) -> None:
+    with pytest.raises(InputError, match="not a report with the layout urdfkin-validation/1"):
+        checked(data, "results.json")
+
+
+def test_a_file_reads_back_as_it_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "results.json"
+    path.write_text(json.dumps(hostile()))
+    read: Document = read_document(path)
+    assert read == hostile()
+
+
+def test_files_that_are_none_say_so(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="cannot be read"):
+        read_document(tmp_path / "missing.json")
+    (tmp_path / "text.json").write_text("{not json")
+    with pytest.raises(InputError, match="not a JSON file"):
+        read_document(tmp_path / "text.json")

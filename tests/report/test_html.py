@@ -1,0 +1,162 @@
+"""The page is whole in itself, says everything, escapes everything, and stays small."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from tests.report.documents import HOSTILE_JOINT, HOSTILE_LINK, HOSTILE_ROBOT, arms, failing, hostile
+from urdfkin.report import html as html_module
+from urdfkin.report.html import as_html
+from urdfkin.report.pages import angle
+
+ASSETS = Path(html_module.__file__).parent / "assets"
+
+
+class Page(HTMLParser):
+    """Elements, attributes, ids, and the text outside scripts and styles."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self.scripts: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        inside = self.elements[-1][0] if self.elements else ""
+        (self.scripts if inside in ("script", "style") else self.words).append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+@cache
+def page(name: str) -> Page:
+    return Page(as_html({"arms": arms, "hostile": hostile, "failing": failing}[name]()))
+
+
+def test_nothing_on_the_page_refers_to_anywhere_else() -> None:
+    for tag, attributes in page("arms").elements:
+        for name in ("src", "href", "xlink:href", "action", "data", "poster", "srcset"):
+            value = attributes.get(name)
+            assert value is None or value.startswith(("#", "data:,")), (tag, name, value)
+    style = (ASSETS / "report.css").read_text()
+    assert "url(" not in style
+    assert "@import" not in style
+    policy = next(
+        a["content"] for a in page("arms").all("meta") if a.get("http-equiv") == "Content-Security-Policy"
+    )
+    assert policy is not None
+    assert policy.startswith("default-src 'none'")
+
+
+def test_every_id_stands_once_and_every_reference_has_its_id() -> None:
+    ids = [attributes["id"] for _, attributes in page("arms").elements if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    for _, attributes in page("arms").elements:
+        for name in ("href", "clip-path", "aria-labelledby"):
+            value = attributes.get(name) or ""
+            for target in re.findall(r"#([\w-]+)", value) + (
+                [value] if name == "aria-labelledby" and value else []
+            ):
+                assert target in ids, (name, value)
+
+
+def test_it_says_what_was_checked_by_which_versions_and_how_to_repeat_it() -> None:
+    text = page("arms").text
+    for words in (
+        "Verified against Pinocchio",
+        "seed 0",
+        "urdfkin validate panda ur5 --samples 6 --seed 0",
+        "numpy",
+        "panda_joint7",
+        "Denavit-Hartenberg",
+        "modified (proximal, Craig)",
+        "Worst cases",
+        "urdfkin acceleration panda --frame",
+        "Findings in the file",
+        "MIT License",
+    ):
+        assert words in text, words
+
+
+def test_what_failed_is_said_in_words_and_not_by_colour_alone() -> None:
+    text = page("failing").text
+    assert "Not verified against Pinocchio" in text
+    assert "1 robot bad input, 1 robot disagrees, 1 robot verified." in text
+    assert "✗ 3" in text
+    assert "URDF502" in text
+
+
+@pytest.mark.parametrize("name", [HOSTILE_ROBOT, HOSTILE_JOINT, HOSTILE_LINK])
+def test_hostile_names_are_text_and_nothing_else(name: str) -> None:
+    hostile_page = page("hostile")
+    assert len(hostile_page.all("script")) == len(page("arms").all("script"))
+    assert hostile_page.all("img") == []
+    assert " ".join(name.split()) in hostile_page.text
+    inline = next(script for script in hostile_page.scripts if '"links"' in script)
+    assert not set("<>&\u2028") & set(inline)
+    assert HOSTILE_LINK in json.loads(inline)["links"]
+
+
+def test_plots_and_pictures_have_words_for_who_cannot_see_them() -> None:
+    arms_page = page("arms")
+    plots = [a for a in arms_page.all("svg") if a.get("class") == "plot"]
+    assert len(plots) == 2
+    assert all(plot.get("role") == "img" for plot in plots)
+    assert "Distribution of the disagreement with Pinocchio, panda" in arms_page.text
+    assert all(a.get("aria-label") for a in arms_page.all("canvas"))
+    for attributes in arms_page.all("input") + arms_page.all("select"):
+        assert attributes.get("type") != "image"
+    assert arms_page.all("html") == [{"lang": "en"}]
+    assert all(a.get("scope") in ("row", "col") for a in arms_page.all("th"))
+
+
+def test_a_page_without_matplotlib_lacks_the_plots_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(html_module, "installed", lambda: False)
+    text = as_html(arms())
+    assert "pip install &#39;urdfkin[plots]&#39;" in text
+    assert 'class="plot"' not in text
+
+
+def test_the_same_document_gives_the_same_page() -> None:
+    assert as_html(arms()) == as_html(arms())
+
+
+def test_a_robot_costs_little_beside_what_every_page_carries() -> None:
+    two, one = arms(), arms()
+    del one["robots"][0]
+    assert len(as_html(two)) - len(as_html(one)) < 140_000
+
+
+@pytest.mark.parametrize(
+    ("radians", "text"),
+    [(0.0, "0"), (1.5707963267948966, "π/2"), (-3.141592653589793, "−π"), (1.5708, "1.5708")],
+)
+def test_only_what_is_a_fraction_of_pi_to_the_last_bit_is_shown_as_one(radians: float, text: str) -> None:
+    assert angle(radians) == text
+
+
+def test_the_bundled_library_is_the_one_that_was_built() -> None:
+    lines = (ASSETS / "three.sha256").read_text().splitlines()
+    sums = {name: digest for digest, name in map(str.split, lines)}
+    assert set(sums) == {"three.min.js", "three.LICENSE.txt"}
+    for name, digest in sums.items():
+        assert hashlib.sha256((ASSETS / name).read_bytes()).hexdigest() == digest
+    named = json.loads((Path(__file__).parents[2] / "scripts" / "three" / "package.json").read_text())
+    head = (ASSETS / "three.min.js").read_text(encoding="utf-8")[:200]
+    assert f"three.js {named['dependencies']['three']}, MIT licence" in head

@@ -1,0 +1,71 @@
+"""JUnit XML keeps to the schema that Jenkins publishes and says everything in its bodies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lxml import etree
+
+from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile
+from urdfkin.report.document import Document
+from urdfkin.report.junit import as_junit
+
+SCHEMA = etree.XMLSchema(etree.parse(Path(__file__).parents[1] / "fixtures" / "junit-10.xsd"))
+
+
+def read(document: Document) -> etree._Element:
+    root = etree.fromstring(as_junit(document))
+    SCHEMA.assertValid(root)
+    return root
+
+
+@pytest.mark.parametrize("make", [arms, failing, hostile])
+def test_it_keeps_to_the_published_schema(make: Any) -> None:
+    read(make())
+
+
+def test_there_is_a_case_for_each_robot_quantity_and_reference() -> None:
+    document = arms()
+    root = read(document)
+    suites = root.findall("testsuite")
+    assert [suite.get("name") for suite in suites] == ["panda", "ur5"]
+    for suite, robot in zip(suites, document["robots"], strict=True):
+        names = [case.get("name") for case in suite.findall("testcase")]
+        assert len(names) == len(set(names)) == len(robot["checks"])
+        assert "acceleration, local" in names
+        assert suite.get("tests") == str(len(names))
+    assert root.get("tests") == str(sum(len(robot["checks"]) for robot in document["robots"]))
+
+
+def test_a_failure_says_everything_in_its_text() -> None:
+    root = read(failing())
+    found = root.findall(".//failure")
+    assert len(found) == 1
+    text = found[0].text or ""
+    for words in (
+        "velocity, local of panda",
+        "outside their bound: 3",
+        "worst inf",
+        "replay: urdfkin velocity",
+    ):
+        assert words in text
+    assert root.get("failures") == "1"
+
+
+def test_a_robot_that_could_not_be_read_is_an_error_with_its_reason() -> None:
+    root = read(failing())
+    case = root.find("testsuite[@name='broken.urdf']/testcase")
+    assert case is not None
+    error = case.find("error")
+    assert error is not None
+    assert "URDF502" in (error.text or "")
+    assert root.get("errors") == "1"
+
+
+def test_names_come_back_as_they_are_and_forbidden_letters_are_told() -> None:
+    document = hostile()
+    document["robots"][1]["source"] = "bell\x07\ufffe"
+    suites = read(document).findall("testsuite")
+    assert [suite.get("name") for suite in suites] == [HOSTILE_ROBOT, "bell\\x07\\xfffe"]

@@ -1,0 +1,51 @@
+"""`urdfkin compare`: what changed between two validations."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from urdfkin.cli.output import console, write_file
+from urdfkin.cli.reports import check_writable
+
+EXAMPLE = "urdfkin compare main.json branch.json --markdown comment.md"
+
+
+@click.command(epilog=f"Example: {EXAMPLE}")
+@click.argument("old", metavar="OLD.json", type=click.Path(path_type=Path))
+@click.argument("new", metavar="NEW.json", type=click.Path(path_type=Path))
+@click.option(
+    "--factor",
+    type=click.FloatRange(1.0),
+    default=2.0,
+    show_default=True,
+    help="By how much a worst disagreement may grow before it is a regression.",
+)
+@click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
+@click.option("--markdown", type=click.Path(path_type=Path), help="Write Markdown for a pull request.")
+@click.pass_context
+def command(
+    context: click.Context, old: Path, new: Path, factor: float, format_: str, markdown: Path | None
+) -> None:
+    """Say what changed between two reports: versions, robots, verdicts, figures.
+
+    A regression is a robot that is gone or worse off, results outside their bound that were inside, something
+    that is compared no more, or a worst disagreement that grew by more than the factor and above 2 eps*scale.
+    Exit 0: none. 1: a regression. 2: a file that cannot be used.
+    """
+    from urdfkin.report.compare import compare  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.comparison import markdown_of, print_comparison  # noqa: PLC0415
+    from urdfkin.report.document import read_document  # noqa: PLC0415
+
+    before, after = read_document(old), read_document(new)
+    check_writable(markdown)
+    found = compare(before, after, factor)
+    if markdown is not None:
+        write_file(markdown, markdown_of(before, after, found).encode())
+    if format_ == "json":
+        click.echo(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+    else:
+        print_comparison(before, after, found, console())
+    context.exit(found.exit_code)

@@ -1,0 +1,48 @@
+"""`urdfkin report`: render a report from the data of an earlier run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from urdfkin.cli.output import console
+from urdfkin.cli.reports import check_writable, report_options, write_reports
+
+EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
+
+
+@click.command(epilog=f"Example: {EXAMPLE}")
+@click.argument("results", metavar="RESULTS.json", type=click.Path(path_type=Path), required=False)
+@report_options
+@click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case.")
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of the data instead.")
+@click.pass_context
+def command(
+    context: click.Context,
+    results: Path | None,
+    html: Path | None,
+    junit: Path | None,
+    markdown: Path | None,
+    cases: bool,
+    schema: bool,
+) -> None:
+    """Show or write the report of an earlier `urdfkin validate ... --json RESULTS.json`.
+
+    Exit 0: the run had verified everything. 1: it had not. 2: the file cannot be used.
+    """
+    from urdfkin.report.document import asset, read_document  # noqa: PLC0415  keeps --help fast
+
+    if schema:
+        click.echo(asset("validation-1.schema.json"), nl=False)
+        return
+    if results is None:
+        raise click.UsageError("name the file that `urdfkin validate ... --json FILE` wrote")
+    document = read_document(results)
+    check_writable(html, junit, markdown)
+    write_reports(document, html=html, junit=junit, markdown=markdown)
+    if not (html or junit or markdown):
+        from urdfkin.report.terminal import print_report  # noqa: PLC0415
+
+        print_report(document, console(), cases=cases)
+    context.exit(0 if document["passed"] else 1)

@@ -1,0 +1,192 @@
+"""What changed between two reports: versions, robots, verdicts, figures; and which changes are regressions.
+
+A change is a regression when something that held no longer does: a robot is gone or its verdict worse, more
+results lie outside their bound, a quantity or results are compared no more, or the worst disagreement grew by
+more than a factor and past what rounding of a single operation gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from urdfkin.report.document import Check, Document, Robot, Units
+from urdfkin.report.words import VERDICTS, check_name, units, worst
+
+#: A worst disagreement may grow by this factor before it counts: the largest of many samples is a lottery.
+FACTOR = 2.0
+#: Below this many eps * scale nothing is a regression: a single rounding gives as much.
+FLOOR = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One difference.
+
+    Attributes:
+        robot: The robot's source; None for the run as a whole.
+        what: What changed.
+        old: Before, in words; empty where it was not there.
+        new: After; empty where it is gone.
+        regression: Whether something that held no longer does.
+    """
+
+    robot: str | None
+    what: str
+    old: str
+    new: str
+    regression: bool = False
+
+    def __str__(self) -> str:
+        where = f"{self.robot}: " if self.robot else ""
+        return f"{where}{self.what}: {self.old or 'nothing'} -> {self.new or 'nothing'}"
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Everything that changed, regressions first in each part."""
+
+    changes: tuple[Change, ...]
+
+    @property
+    def regressions(self) -> tuple[Change, ...]:
+        """The changes for the worse."""
+        return tuple(change for change in self.changes if change.regression)
+
+    @property
+    def exit_code(self) -> int:
+        """1 on a regression."""
+        return 1 if self.regressions else 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "schema": "urdfkin-comparison/1",
+            "regressions": len(self.regressions),
+            "changes": [asdict(change) for change in self.changes],
+        }
+
+
+def compare(old: Document, new: Document, factor: float = FACTOR) -> Comparison:
+    """The changes from one report to another.
+
+    Args:
+        old: The report before.
+        new: The report after.
+        factor: By how much a worst disagreement may grow.
+    """
+    changes = [*_run(old, new), *_robots(old, new, factor)]
+    return Comparison(tuple(changes))
+
+
+def _run(old: Document, new: Document) -> Iterator[Change]:
+    """Versions and settings; a run that was cut short where the other was not."""
+    yield from _mapping("version of ", old["versions"], new["versions"])
+    settings = [{"seed": str(d["seed"]), "samples": str(d["samples"])} for d in (old, new)]
+    yield from _mapping("", *settings)
+    if old["interrupted"] != new["interrupted"]:
+        before, after = ("interrupted" if d["interrupted"] else "finished" for d in (old, new))
+        yield Change(None, "run", before, after, regression=new["interrupted"])
+
+
+def _mapping(prefix: str, old: Mapping[str, str], new: Mapping[str, str]) -> Iterator[Change]:
+    for key in dict.fromkeys([*old, *new]):
+        if old.get(key) != new.get(key):
+            yield Change(None, prefix + key, old.get(key, ""), new.get(key, ""))
+
+
+def _robots(old: Document, new: Document, factor: float) -> Iterator[Change]:
+    before, after = _by_source(old), _by_source(new)
+    for source in dict.fromkeys([*before, *after]):
+        if source not in after:
+            yield Change(source, "robot", before[source]["verdict"], "", regression=True)
+        elif source not in before:
+            verdict = after[source]["verdict"]
+            yield Change(source, "robot", "", verdict, regression=verdict != "verified")
+        else:
+            yield from _robot(source, before[source], after[source], factor, _as_many(old, new))
+
+
+def _by_source(document: Document) -> dict[str, Robot]:
+    """Robots by what names them; a source that was given twice is counted."""
+    named: dict[str, Robot] = {}
+    for robot in document["robots"]:
+        source, count = robot["source"], 1
+        while source in named:
+            count += 1
+            source = f"{robot['source']} ({count})"
+        named[source] = robot
+    return named
+
+
+def _as_many(old: Document, new: Document) -> bool:
+    """Whether the new run was asked for at least as many samples."""
+    return new["samples"] >= old["samples"]
+
+
+def _robot(source: str, old: Robot, new: Robot, factor: float, as_many: bool) -> Iterator[Change]:
+    if old["verdict"] != new["verdict"]:
+        worse = VERDICTS.index(new["verdict"]) < VERDICTS.index(old["verdict"])
+        yield Change(source, "verdict", old["verdict"], new["verdict"], regression=worse)
+    for what, n_old, n_new in (
+        ("joints", len(old["joints"]), len(new["joints"])),
+        ("frames", len(old["frames"]), len(new["frames"])),
+    ):
+        if n_old != n_new:
+            yield Change(source, what, str(n_old), str(n_new))
+    yield from _findings(source, old, new)
+    before = {check_name(check): check for check in old["checks"]}
+    after = {check_name(check): check for check in new["checks"]}
+    for name in dict.fromkeys([*before, *after]):
+        if name not in after:
+            yield Change(source, name, "compared", "", regression=True)
+        elif name not in before:
+            yield Change(source, name, "", "compared", regression=bool(after[name]["failed"]))
+        else:
+            yield from _check(source, name, before[name], after[name], factor, as_many)
+
+
+def _check(source: str, name: str, old: Check, new: Check, factor: float, as_many: bool) -> Iterator[Change]:
+    def change(words: Callable[[Check], str], regression: bool) -> Change:
+        return Change(source, name, words(old), words(new), regression)
+
+    if old["failed"] != new["failed"]:
+        yield change(lambda c: f"{c['failed']:,} outside the bound", new["failed"] > old["failed"])
+    if new["results"] < old["results"] and as_many:
+        # Fewer samples asked for is a setting, and was said; fewer results from as many samples is a loss.
+        yield change(lambda c: f"{c['results']:,} results", True)
+    grew = _grew(old["worst"], new["worst"], factor)
+    if grew or _grew(new["worst"], old["worst"], factor):
+        yield change(lambda c: f"{units(c['worst'])} eps*scale", grew)
+
+
+def _grew(old: Units, new: Units, factor: float) -> bool:
+    if old is None:
+        return False
+    return new is None or (new > FLOOR and new > factor * old)
+
+
+def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
+    """Errors and warnings by code; the verdict says whether an error matters."""
+    counts: list[dict[str, int]] = [{}, {}]
+    for count, robot in zip(counts, (old, new), strict=True):
+        for finding in robot["findings"]:
+            if finding["severity"] != "note":
+                key = f"{finding['severity']} {finding['code']}"
+                count[key] = count.get(key, 0) + 1 + len(finding["also"])
+    for key in sorted(counts[0].keys() | counts[1].keys()):
+        before, after = counts[0].get(key, 0), counts[1].get(key, 0)
+        if before != after:
+            yield Change(source, key, str(before or ""), str(after or ""))
+
+
+def figures(old: Document, new: Document) -> list[tuple[str, Units | str, Units | str]]:
+    """The worst disagreement of each quantity over all robots, before and after; empty where not compared."""
+    names = dict.fromkeys(c["quantity"] for d in (old, new) for r in d["robots"] for c in r["checks"])
+    return [(name, _worst(old, name), _worst(new, name)) for name in names]
+
+
+def _worst(document: Document, quantity: str) -> Units | str:
+    checks = [c for robot in document["robots"] for c in robot["checks"] if c["quantity"] == quantity]
+    return worst(check["worst"] for check in checks) if checks else ""

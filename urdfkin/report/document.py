@@ -1,0 +1,268 @@
+"""The JSON document of a validation: its types, reading it, and holding it to its published schema."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal, TypedDict, cast
+
+from urdfkin.errors import InputError, SourceError
+from urdfkin.validation.report import SCHEMA
+
+#: A disagreement in eps * scale; None is no number, or what must agree exactly and does not.
+Units = float | None
+Verdict = Literal["verified", "disagrees", "not verified", "bad input"]
+
+
+class Limit(TypedDict):
+    """Bounds of a joint."""
+
+    lower: float | None
+    upper: float | None
+    velocity: float | None
+    effort: float | None
+
+
+class Mimic(TypedDict):
+    """Whom a joint follows."""
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+class Joint(TypedDict):
+    """A joint, fixed ones too."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    placement: list[list[float]]
+    axis: list[float] | None
+    q: int | None
+    v: int | None
+    limit: Limit | None
+    mimic: Mimic | None
+
+
+class Model(TypedDict):
+    """What a robot is made of."""
+
+    name: str
+    source: str
+    mimic: bool | None
+    root_joint: str | None
+    nq: int
+    nv: int
+    base: str
+    tip: str
+    coordinates: list[str]
+    rates: list[str]
+    frames: list[str]
+    links: list[str]
+    joints: list[Joint]
+
+
+class Finding(TypedDict):
+    """Something about the URDF file."""
+
+    code: str
+    severity: Literal["error", "warning", "note"]
+    message: str
+    found: str | None
+    remedy: str | None
+    file: str
+    line: int
+    column: int
+    element: str | None
+    name: str | None
+    oracle: str | None
+    also: list[int]
+
+
+class Row(TypedDict):
+    """A row of a Denavit-Hartenberg table."""
+
+    joint: str
+    kind: str
+    a: float
+    alpha: float
+    beta: float
+    d: float
+    theta: float
+    sense: int
+
+
+class Table(TypedDict):
+    """A table in one convention."""
+
+    rows: list[Row]
+    base: list[list[float]]
+    tool: list[list[float]]
+
+
+class Chain(TypedDict):
+    """A chain and its tables."""
+
+    limb: str | None
+    base: str
+    tip: str
+    standard: Table
+    modified: Table
+    samples: int
+    metres: float | None
+    worst: Units
+    share_of_bound: Units
+
+
+class Errors(TypedDict):
+    """True errors of one side."""
+
+    worst: float
+    typical: float
+
+
+class Judged(TypedDict):
+    """One quantity in one reference, judged."""
+
+    quantity: str
+    reference: str | None
+    numbers: int
+    urdfkin: Errors
+    pinocchio: Errors
+
+
+class Judgement(TypedDict):
+    """Both sides against values that are right to fifty digits."""
+
+    robot: str
+    samples: int
+    seed: int
+    lines: list[Judged]
+
+
+class Case(TypedDict):
+    """The sample with the largest share of its bound."""
+
+    sample: int
+    frame: str
+    disagreement: Units
+    q: list[float]
+    v: list[float]
+    a: list[float]
+    replay: str
+
+
+class Check(TypedDict):
+    """One quantity in one reference."""
+
+    quantity: str
+    reference: str | None
+    results: int
+    failed: int
+    median: Units
+    p99: Units
+    worst: Units
+    share_of_bound: Units
+    bound: list[float | None]
+    histogram: list[int]
+    subjects: Literal["frames", "joints", "columns"]
+    worst_by_subject: list[Units]
+    worst_case: Case | None
+
+
+class Timings(TypedDict):
+    """Seconds, summed over processes."""
+
+    read: float
+    urdfkin: float
+    pinocchio: float
+    compare: float
+
+
+class Robot(TypedDict):
+    """One robot."""
+
+    source: str
+    name: str
+    verdict: Verdict
+    reason: str | None
+    joints: list[str]
+    frames: list[str]
+    samples: int
+    results: int
+    failed: int
+    seconds: float
+    timings: Timings | None
+    model: Model | None
+    findings: list[Finding]
+    chains: list[Chain]
+    checks: list[Check]
+    judge: Judgement | None
+
+
+class Document(TypedDict):
+    """The whole document."""
+
+    schema: str
+    versions: dict[str, str]
+    started: str
+    seconds: float
+    seed: int
+    samples: int
+    histogram_edges: list[float]
+    interrupted: bool
+    passed: bool
+    command: str
+    robots: list[Robot]
+
+
+def asset(name: str) -> str:
+    """The text of a file that ships with the reports."""
+    return resources.files("urdfkin.report").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+@cache
+def schema() -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of the document."""
+    return cast("dict[str, Any]", json.loads(asset("validation-1.schema.json")))
+
+
+def read_document(path: Path) -> Document:
+    """A document from a file.
+
+    Raises:
+        SourceError: the file cannot be read.
+        InputError: it is not JSON, not a validation report, of another version, or breaks the schema.
+    """
+    try:
+        data = json.loads(path.read_bytes())
+    except OSError as error:
+        raise SourceError("cannot be read", where=str(path), found=error.strerror or str(error)) from error
+    except ValueError as error:
+        raise InputError("not a JSON file", where=str(path), found=str(error)) from error
+    return checked(data, str(path))
+
+
+def checked(data: object, where: str) -> Document:
+    """`data` as a document; raises InputError as `read_document` does."""
+    found = data.get("schema") if isinstance(data, dict) else None
+    if found != SCHEMA:
+        raise InputError(
+            f"not a report with the layout {SCHEMA}",
+            where=where,
+            found=repr(found) if found else "no 'schema' entry",
+            remedy="write one with: urdfkin validate ROBOT --json FILE",
+        )
+    from jsonschema import Draft202012Validator  # noqa: PLC0415  only who reads files needs it
+    from jsonschema.exceptions import best_match  # noqa: PLC0415
+
+    error = best_match(Draft202012Validator(schema()).iter_errors(data))
+    if error is not None:
+        raise InputError(
+            f"breaks the layout {SCHEMA}", where=where, found=f"{error.json_path}: {error.message}"
+        )
+    return cast("Document", data)

@@ -1,0 +1,137 @@
+"""The report as one HTML file: it opens offline, asks no network for anything, and escapes every name."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from urdfkin.figure import installed
+from urdfkin.report import pages
+from urdfkin.report.distributions import distributions
+from urdfkin.report.document import Document, Robot, asset
+from urdfkin.report.scene import scene
+from urdfkin.report.words import (
+    columns,
+    counted,
+    percent,
+    pinocchio,
+    share_of,
+    summary,
+    units,
+    verdict_counts,
+    worst,
+)
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+#: With no more robots than this they stand open.
+_OPEN = 1
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415  keeps --help fast
+
+    environment = Environment(
+        loader=PackageLoader("urdfkin.report"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
+    environment.filters["counted"] = counted
+    return environment
+
+
+def as_html(document: Document) -> str:
+    """The page. Names may be anything, `<script>` included: the template escapes them all."""
+    from markupsafe import Markup  # noqa: PLC0415
+
+    robots = document["robots"]
+    quantities = columns(robots)
+    return (
+        _environment()
+        .get_template("report.html.j2")
+        .render(
+            document=document,
+            summary=summary(document),
+            when=_when(document["started"]),
+            pinocchio=pinocchio(document),
+            totals=_totals(document),
+            verdicts=verdict_counts(document),
+            quantities=list(quantities),
+            overview=[pages.overview(robot, list(quantities.values())) for robot in robots],
+            robots=[_robot(robot, i, document) for i, robot in enumerate(robots)],
+            opened=len(robots) <= _OPEN,
+            heat_steps=pages.HEAT_STEPS,
+            style=Markup(asset("report.css")),
+            script=Markup(asset("report.js")),
+            view_script=Markup(asset("view3d.js")),
+            three=Markup(asset("three.min.js")),
+            three_licence=asset("three.LICENSE.txt"),
+        )
+    )
+
+
+def _totals(document: Document) -> dict[str, Any]:
+    robots = document["robots"]
+    checks = [check for robot in robots for check in robot["checks"]]
+    return {
+        "robots": len(robots),
+        "joints": sum(len(robot["joints"]) for robot in robots),
+        "frames": sum(len(robot["frames"]) for robot in robots),
+        "results": sum(robot["results"] for robot in robots),
+        "failed": sum(robot["failed"] for robot in robots),
+        "worst": units(worst(check["worst"] for check in checks), compared=bool(checks)),
+        "share": percent(worst(map(share_of, robots))) if checks else "",
+    }
+
+
+def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
+    from markupsafe import Markup  # noqa: PLC0415
+
+    model = robot["model"]
+    heads, heat = pages.heat_map(robot, model) if model and robot["checks"] else ([], [])
+    return {
+        "index": index,
+        "data": robot,
+        "summary": pages.overview(robot, []),
+        "scene": scene(model, robot["chains"]) if model else None,
+        "joints": pages.joint_rows(model) if model else [],
+        "chains": [
+            {
+                "data": chain,
+                "beta": pages.has_beta(chain),
+                "tables": {kind: pages.chain_rows(chain, kind) for kind in ("standard", "modified")},
+                "agrees": (chain["share_of_bound"] or 0.0) <= 1.0,
+                "metres": f"{chain['metres'] or 0.0:.2g}",
+                "worst": units(chain["worst"]),
+                "share": percent(chain["share_of_bound"]),
+            }
+            for chain in robot["chains"]
+        ],
+        "checks": pages.check_rows(robot),
+        "judged": pages.judged_rows(robot["judge"]) if robot["judge"] else [],
+        "heat_heads": heads,
+        "heat": heat,
+        "plot": Markup(_plot(robot, index, document)),
+    }
+
+
+def _plot(robot: Robot, index: int, document: Document) -> str:
+    """Empty where matplotlib is not installed: the tables say the same."""
+    if not installed():
+        return ""
+    return distributions(robot, document["histogram_edges"], f"p{index}-")
+
+
+def _when(started: str) -> str:
+    """The moment in words; as it stands if it is no ISO date."""
+    try:
+        moment = datetime.fromisoformat(started)
+    except ValueError:
+        return started
+    return f"{moment.day} {moment:%B %Y, %H:%M} UTC"

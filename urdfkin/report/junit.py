@@ -1,0 +1,111 @@
+"""JUnit XML: a suite for each robot, a case for each quantity and reference, the full text in the body.
+
+The layout is the one that Jenkins publishes (junit-10.xsd) and that GitLab, GitHub actions and others read.
+Some of them drop the attributes of a failure: its text says everything.
+"""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree as ET
+
+from urdfkin.report.document import Case, Check, Document, Robot
+from urdfkin.report.words import check_name, in_order, percent, units
+
+#: What XML 1.0 cannot hold, not even escaped.
+_FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def as_junit(document: Document) -> bytes:
+    """The report as a JUnit XML file."""
+    suites = [_suite(robot, document) for robot in document["robots"]]
+    counts = {name: str(sum(int(suite.get(name, "0")) for suite in suites)) for name in _COUNTS}
+    root = ET.Element("testsuites", {"name": "urdfkin validate", "time": _time(document["seconds"])} | counts)
+    root.extend(suites)
+    ET.indent(root)
+    return (
+        b'<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode").encode() + b"\n"
+    )
+
+
+_COUNTS = ("tests", "failures", "errors")
+
+
+def _suite(robot: Robot, document: Document) -> ET.Element:
+    name = _clean(robot["source"])
+    cases = [_case(check, robot) for check in in_order(robot)] or [_unchecked(robot)]
+    suite = ET.Element(
+        "testsuite",
+        {
+            "name": name,
+            "tests": str(len(cases)),
+            "failures": str(sum(case.find("failure") is not None for case in cases)),
+            "errors": str(sum(case.find("error") is not None for case in cases)),
+            "skipped": "0",
+            "time": _time(robot["seconds"]),
+            "timestamp": document["started"],
+        },
+    )
+    properties = ET.SubElement(suite, "properties")
+    facts = {"robot": robot["name"], "verdict": robot["verdict"], "seed": str(document["seed"])}
+    for key, value in (facts | document["versions"]).items():
+        ET.SubElement(properties, "property", {"name": key, "value": _clean(value)})
+    suite.extend(cases)
+    return suite
+
+
+def _case(check: Check, robot: Robot) -> ET.Element:
+    case = ET.Element(
+        "testcase", {"name": check_name(check), "classname": f"urdfkin.{_clean(robot['source'])}"}
+    )
+    text = _clean(_text(check, robot))
+    if check["failed"]:
+        message = (
+            f"{check['failed']:,} of {check['results']:,} results outside their bound,"
+            f" worst {units(check['worst'])} eps*scale"
+        )
+        ET.SubElement(case, "failure", {"type": "disagreement", "message": message}).text = text
+    else:
+        ET.SubElement(case, "system-out").text = text
+    return case
+
+
+def _unchecked(robot: Robot) -> ET.Element:
+    """A robot of which nothing was compared: why, and what was found in its file."""
+    case = ET.Element("testcase", {"name": "load", "classname": f"urdfkin.{_clean(robot['source'])}"})
+    reason = _clean(robot["reason"] or "nothing was compared")
+    if robot["verdict"] == "verified":
+        ET.SubElement(case, "system-out").text = reason
+        return case
+    kind = "failure" if robot["verdict"] == "not verified" else "error"
+    ET.SubElement(
+        case, kind, {"type": robot["verdict"], "message": reason.splitlines()[0]}
+    ).text = f"{robot['verdict']}: {reason}"
+    return case
+
+
+def _text(check: Check, robot: Robot) -> str:
+    case: Case | None = check["worst_case"]
+    tightest, widest = check["bound"]
+    lines = [
+        f"{check_name(check)} of {robot['source']}",
+        f"results compared: {check['results']:,}",
+        f"outside their bound: {check['failed']:,}",
+        f"disagreement in eps*scale: median {units(check['median'])}, 99th percentile {units(check['p99'])},"
+        f" worst {units(check['worst'])}",
+        f"largest share of a bound: {percent(check['share_of_bound'])}",
+    ]
+    if tightest is not None and widest is not None:
+        lines.append(f"bounds: {tightest:.0f} to {widest:.0f} eps*scale")
+    if case is not None:
+        lines += [f"worst case: sample {case['sample']}, {case['frame']}", f"replay: {case['replay']}"]
+    return "\n".join(lines)
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds:.3f}"
+
+
+def _clean(text: str) -> str:
+    """Names may hold what XML forbids; the escape says which character it was."""
+    return _FORBIDDEN.sub(lambda found: f"\\x{ord(found[0]):02x}", text)

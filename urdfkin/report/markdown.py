@@ -1,0 +1,124 @@
+"""Markdown that fits a pull request's comment: the verdict, a table, and what failed with its replay line."""
+
+from __future__ import annotations
+
+import re
+
+from urdfkin.report.document import Document, Robot
+from urdfkin.report.words import (
+    VERDICTS,
+    check_name,
+    columns,
+    counted,
+    percent,
+    share_of,
+    summary,
+    units,
+    worst_of,
+)
+
+#: GitHub refuses comments longer than 65,536 characters.
+LIMIT = 60_000
+_MARKS = {"verified": "✅", "disagrees": "❌", "not verified": "⚠️", "bad input": "⛔"}
+#: How many failing checks are shown for each robot.
+_SHOWN = 3
+
+
+def as_markdown(document: Document, limit: int = LIMIT) -> str:
+    """The report as a comment; robots that failed come first, and a line says what did not fit."""
+    passed = document["passed"]
+    head = [
+        f"## {'✅ Verified against' if passed else '❌ Not verified against'} Pinocchio"
+        f" {text(document['versions'].get('pin', '?'))}",
+        "",
+        text(summary(document)),
+        "",
+    ]
+    foot = [
+        "",
+        "Worst disagreement for each quantity in eps·scale: 1 to 10 is what rounding gives.",
+        "",
+        f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
+        " Repeat it:</sub>",
+        "",
+        fenced(shortened(document["command"], 2000)),
+        "",
+    ]
+    robots = sorted(document["robots"], key=lambda robot: VERDICTS.index(robot["verdict"]))
+    room = limit - len("\n".join(head + foot))
+    return "\n".join(head + _body(robots, room) + foot)
+
+
+def _body(robots: list[Robot], room: int) -> list[str]:
+    quantities = columns(robots)
+    heads = ["robot", "joints", "frames", "results", *quantities, "of bound", "verdict"]
+    lines = [_row(heads), _row(["---", *["---:"] * (len(heads) - 2), "---"])]
+    left = room - sum(len(line) + 1 for line in lines) - 200
+    tails: list[str] = []
+    for shown, robot in enumerate(robots):
+        row, tail = _row(_cells(robot, list(quantities.values()))), _details(robot)
+        left -= len(row) + sum(len(line) + 1 for line in tail) + 1
+        if left < 0:
+            rest = robots[shown:]
+            good = sum(robot["verdict"] == "verified" for robot in rest)
+            tails += ["", f"{counted(len(rest), 'robot')} more did not fit; {good} of them verified."]
+            break
+        lines.append(row)
+        tails += tail
+    return lines + tails
+
+
+def _cells(robot: Robot, quantities: list[tuple[str, ...]]) -> list[str]:
+    verdict = robot["verdict"]
+    share = percent(share_of(robot)) if robot["checks"] else ""
+    return [
+        text(shortened(robot["source"], 60)),
+        str(len(robot["joints"])),
+        str(len(robot["frames"])),
+        f"{robot['results']:,}",
+        *(worst_of(robot, names) for names in quantities),
+        share,
+        f"{_MARKS[verdict]} {verdict}",
+    ]
+
+
+def _details(robot: Robot) -> list[str]:
+    """What went wrong with one robot."""
+    if robot["reason"]:
+        return ["", f"**{text(robot['source'])}**: {text(shortened(robot['reason'], 600))}"]
+    failed = [check for check in robot["checks"] if check["failed"]]
+    lines: list[str] = []
+    for check in failed[:_SHOWN]:
+        lines += [
+            "",
+            f"**{text(robot['source'])}**, {text(check_name(check))}: {check['failed']:,} of"
+            f" {check['results']:,} outside their bound, worst {units(check['worst'])} eps·scale",
+        ]
+        if check["worst_case"] is not None:
+            lines += ["", fenced(shortened(check["worst_case"]["replay"], 4000))]
+    if len(failed) > _SHOWN:
+        lines += ["", f"... and {len(failed) - _SHOWN} more quantities of {text(robot['source'])}"]
+    return lines
+
+
+def _row(cells: list[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def text(words: str) -> str:
+    """Words that Markdown, HTML and mentions leave alone."""
+    flat = re.sub(r"[\x00-\x1f\x7f\u2028\u2029]+", " ", words)
+    flat = flat.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("@", "&#64;")
+    return re.sub(r"([\\`*_{}\[\]|~!#])(?!64;)", r"\\\1", flat)
+
+
+def fenced(code: str) -> str:
+    """A block of code whose fence is longer than any run of backticks inside."""
+    longest = max((len(run) for run in re.findall("`+", code)), default=0)
+    fence = "`" * max(3, longest + 1)
+    return f"{fence}sh\n{code}\n{fence}"
+
+
+def shortened(words: str, length: int) -> str:
+    """At most `length` characters."""
+    return words if len(words) <= length else words[: length - 4] + " ..."

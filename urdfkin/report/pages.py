@@ -1,0 +1,237 @@
+"""A robot as the page shows it: rows of tables and cells of the heat map, ready for the template."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from urdfkin.dh.units import Units as DisplayUnits
+from urdfkin.report.document import Chain, Check, Joint, Judgement, Limit, Model, Robot, Row, Units
+from urdfkin.report.words import (
+    SIDES,
+    column,
+    columns,
+    in_order,
+    nearer,
+    percent,
+    quantity_name,
+    share_of,
+    units,
+    worst,
+    worst_of,
+)
+
+_READABLE = DisplayUnits(digits=6)
+
+#: Upper edges of the heat map's steps, eps * scale; what is above the last has a step of its own.
+HEAT_STEPS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A cell of the heat map: its text, its step, and whether the quantity failed there."""
+
+    text: str
+    step: int
+
+
+def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, Any]:
+    """A line of the overview table, with numbers to sort by."""
+    checks = robot["checks"]
+    largest, share = worst(check["worst"] for check in checks), share_of(robot)
+    return {
+        "source": robot["source"],
+        "verdict": robot["verdict"],
+        "joints": len(robot["joints"]),
+        "frames": len(robot["frames"]),
+        "results": robot["results"],
+        "failed": robot["failed"],
+        "quantities": [(worst_of(robot, names), _key(robot, names)) for names in quantities_of],
+        "worst": units(largest, compared=bool(checks)),
+        "worst_key": _sortable(largest) if checks else -1.0,
+        "share": percent(share) if checks else "",
+        "share_key": _sortable(share) if checks else -1.0,
+        "findings": sum(finding["severity"] != "note" for finding in robot["findings"]),
+        "seconds": robot["seconds"],
+    }
+
+
+def _key(robot: Robot, names: Sequence[str]) -> float:
+    checks = column(robot, names)
+    return _sortable(worst(check["worst"] for check in checks)) if checks else -1.0
+
+
+def _sortable(value: Units) -> float:
+    return 1e308 if value is None else value
+
+
+def joint_rows(model: Model) -> list[dict[str, Any]]:
+    """Every joint with its limits; moving ones first would break the order of q, so the order stays."""
+    return [
+        {
+            "name": joint["name"],
+            "kind": joint["kind"],
+            "parent": joint["parent"],
+            "child": joint["child"],
+            "q": _coordinate(joint),
+            "axis": _axis(joint),
+            **_limits(joint["limit"], joint["kind"]),
+        }
+        for joint in model["joints"]
+    ]
+
+
+def _coordinate(joint: Joint) -> str:
+    mimic = joint["mimic"]
+    if joint["q"] is None:
+        return ""
+    size = {"planar": 3, "floating": 7}.get(joint["kind"], 1)
+    place = f"q[{joint['q']}]" if size == 1 else f"q[{joint['q']}:{joint['q'] + size}]"
+    if mimic is None:
+        return place
+    offset = f" {mimic['offset']:+g}" if mimic["offset"] else ""
+    return f"{mimic['multiplier']:g} {place}{offset}"
+
+
+def _axis(joint: Joint) -> str:
+    """The axis by its letter where it is one, else its numbers."""
+    axis = joint["axis"]
+    if axis is None:
+        return ""
+    for letter, k in zip("xyz", range(3), strict=True):
+        if abs(axis[k]) == 1.0:
+            return ("-" if axis[k] < 0 else "+") + letter
+    return ", ".join(f"{x:.4g}" for x in axis)
+
+
+def _limits(limit: Limit | None, kind: str) -> dict[str, str]:
+    if limit is None:
+        return {"lower": "", "upper": "", "velocity": "", "effort": ""}
+    unit = "m" if kind == "prismatic" else "rad"
+    words = {key: "" if value is None else f"{value:.6g}" for key, value in limit.items()}
+    for key, suffix in (("lower", unit), ("upper", unit), ("velocity", f"{unit}/s")):
+        words[key] += f" {suffix}" if words[key] else ""
+    return words
+
+
+def heat_map(robot: Robot, model: Model) -> tuple[list[str], list[tuple[str, list[Cell]]]]:
+    """Column heads, and for each moving joint its name and cells: the worst over all references."""
+    quantities_of = columns([robot])
+    frame = {name: i for i, name in enumerate(robot["frames"])}
+    moving = {name: i for i, name in enumerate(robot["joints"])}
+    own = _columns(model)
+    rows = []
+    for joint in robot["joints"]:
+        where = {
+            "frames": [frame[f"joint:{joint}"]] if f"joint:{joint}" in frame else [],
+            "joints": [moving[joint]],
+            "columns": own.get(joint, []),
+        }
+        rows.append((joint, [_cell(column(robot, names), where) for names in quantities_of.values()]))
+    return list(quantities_of), rows
+
+
+def _columns(model: Model) -> dict[str, list[int]]:
+    """Which columns of all joints' rates belong to each joint, followers too."""
+    own: dict[str, list[int]] = {}
+    at = 0
+    for joint in model["joints"]:
+        size = {"fixed": 0, "planar": 3, "floating": 6}.get(joint["kind"], 1)
+        own[joint["name"]] = list(range(at, at + size))
+        at += size
+    return own
+
+
+def _cell(checks: Sequence[Check], where: dict[str, list[int]]) -> Cell:
+    found = [check["worst_by_subject"][i] for check in checks for i in where[check["subjects"]]]
+    if not found:
+        return Cell("", 0)
+    largest = worst(found)
+    if largest is None:
+        return Cell("inf", len(HEAT_STEPS) + 1)
+    return Cell(units(largest), sum(largest > edge for edge in HEAT_STEPS) + (largest > 0.0))
+
+
+def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
+    """A table's rows as cells: joint, a, alpha, (beta,) d, theta, the joint's place marked."""
+    table = chain["standard"] if convention == "standard" else chain["modified"]
+    return [_dh_cells(row, has_beta(chain)) for row in table["rows"]]
+
+
+def has_beta(chain: Chain) -> bool:
+    """Whether any row of either table is a Hayati row."""
+    return any(row["beta"] != 0.0 for key in ("standard", "modified") for row in _rows(chain, key))
+
+
+def _rows(chain: Chain, convention: str) -> list[Row]:
+    return chain["standard"]["rows"] if convention == "standard" else chain["modified"]["rows"]
+
+
+def _dh_cells(row: Row, beta: bool) -> list[str]:
+    sign = "+" if row["sense"] > 0 else "−"
+    slides = row["kind"] == "prismatic"
+    d, theta = metres(row["d"]), angle(row["theta"])
+    d = _plus(d, f"{sign} q") if slides else d
+    theta = theta if slides else _plus(theta, f"{sign} q")
+    return [
+        row["joint"],
+        metres(row["a"]),
+        angle(row["alpha"]),
+        *([angle(row["beta"])] if beta else []),
+        d,
+        theta,
+    ]
+
+
+def _plus(constant: str, variable: str) -> str:
+    if constant == "0":
+        return variable.removeprefix("+ ")
+    return f"{constant} {variable}"
+
+
+def metres(value: float) -> str:
+    """A length, metres."""
+    return _READABLE.length(value).replace("-", "−")
+
+
+def angle(value: float) -> str:
+    """An angle, radians; what is a multiple of pi/12 to the last bit is shown as one."""
+    return _READABLE.angle(value, pi="π").replace("-", "−")
+
+
+def judged_rows(judgement: Judgement) -> list[dict[str, Any]]:
+    """Both sides' true errors, and who is nearer."""
+    return [
+        {
+            "quantity": quantity_name(line["quantity"]),
+            "reference": line["reference"] or "",
+            "numbers": line["numbers"],
+            "worst": [f"{line[side]['worst']:.2f}" for side in SIDES],
+            "typical": [f"{line[side]['typical']:.3f}" for side in SIDES],
+            "nearer": nearer(line),
+        }
+        for line in judgement["lines"]
+    ]
+
+
+def check_rows(robot: Robot) -> list[dict[str, Any]]:
+    """The checks, with their figures in words."""
+    return [
+        {
+            "quantity": quantity_name(check["quantity"]),
+            "reference": check["reference"] or "",
+            "results": check["results"],
+            "failed": check["failed"],
+            "median": units(check["median"]),
+            "p99": units(check["p99"]),
+            "worst": units(check["worst"]),
+            "share": percent(check["share_of_bound"]),
+            "width": min(100.0, 100.0 * (check["share_of_bound"] or 0.0))
+            if check["share_of_bound"] is not None
+            else 100.0,
+            "case": check["worst_case"],
+            "where": "" if check["worst_case"] is None else check["worst_case"]["frame"],
+        }
+        for check in in_order(robot)
+    ]

@@ -1,0 +1,197 @@
+"""The report on a terminal: two tables at 80 columns, a wide one from 100, what failed; no colour needed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from urdfkin.report.document import Check, Document, Judgement, Robot
+from urdfkin.report.words import (
+    SIDES,
+    check_name,
+    columns,
+    counted,
+    in_order,
+    nearer,
+    of_quantity,
+    percent,
+    pinocchio,
+    quantities,
+    quantity_name,
+    share_of,
+    summary,
+    units,
+    worst,
+    worst_of,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+#: From this width on a column for each quantity fits beside the robots.
+_WIDE = 100
+_ROBOT_WIDTH = 20
+
+
+def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
+    """Print a report.
+
+    Args:
+        document: The report's data.
+        out: Where to; its width decides the layout.
+        cases: Whether to show the line that replays each worst case; for failures it is always shown.
+    """
+    robots = document["robots"]
+    out.print(
+        f"worst disagreement with Pinocchio {pinocchio(document)}, in eps*scale (1 to 10 is rounding)",
+        style="bold",
+    )
+    if len(robots) == 1 and robots[0]["checks"]:
+        out.print(_checks(robots[0]))
+    elif out.width >= _WIDE:
+        out.print(_wide(robots))
+    else:
+        out.print(_robots(robots))
+        out.print(_quantities(robots))
+    for robot in robots:
+        _print_robot(robot, out, cases=cases)
+    out.print(summary(document), style="bold green" if document["passed"] else "bold red")
+
+
+def plain_table(heads: Sequence[str], rows: Iterable[Sequence[str]], words: Sequence[int]) -> Table:
+    """Columns in `words` on the left, the others on the right, one space between."""
+    from rich import box  # noqa: PLC0415  keeps --help fast
+    from rich.table import Table  # noqa: PLC0415
+
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+    for i, head in enumerate(heads):
+        left = i in words
+        width = _ROBOT_WIDTH if i == 0 and len(words) > 1 else None
+        table.add_column(
+            head, justify="left" if left else "right", overflow="fold", max_width=width, vertical="top"
+        )
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _counts(robot: Robot) -> list[str]:
+    return [robot["source"], str(len(robot["joints"])), str(len(robot["frames"])), f"{robot['results']:,}"]
+
+
+def _wide(robots: Sequence[Robot]) -> Table:
+    quantities_of = columns(robots)
+    heads = ["robot", "joints", "frames", "results", *quantities_of, "of bound", "verdict"]
+    rows = (
+        [
+            *_counts(robot),
+            *(worst_of(robot, names) for names in quantities_of.values()),
+            percent(share_of(robot)) if robot["checks"] else "",
+            robot["verdict"],
+        ]
+        for robot in robots
+    )
+    return plain_table(heads, rows, words=(0, len(heads) - 1))
+
+
+def _robots(robots: Sequence[Robot]) -> Table:
+    heads = ["robot", "joints", "frames", "results", "worst", "of bound", "verdict"]
+    rows = (
+        [
+            *_counts(robot),
+            units(worst(check["worst"] for check in robot["checks"]), compared=bool(robot["checks"])),
+            percent(share_of(robot)) if robot["checks"] else "",
+            robot["verdict"],
+        ]
+        for robot in robots
+    )
+    return plain_table(heads, rows, words=(0, 6))
+
+
+def _quantities(robots: Sequence[Robot]) -> Table:
+    """One row a quantity, over all robots."""
+    rows = []
+    for name in quantities(robots):
+        checks = [check for robot in robots for check in of_quantity(robot, name)]
+        by_robot = {robot["source"]: of_quantity(robot, name) for robot in robots}
+        largest = worst(check["worst"] for check in checks)
+        where = next(s for s, own in by_robot.items() if any(c["worst"] == largest for c in own))
+        rows.append([quantity_name(name), *_figures(checks), where])
+    return plain_table(["quantity", "results", "worst", "of bound", "robot"], rows, words=(0, 4))
+
+
+def _figures(checks: Sequence[Check]) -> list[str]:
+    return [
+        f"{sum(check['results'] for check in checks):,}",
+        units(worst(check["worst"] for check in checks)),
+        percent(worst(check["share_of_bound"] for check in checks)),
+    ]
+
+
+def _checks(robot: Robot) -> Table:
+    """One robot: a row for each quantity and reference."""
+    heads = [robot["source"], "results", "outside", "median", "99 %", "worst", "of bound"]
+    rows = (
+        [
+            check_name(check),
+            f"{check['results']:,}",
+            f"{check['failed']:,}",
+            units(check["median"]),
+            units(check["p99"]),
+            units(check["worst"]),
+            percent(check["share_of_bound"]),
+        ]
+        for check in in_order(robot)
+    )
+    return plain_table(heads, rows, words=(0,))
+
+
+def _judged(judgement: Judgement) -> Table:
+    """Both sides' true errors, a row for each quantity and reference."""
+    heads = [
+        "quantity, reference",
+        "numbers",
+        "worst\nurdfkin",
+        "\nPinocchio",
+        "typical\nurdfkin",
+        "\nPinocchio",
+    ]
+    rows = (
+        [
+            line["quantity"] + (f", {line['reference']}" if line["reference"] else ""),
+            f"{line['numbers']:,}",
+            *(f"{line[side]['worst']:.2f}" for side in SIDES),
+            *(f"{line[side]['typical']:.3f}" for side in SIDES),
+            nearer(line),
+        ]
+        for line in judgement["lines"]
+    )
+    return plain_table([*heads, "\nnearer"], rows, words=(0,))
+
+
+def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
+    if robot["reason"]:
+        out.print(f"{robot['source']}: {robot['verdict']}: {robot['reason']}")
+    noted = [finding for finding in robot["findings"] if finding["severity"] != "note"]
+    if noted and robot["checks"] and cases:
+        out.print(
+            f"{robot['source']}: {counted(len(noted), 'warning')}, see: urdfkin check {robot['source']}"
+        )
+    if robot["judge"] is not None:
+        out.print(
+            f"{robot['source']}: true errors in eps*scale, at 50 digits, on"
+            f" {counted(robot['judge']['samples'], 'sample')}",
+            style="bold",
+        )
+        out.print(_judged(robot["judge"]))
+    for check in robot["checks"]:
+        case = check["worst_case"]
+        if case is None or not (cases or check["failed"]):
+            continue
+        out.print(
+            f"{robot['source']}, {check_name(check)}: {check['failed']:,} of {check['results']:,} outside"
+            f" the bound, worst {units(check['worst'])} eps*scale,"
+            f" {percent(check['share_of_bound'])} of the bound"
+        )
+        out.print(f"  {case['replay']}", soft_wrap=True)

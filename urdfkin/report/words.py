@@ -1,0 +1,144 @@
+"""The words and numbers that all forms of the report share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Literal
+
+from urdfkin.report.document import Check, Document, Judged, Robot, Units
+
+#: Quantities as a reader knows them, in the order of a report.
+QUANTITIES = {
+    "placement": "placement",
+    "velocity": "velocity",
+    "jacobian": "Jacobian",
+    "jacobian rate": "Jacobian rate",
+    "acceleration": "acceleration",
+    "joint jacobian": "joint Jacobian",
+    "joint jacobian rate": "joint Jacobian rate",
+    "screws": "data.J",
+}
+#: Column heads short enough for a line of all robots, and the quantities whose worst stands below them.
+COLUMNS = {
+    "place": ("placement",),
+    "vel": ("velocity",),
+    "J": ("jacobian", "joint jacobian"),
+    "J-dot": ("jacobian rate", "joint jacobian rate"),
+    "acc": ("acceleration",),
+    "data.J": ("screws",),
+}
+SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
+#: Worse verdicts first.
+VERDICTS = ("bad input", "not verified", "disagrees", "verified")
+
+
+def quantity_name(quantity: str) -> str:
+    """What a reader calls a quantity."""
+    return QUANTITIES.get(quantity, quantity)
+
+
+def check_name(check: Check) -> str:
+    """A quantity and its reference: `acceleration, local`."""
+    reference = check["reference"]
+    return check["quantity"] + (f", {reference}" if reference else "")
+
+
+def units(value: Units, *, compared: bool = True) -> str:
+    """A disagreement to three digits; `inf` for what no number can say, nothing for what was not compared."""
+    if not compared:
+        return ""
+    if value is None:
+        return "inf"
+    return f"{value:.2f}" if value < 1000.0 else f"{value:.2g}"
+
+
+def percent(share: Units) -> str:
+    """A share of a bound."""
+    if share is None:
+        return "inf"
+    return f"{share:.1%}" if share < 10.0 else f"{share:.2g} x"
+
+
+def worst(values: Iterable[Units]) -> Units:
+    """The largest; None, which stands for infinity, is larger than any number."""
+    largest = 0.0
+    for value in values:
+        if value is None:
+            return None
+        largest = max(largest, value)
+    return largest
+
+
+def quantities(robots: Sequence[Robot]) -> list[str]:
+    """The quantities that were compared of any robot, known ones in their order first."""
+    found = {check["quantity"] for robot in robots for check in robot["checks"]}
+    return [q for q in QUANTITIES if q in found] + sorted(found - set(QUANTITIES))
+
+
+def of_quantity(robot: Robot, quantity: str) -> list[Check]:
+    """A robot's checks of one quantity, one a reference."""
+    return [check for check in robot["checks"] if check["quantity"] == quantity]
+
+
+def in_order(robot: Robot) -> list[Check]:
+    """A robot's checks, quantity by quantity."""
+    return [check for quantity in quantities([robot]) for check in of_quantity(robot, quantity)]
+
+
+def columns(robots: Sequence[Robot]) -> dict[str, tuple[str, ...]]:
+    """The columns of `COLUMNS` that any robot fills; a quantity of no column has its own."""
+    found = quantities(robots)
+    known = {name for names in COLUMNS.values() for name in names}
+    heads = {head: names for head, names in COLUMNS.items() if any(name in found for name in names)}
+    return heads | {name: (name,) for name in found if name not in known}
+
+
+def column(robot: Robot, names: Sequence[str]) -> list[Check]:
+    """A robot's checks of several quantities."""
+    return [check for name in names for check in of_quantity(robot, name)]
+
+
+def worst_of(robot: Robot, names: Sequence[str]) -> str:
+    """The worst disagreement of quantities over their references, as a cell."""
+    checks = column(robot, names)
+    return units(worst(check["worst"] for check in checks), compared=bool(checks))
+
+
+def nearer(line: Judged) -> str:
+    """Whose typical error is the smaller."""
+    return "urdfkin" if line["urdfkin"]["typical"] <= line["pinocchio"]["typical"] else "Pinocchio"
+
+
+def share_of(robot: Robot) -> Units:
+    """The largest share of any bound."""
+    return worst(check["share_of_bound"] for check in robot["checks"])
+
+
+def summary(document: Document) -> str:
+    """The outcome in one line."""
+    robots = document["robots"]
+    results = sum(robot["results"] for robot in robots)
+    failed = sum(robot["failed"] for robot in robots)
+    state = "interrupted: " if document["interrupted"] else ""
+    return (
+        f"{state}{counted(len(robots), 'robot')}, {results:,} results compared, {failed:,} outside their"
+        f" bound, {document['seconds']:.1f} s, seed {document['seed']}"
+    )
+
+
+def counted(n: int, noun: str) -> str:
+    """`1 robot`, `2 robots`."""
+    return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
+
+
+def verdict_counts(document: Document) -> dict[str, int]:
+    """How many robots have each verdict, worst first, zeros left out."""
+    counts = dict.fromkeys(VERDICTS, 0)
+    for robot in document["robots"]:
+        counts[robot["verdict"]] += 1
+    return {verdict: count for verdict, count in counts.items() if count}
+
+
+def pinocchio(document: Document) -> str:
+    """The version that checked."""
+    return document["versions"].get("pin", "?")

@@ -1,0 +1,68 @@
+"""Where a validation's time goes: reading, urdfkin, Pinocchio, comparing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, ParamSpec, TypeVar
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+@dataclass(slots=True)
+class Clock:
+    """Seconds by whose work they were; `compare` is what remains of the whole.
+
+    Attributes:
+        read: Reading the file and building both models.
+        urdfkin: Computing with urdfkin.
+        pinocchio: Computing with Pinocchio.
+        compare: Bounds and comparison.
+    """
+
+    read: float = 0.0
+    urdfkin: float = 0.0
+    pinocchio: float = 0.0
+    compare: float = 0.0
+
+    def ours(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        """Call something of urdfkin's."""
+        begin = time.perf_counter()
+        try:
+            return function(*args, **kwargs)
+        finally:
+            self.urdfkin += time.perf_counter() - begin
+
+    def theirs(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        """Call something of Pinocchio's."""
+        begin = time.perf_counter()
+        try:
+            return function(*args, **kwargs)
+        finally:
+            self.pinocchio += time.perf_counter() - begin
+
+    def close(self, seconds: float) -> None:
+        """What the whole took."""
+        self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "read": round(self.read, 4),
+            "urdfkin": round(self.urdfkin, 4),
+            "pinocchio": round(self.pinocchio, 4),
+            "compare": round(self.compare, 4),
+        }
+
+
+def total(clocks: Iterable[Clock]) -> Clock:
+    """The sum of several."""
+    whole = Clock()
+    for clock in clocks:
+        whole.read += clock.read
+        whole.urdfkin += clock.urdfkin
+        whole.pinocchio += clock.pinocchio
+        whole.compare += clock.compare
+    return whole
