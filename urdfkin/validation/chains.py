@@ -13,7 +13,7 @@ import numpy as np
 
 from urdfkin.catalogue import catalogue
 from urdfkin.dh.make import dh_table
-from urdfkin.dh.table import DHRow, DHTable
+from urdfkin.dh import DHRow, DHTable
 from urdfkin.errors import InputError
 from urdfkin.oracle import Oracle
 from urdfkin.robot import Robot
