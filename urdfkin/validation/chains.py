@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from urdfkin.catalogue import catalogue
-from urdfkin.dh.make import dh_table
 from urdfkin.dh import DHRow, DHTable
+from urdfkin.dh.make import dh_table
 from urdfkin.errors import InputError
 from urdfkin.oracle import Oracle
 from urdfkin.robot import Robot
