@@ -184,6 +184,7 @@ class Robot(Manipulator, Tables):
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
         verify: bool | None = None,
+        threads: int | None = None,
     ) -> FloatArray:
         """(..., 4, 4) T_world_frame, eq. 7.77 with the rotations alongside.
 
@@ -193,6 +194,8 @@ class Robot(Manipulator, Tables):
             base: How the root link moves; None if it stands at the world's origin.
             out: C-contiguous float64 array of the result's shape to write into.
             verify: Whether Pinocchio checks this call; None leaves it to the robot.
+            threads: How many compute a batch; None: every processor from 4,096 configurations on. The
+                results do not depend on it.
 
         Raises:
             InputError: wrong length, a number that is not finite, a batch that does not broadcast.
@@ -200,7 +203,9 @@ class Robot(Manipulator, Tables):
             VerificationError: Pinocchio computes something else.
         """
         call = Call(self, (frame,), _ALIGNED, base, q)
-        result = evaluate.placements(call.plan, call.q, base=call.state, out=call.flat(out, 4, 4))
+        result = evaluate.placements(
+            call.plan, call.q, base=call.state, out=call.flat(out, 4, 4), threads=threads
+        )
         if self.wants(verify, Quantity.PLACEMENT, call.n, base):
             theirs = self.oracle(base).placements(call.q, call.frames, call.flat_base)
             call.check(Quantity.PLACEMENT, result, theirs, bounds.placement_bound(call.size()))
@@ -216,11 +221,12 @@ class Robot(Manipulator, Tables):
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
         verify: bool | None = None,
+        threads: int | None = None,
     ) -> FloatArray:
         """(..., 6) [linear; angular] m/s, rad/s: eq. 7.127, 7.128. Arguments and errors as `placement`."""
         call = Call(self, (frame,), reference, base, q, v)
         result = evaluate.velocities(
-            call.plan, call.q, call.v, call.reference, base=call.state, out=call.flat(out, 6)
+            call.plan, call.q, call.v, call.reference, base=call.state, out=call.flat(out, 6), threads=threads
         )
         if self.wants(verify, Quantity.VELOCITY, call.n, base):
             theirs = self.oracle(base).velocities(
@@ -238,6 +244,7 @@ class Robot(Manipulator, Tables):
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
         verify: bool | None = None,
+        threads: int | None = None,
     ) -> FloatArray:
         """(..., 6, nv) velocity Jacobian, eq. 7.85. Arguments and errors as `placement`.
 
@@ -245,7 +252,12 @@ class Robot(Manipulator, Tables):
         """
         call = Call(self, (frame,), reference, base, q)
         result = evaluate.jacobians(
-            call.plan, call.q, call.reference, base=call.state, out=call.flat(out, 6, self.nv)
+            call.plan,
+            call.q,
+            call.reference,
+            base=call.state,
+            out=call.flat(out, 6, self.nv),
+            threads=threads,
         )
         if self.wants(verify, Quantity.JACOBIAN, call.n, base):
             theirs = self.oracle(base).jacobians(call.q, call.frames, [call.reference], call.flat_base)[
@@ -266,6 +278,7 @@ class Robot(Manipulator, Tables):
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
         verify: bool | None = None,
+        threads: int | None = None,
     ) -> FloatArray:
         """(..., 6) classical acceleration [linear; angular] m/s^2, rad/s^2: eq. 7.129, 7.130.
 
@@ -273,7 +286,14 @@ class Robot(Manipulator, Tables):
         """
         call = Call(self, (frame,), reference, base, q, v, a)
         result = evaluate.accelerations(
-            call.plan, call.q, call.v, call.a, call.reference, base=call.state, out=call.flat(out, 6)
+            call.plan,
+            call.q,
+            call.v,
+            call.a,
+            call.reference,
+            base=call.state,
+            out=call.flat(out, 6),
+            threads=threads,
         )
         if self.wants(verify, Quantity.ACCELERATION, call.n, base):
             theirs = self.oracle(base).accelerations(

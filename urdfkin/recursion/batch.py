@@ -15,6 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from urdfkin.errors import InputError
 from urdfkin.recursion.lanes import LANES
 from urdfkin.tree import FloatArray
 
@@ -38,7 +39,12 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
         inputs: C-contiguous.
         out: C-contiguous.
         threads: How many; None for `default_threads`.
+
+    Raises:
+        InputError: fewer than one thread.
     """
+    if threads is not None and threads < 1:
+        raise InputError("threads must be at least 1", found=str(threads))
     n = len(out)
     whole = n - n % LANES
     parts = _parts(whole, default_threads(n) if threads is None else threads)
