@@ -27,13 +27,6 @@ def test_results_are_equal_to_the_last_bit_for_any_number_of_threads(panda: urdf
             np.testing.assert_array_equal(again, jacobian)
 
 
-def test_a_configuration_gives_the_same_bits_wherever_it_stands_in_a_batch(panda: urdfkin.Robot) -> None:
-    q = panda.sample(3 * LANES + 5, seed=4)
-    batch = panda.jacobian(q, "panda_hand")
-    for k in range(len(q)):
-        np.testing.assert_array_equal(panda.jacobian(q[k], "panda_hand"), batch[k])
-
-
 def test_a_batch_large_enough_for_threads_by_itself_is_the_same(panda: urdfkin.Robot) -> None:
     q = panda.sample(5000, seed=5)
     alone = panda.placement(q, "panda_hand", threads=1)

@@ -1,8 +1,8 @@
 """A batch in whole blocks of lanes, spread over threads.
 
-Kernels take whole blocks. What is left over is filled up with copies of its last configuration, so that
-each configuration is computed by the same instructions wherever it stands, and parts for threads are cut
-between blocks: results are equal for any number of threads, to the last bit.
+Kernels take whole blocks. What is left over is filled up with copies of its last configuration. Parts for
+threads are cut between blocks, so that each configuration has the same place in its block: results are
+equal for any number of threads, to the last bit.
 """
 
 from __future__ import annotations
