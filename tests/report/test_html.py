@@ -129,7 +129,7 @@ def test_plots_and_pictures_have_words_for_who_cannot_see_them() -> None:
 def test_a_page_without_matplotlib_lacks_the_plots_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(html_module, "installed", lambda: False)
     text = as_html(arms())
-    assert "pip install &#39;urdfkin[plots]&#39;" in text
+    assert "pip install 'urdfkin[plots]'" in text
     assert 'class="plot"' not in text
 
 

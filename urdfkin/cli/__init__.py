@@ -28,6 +28,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),
     "explain": ("urdfkin.cli.explain", "what a finding's code means, or an equation's number"),
     "report": ("urdfkin.cli.report", "show or write the report of an earlier validation"),
+    "plot": ("urdfkin.cli.plot", "a frame's motion along a trajectory, as a picture"),
     "compare": ("urdfkin.cli.compare", "what changed between two validations"),
 }
 

@@ -1,0 +1,101 @@
+"""`urdfkin plot`: a frame's motion along a trajectory, as a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from urdfkin.cli.arguments import frame_option, load_robot, reference_option, robot_argument, seed_option
+from urdfkin.cli.output import compiling, write_file
+from urdfkin.cli.reports import check_writable
+from urdfkin.errors import InputError
+
+if TYPE_CHECKING:
+    from urdfkin.robot import Robot
+    from urdfkin.trajectory import Trajectory
+
+#: They repeat `urdfkin.plot.panels.PANELS`, whose import --help does not need.
+PANELS = (
+    *("position", "orientation", "velocity", "angular-velocity", "acceleration", "angular-acceleration"),
+    *("parts", "singular-values", "manipulability", "disagreement"),
+)
+
+EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.svg"
+
+
+@click.command(epilog=f"Example: {EXAMPLE}")
+@robot_argument
+@frame_option
+@reference_option
+@click.option("--trajectory", type=click.Path(path_type=Path), help="CSV: t, coordinates, v:NAME, a:NAME.")
+@click.option("--from", "start", default="neutral", show_default=True, help="Where a line begins, as --q.")
+@click.option("--to", "end", help="Where a line ends: numbers, 'neutral' or 'random'.")
+@click.option("--duration", type=float, default=1.0, show_default=True, help="Of a line, seconds.")
+@click.option("--samples", type=click.IntRange(3), default=201, show_default=True, help="Of a line.")
+@seed_option
+@click.option(
+    "--panel",
+    "panels",
+    multiple=True,
+    type=click.Choice(PANELS),
+    help="What to draw; repeatable. Default: everything.",
+)
+@click.option(
+    "--output",
+    "-o",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="The picture; its ending says what: svg, png, pdf.",
+)
+@click.pass_context
+def command(
+    context: click.Context,
+    robot: str,
+    mimic: bool | None,
+    root_joint: str | None,
+    frame: str | None,
+    reference: str,
+    trajectory: Path | None,
+    start: str,
+    end: str | None,
+    duration: float,
+    samples: int,
+    seed: int,
+    panels: tuple[str, ...],
+    output: Path,
+) -> None:
+    """Draw a frame's position, velocity, acceleration and its parts, singular values and the check over time.
+
+    Along a CSV file, or along a line in joint space from rest to rest. Exit 0: verified. 1: a disagreement.
+    3: Pinocchio could not check it.
+    """
+    if (trajectory is None) == (end is None):
+        raise click.UsageError("say --trajectory FILE.csv, or --to VALUES for a line")
+    from urdfkin.figure import save  # noqa: PLC0415  keeps --help fast
+    from urdfkin.frame_motion import frame_motion  # noqa: PLC0415
+    from urdfkin.plot.sheet import foot, sheet  # noqa: PLC0415
+    from urdfkin.trajectory import read_trajectory  # noqa: PLC0415
+
+    check_writable(output)
+    loaded = load_robot(robot, mimic, root_joint)
+    if trajectory is not None:
+        motion = read_trajectory(loaded, trajectory)
+    else:
+        motion = _line(loaded, start, end or "", duration, samples, seed)
+    with compiling():
+        found = frame_motion(loaded, motion.q, motion.v, motion.a, frame or loaded.tip_frame, reference)
+    write_file(output, save(sheet(loaded, found, motion, panels), output))
+    click.echo(f"{loaded.name}: {found.frame}: {foot(found, motion)}")
+    context.exit(3 if found.not_verified is not None else 0 if found.agrees else 1)
+
+
+def _line(robot: Robot, start: str, end: str, duration: float, samples: int, seed: int) -> Trajectory:
+    from urdfkin.cli.arguments import read_inputs  # noqa: PLC0415
+    from urdfkin.trajectory import line  # noqa: PLC0415
+
+    ends = [read_inputs(robot, None, seed, text).q for text in (start, end)]
+    if any(len(q) != 1 for q in ends):
+        raise InputError("a line has one beginning and one end", found=f"{len(ends[0])} and {len(ends[1])}")
+    return line(robot, ends[0][0], ends[1][0], duration, samples)
