@@ -2,7 +2,8 @@
 
 The oracle reads the URDF text itself, with its own parser, so that nothing of urdfkin's reading is shared.
 Its model is built without mimic joints (with them, Pinocchio 4.1 refuses four of the robots it ships with);
-followers are coupled here: q_full = G q + g_0, v_full = G v, J = J_full G.
+followers are coupled here, by the rules as `urdfkin.followers` reads them from the text once more:
+q_full = G q + g_0, v_full = G v, J = J_full G.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import numpy as np
 
 from urdfkin.configuration import pinocchio_blocks
 from urdfkin.deep_stack import with_stack
-from urdfkin.errors import UrdfkinError
+from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.followers import with_rules_of_text
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import IntArray
 from urdfkin.reference import Reference
@@ -69,7 +71,9 @@ class Oracle:
         self._root_joint = root_joint
         self._root = 0  # Pinocchio's index of the frame that the robot stands on
         self._model = self._build(text)
-        self._layout = _Layout(self._model, tree, 7 if moving_base else 0, 6 if moving_base else 0)
+        self._layout = _Layout(
+            self._model, self._coupled(text), 7 if moving_base else 0, 6 if moving_base else 0
+        )
         self._local = threading.local()
         self._references = {
             Reference.LOCAL: pin.LOCAL,
@@ -90,6 +94,15 @@ class Oracle:
         if depth < _SHALLOW:
             return self._parse(text)
         return with_stack(depth * _STACK_FOR_A_LINK, lambda: self._parse(text))
+
+    def _coupled(self, text: str) -> KinematicTree:
+        """The tree with the text's own mimic rules; urdfkin's reading of them is under test too."""
+        try:
+            return with_rules_of_text(self._tree, text)
+        except (InputError, ValueError) as error:
+            raise OracleError(
+                "the mimic rules read differently", where=self._tree.name, found=str(error)
+            ) from error
 
     def _parse(self, text: str) -> Any:
         pin, tree = self._pin, self._tree

@@ -1,0 +1,50 @@
+"""Mimic rules as the URDF's text states them, for the oracle: read apart from urdfkin's own reader.
+
+Pinocchio couples nothing here (see `urdfkin.oracle`), so that a rule which the reader got wrong would be
+wrong on both sides, and agree. The standard library's parser reads it a second time.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as Xml
+from dataclasses import replace
+
+from urdfkin.errors import InputError
+from urdfkin.tree import KinematicTree, Mimic
+
+
+def with_rules_of_text(tree: KinematicTree, text: str) -> KinematicTree:
+    """The tree, its followers following as the text says.
+
+    Args:
+        tree: urdfkin's reading; which joints follow is taken from it, whom and how is not.
+        text: The URDF.
+
+    Raises:
+        InputError: the text lets a follower of the tree move freely.
+    """
+    if not any(joint.mimic for joint in tree.joints):
+        return tree
+    rules = {
+        joint.get("name", ""): Mimic(
+            rule.get("joint", ""), float(rule.get("multiplier", "1")), float(rule.get("offset", "0"))
+        )
+        for joint in Xml.fromstring(text).iterfind("joint")
+        if (rule := joint.find("mimic")) is not None
+    }
+    missing = [joint.name for joint in tree.joints if joint.mimic and joint.name not in rules]
+    if missing:
+        raise InputError("the URDF has no mimic rule for a joint", where=f"joint {missing[0]}")
+    joints = (replace(j, mimic=_to_the_end(j.name, rules)) if j.mimic else j for j in tree.joints)
+    return KinematicTree(tree.name, tree.links, tuple(joints))
+
+
+def _to_the_end(follower: str, rules: dict[str, Mimic]) -> Mimic:
+    """q_follower = m_1 (m_2 (... q_leader ... + o_2) + o_1, multiplied out from the leader's end."""
+    chain = [rules[follower]]
+    while (following := rules.get(chain[-1].leader)) is not None and len(chain) <= len(rules):
+        chain.append(following)
+    multiplier, offset = 1.0, 0.0
+    for rule in reversed(chain):
+        multiplier, offset = rule.multiplier * multiplier, rule.multiplier * offset + rule.offset
+    return Mimic(chain[-1].leader, multiplier, offset)
