@@ -12,6 +12,8 @@ from scripts.fuzzing.judge import judge
 from scripts.fuzzing.mutations import FAMILIES, mutant
 from tests.diagnostics.cases.arm import arm, fixed
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_mutant_depends_on_seed_and_number_alone() -> None:
     robots = fuzz.files()

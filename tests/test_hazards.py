@@ -12,6 +12,8 @@ from urdfkin.tree import Joint, JointKind, KinematicTree, build_tree, with_root_
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.writer import to_urdf
 
+pytestmark = pytest.mark.slow
+
 
 def chain(count: int, kind: JointKind = JointKind.FIXED) -> KinematicTree:
     T = np.eye(4)

@@ -11,6 +11,8 @@ import pytest
 
 import urdfkin
 
+pytestmark = pytest.mark.slow
+
 POLAR = ["polar", "--q", "0.3,0.7", "--v", "1,2", "--a", "0.5,-1"]
 
 

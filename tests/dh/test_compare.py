@@ -18,6 +18,8 @@ from urdfkin.dh.compare import compare, comparison_text
 from urdfkin.errors import InputError
 from urdfkin.tree import FloatArray, KinematicTree
 
+pytestmark = pytest.mark.slow
+
 EPS = float(np.finfo(np.float64).eps)
 
 

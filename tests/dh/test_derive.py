@@ -21,6 +21,8 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.tree import FloatArray, KinematicTree
 
+pytestmark = pytest.mark.slow
+
 EPS = float(np.finfo(np.float64).eps)
 CONVENTIONS = ("standard", "modified")
 LENGTH_BOUND = 10.0

@@ -17,6 +17,8 @@ from urdfkin.dh.read import table_from_text
 from urdfkin.errors import InputError, SourceError
 from urdfkin.tree import KinematicTree
 
+pytestmark = pytest.mark.slow
+
 ROWS = [[0.0, "pi/2", 0.3, 0.0, "R"], [0.4, 0.0, 0.0, -1.0, "P"]]
 
 

@@ -16,6 +16,8 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.tree import FloatArray, JointKind, KinematicTree, Mimic
 
+pytestmark = pytest.mark.slow
+
 conventions = st.sampled_from(["standard", "modified"])
 
 

@@ -16,6 +16,8 @@ from urdfkin.dh import DHTable, dh_table
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.tree import FloatArray, KinematicTree
 
+pytestmark = pytest.mark.slow
+
 EPS = float(np.finfo(np.float64).eps)
 
 

@@ -18,6 +18,8 @@ from urdfkin.dh.tree_parameters import tree_parameters
 from urdfkin.errors import InputError
 from urdfkin.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
 
+pytestmark = pytest.mark.slow
+
 EPS = float(np.finfo(np.float64).eps)
 
 

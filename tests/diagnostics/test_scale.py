@@ -6,6 +6,8 @@ import pytest
 
 from urdfkin.diagnostics import Finding, Limits, check_text
 
+pytestmark = pytest.mark.slow
+
 MANY = 50_000
 
 

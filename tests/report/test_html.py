@@ -16,6 +16,8 @@ from urdfkin.report import html as html_module
 from urdfkin.report.html import as_html
 from urdfkin.report.pages import angle
 
+pytestmark = pytest.mark.slow
+
 ASSETS = Path(html_module.__file__).parent / "assets"
 
 

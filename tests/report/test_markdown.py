@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import copy
 
+import pytest
 from markdown_it import MarkdownIt
 
 from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile
 from urdfkin.report.markdown import LIMIT, as_markdown, fenced, text
+
+pytestmark = pytest.mark.slow
 
 GITHUB_LIMIT = 65_536
 

@@ -16,6 +16,8 @@ from urdfkin.tree import FloatArray
 from urdfkin.validation.report import RobotReport, Verdict
 from urdfkin.verification.bounds import Quantity
 
+pytestmark = pytest.mark.slow
+
 #: Rounding seldom conspires: what is measured stays below this share of the bound, on every robot here.
 USUAL_SHARE = 0.25
 

@@ -18,6 +18,8 @@ from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.skeleton import rpy_of_quaternion
 from urdfkin.urdf.writer import to_urdf
 
+pytestmark = pytest.mark.slow
+
 EPS = float(np.finfo(float).eps)
 SLOW = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 

@@ -15,6 +15,8 @@ from urdfkin.urdf import xacro
 from urdfkin.urdf.packages import find_package
 from urdfkin.urdf.xacro import XacroError, expand
 
+pytestmark = pytest.mark.slow
+
 NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 ARM = f"""<robot name="arm" {NAMESPACE}>
   <xacro:arg name="n" default="2"/>
