@@ -45,7 +45,7 @@ def walker() -> KinematicTree:
 
 
 @given(trees())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_every_path_of_a_tree_is_placed_as_pinocchio_places_it(tree: KinematicTree) -> None:
     oracle = TreeOracle(tree)
     q = configurations(tree.nq, 4)

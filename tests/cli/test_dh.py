@@ -112,3 +112,9 @@ def test_bad_input_is_told_what_to_do(
 ) -> None:
     with pytest.raises(error, match=message):
         run(*arguments)
+
+
+def test_the_table_in_the_docs_is_what_the_command_prints() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "dh.md").read_text()
+    command, shown = page.split("```console\n$ urdfkin dh ")[1].split("```")[0].split("\n", 1)
+    assert run(*command.split()).stdout.startswith(shown)
