@@ -39,5 +39,6 @@ def load_kernels() -> None:
     from urdfkin.recursion import (  # noqa: F401, PLC0415
         jacobian_kernel,
         jacobian_rate_kernel,
+        local_kernel,
         motion_kernel,
     )

@@ -1,0 +1,79 @@
+"""Run the `urdfkin` command: in this process where its entry point will do, in one of its own where not."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from urdfkin.cli import main
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a command left behind."""
+
+    code: int
+    out: bytes
+    err: str
+
+    @property
+    def text(self) -> str:
+        """Standard output as text."""
+        return self.out.decode()
+
+    @property
+    def data(self) -> Any:
+        """Standard output as JSON; NaN and Infinity are none."""
+        return json.loads(self.text, parse_constant=_refused)
+
+
+def _refused(word: str) -> None:
+    raise ValueError(f"{word} is no JSON")
+
+
+def urdfkin(*words: str, stdin: str | bytes = b"") -> Done:
+    """The entry point of the installed command, called here: no new process, the same code."""
+    data = stdin.encode() if isinstance(stdin, str) else stdin
+    out, err = io.BytesIO(), io.StringIO()
+    code = 0
+    with _streams(words, io.TextIOWrapper(io.BytesIO(data)), io.TextIOWrapper(out, write_through=True), err):
+        try:
+            main()
+        except SystemExit as leave:
+            code = leave.code if isinstance(leave.code, int) else int(leave.code is not None)
+    return Done(code, out.getvalue(), err.getvalue())
+
+
+@contextmanager
+def _streams(
+    words: tuple[str, ...], stdin: io.TextIOWrapper, stdout: io.TextIOWrapper, stderr: io.StringIO
+) -> Iterator[None]:
+    before = sys.argv, sys.stdin, sys.stdout, sys.stderr
+    sys.argv, sys.stdin, sys.stdout, sys.stderr = ["urdfkin", *words], stdin, stdout, stderr
+    try:
+        yield
+    finally:
+        stdout.flush()
+        stdout.detach()
+        sys.argv, sys.stdin, sys.stdout, sys.stderr = before
+
+
+def process(*words: str, stdin: bytes = b"", cwd: Path | None = None, **env: str) -> Done:
+    """`python -m urdfkin` in a process of its own."""
+    done = subprocess.run(
+        [sys.executable, "-m", "urdfkin", *words],
+        input=stdin,
+        cwd=cwd,
+        env={**os.environ, **env},
+        capture_output=True,
+        check=False,
+    )
+    return Done(done.returncode, done.stdout, done.stderr.decode())

@@ -1,0 +1,234 @@
+"""Values in and numbers out: every way of giving q, v and a, every format, to the last digit."""
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urdfkin as library
+from tests.cli.running import urdfkin
+from tests.robots.odd_urdfs import urdf_of
+from urdfkin.tree import FloatArray
+from urdfkin.verification.sampling import sample
+
+QUANTITIES = {
+    "placement": "q",
+    "velocity": "qv",
+    "jacobian": "q",
+    "jacobian-rate": "qv",
+    "acceleration": "qva",
+}
+Q = (0.1, -0.5, 1 / 3, -2.0, 2**-0.5, 1.5, 0.8, 0.02)
+
+
+def expected(quantity: str, n: int, reference: str) -> FloatArray:
+    """What the library computes for samples 0 to n-1 of seed 7, drawn as the command draws them."""
+    robot = library.load("panda")
+    rng = np.random.default_rng(7)
+    q = sample(robot.tree, n, rng)
+    v = rng.standard_normal((n, robot.nv)) if "v" in QUANTITIES[quantity] else q
+    a = rng.standard_normal((n, robot.nv)) if "a" in QUANTITIES[quantity] else q
+    frame = "panda_hand"
+    return {
+        "placement": lambda: robot.placement(q, frame),
+        "velocity": lambda: robot.velocity(q, v, frame, reference),
+        "jacobian": lambda: robot.jacobian(q, frame, reference),
+        "jacobian-rate": lambda: robot.jacobian_rate(q, v, frame, reference),
+        "acceleration": lambda: robot.acceleration(q, v, a, frame, reference),
+    }[quantity]()
+
+
+def command(quantity: str, n: int, reference: str, format_: str) -> bytes:
+    words = [quantity, "panda", "--frame", "panda_hand", "--seed", "7", "--format", format_]
+    if quantity != "placement":
+        words += ["--reference", reference]
+    for letter in QUANTITIES[quantity]:
+        words += [f"--{letter}", f"random:{n}"]
+    done = urdfkin(*words)
+    assert done.code == 0, done.err
+    return done.out
+
+
+@pytest.mark.parametrize("n", [1, 3])
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_json_csv_and_npy_give_the_librarys_numbers_to_the_last_digit(quantity: str, n: int) -> None:
+    result = expected(quantity, n, "local")
+    data = json.loads(command(quantity, n, "local", "json"))
+    assert np.array_equal(np.array(data["result"]), result)
+    assert np.array_equal(np.load(io.BytesIO(command(quantity, n, "local", "npy"))), result)
+    rows = list(csv.reader(io.StringIO(command(quantity, n, "local", "csv").decode())))
+    numbers = np.array([[float(cell) for cell in row if _is_number(cell)] for row in rows[1:]])
+    labels = 1  # the sample's number; a Jacobian's rows have a name besides, which is no number
+    assert np.array_equal(numbers[:, labels:].reshape(result.shape), result)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_the_table_says_what_was_computed_checked_and_how_closely(quantity: str) -> None:
+    text = command(quantity, 1, "local_world_aligned", "table").decode()
+    assert "panda" in text
+    assert "panda_hand" in text
+    assert "verified by Pinocchio 4" in text
+    assert "eps*scale" in text
+    if quantity.startswith("jacobian"):
+        assert all(name in text for name in library.load("panda").rate_names)
+
+
+def test_the_json_says_all_that_is_needed_to_use_it() -> None:
+    data = urdfkin(
+        "acceleration", "panda", "--q", "random", "--v", "random", "--a", "random", "--format", "json"
+    ).data
+    assert data["robot"] == "panda"
+    assert data["frame"] == "panda_hand_tcp"
+    assert data["reference"] == "local_world_aligned"
+    assert data["coordinates"] == list(library.load("panda").coordinate_names)
+    assert data["rates"] == list(library.load("panda").rate_names)
+    assert len(data["q"]) == len(data["v"]) == len(data["a"]) == len(data["result"]) == 1
+    assert data["verified"] is True
+    assert data["check"].startswith("verified by Pinocchio 4")
+    robot = library.load("panda")
+    again = robot.acceleration(data["q"], data["v"], data["a"], data["frame"], data["reference"])
+    assert np.array_equal(again, data["result"])
+
+
+def test_numbers_are_taken_as_they_are_written() -> None:
+    data = urdfkin("placement", "panda", "--q", ",".join(map(repr, Q)), "--format", "json").data
+    assert data["q"] == [list(Q)]
+    assert np.array_equal(data["result"][0], library.load("panda").placement(Q, "panda_hand_tcp"))
+
+
+@pytest.mark.parametrize("layout", ["plain", "header", "header in another order", "crlf and bom", "comments"])
+def test_a_batch_comes_from_a_csv_file_with_or_without_a_header(layout: str, tmp_path: Path) -> None:
+    robot = library.load("panda")
+    q, names = robot.sample(4, 3), list(robot.coordinate_names)
+    order = list(range(8))
+    if layout == "header in another order":
+        order = [3, 1, 7, 0, 5, 2, 6, 4]
+    lines = [",".join(repr(float(row[i])) for i in order) for row in q]
+    if layout.startswith("header"):
+        lines.insert(0, ", ".join(names[i] for i in order))
+    if layout == "comments":
+        lines = ["# recorded today", lines[0], "", *lines[1:]]
+    text = "\n".join(lines) + "\n"
+    if layout == "crlf and bom":
+        text = "\ufeff" + text.replace("\n", "\r\n")
+    path = tmp_path / "q.csv"
+    path.write_text(text, encoding="utf-8", newline="")
+    done = urdfkin("jacobian", "panda", "--q", f"@{path}", "--format", "npy")
+    assert done.code == 0, done.err
+    assert np.array_equal(np.load(io.BytesIO(done.out)), robot.jacobian(q, "panda_hand_tcp"))
+
+
+def test_a_batch_may_come_from_standard_input_as_a_robot_may() -> None:
+    robot = library.load("ur5")
+    rows = "\n".join(",".join(map(repr, row)) for row in robot.sample(3, 1).tolist())
+    done = urdfkin("jacobian", "ur5", "--q", "@-", "--format", "npy", stdin=rows)
+    assert np.array_equal(np.load(io.BytesIO(done.out)), robot.jacobian(robot.sample(3, 1), robot.tip_frame))
+    done = urdfkin("jacobian", "-", "--frame", "tool0", "--format", "json", stdin=robot.urdf)
+    assert done.code == 0, done.err
+    assert done.data["source"] == "-"
+    assert np.array_equal(done.data["result"][0], robot.jacobian(np.zeros(6), "tool0"))
+
+
+def test_one_sample_of_v_goes_with_a_batch_of_q() -> None:
+    done = urdfkin("velocity", "ur5", "--q", "random:5", "--v", "1,0,0,0,0,0", "--format", "json")
+    assert np.shape(done.data["v"]) == (5, 6)
+    done = urdfkin("velocity", "ur5", "--q", "random:5", "--v", "random:4")
+    assert (done.code, done.out) == (2, b"")
+    assert "different lengths: found 5, 4" in done.err
+
+
+def test_a_seed_gives_the_same_numbers_and_another_one_others() -> None:
+    one, again, other = (
+        urdfkin("jacobian", "panda", "--q", "random:2", "--seed", seed, "--format", "csv").out
+        for seed in ("3", "3", "4")
+    )
+    assert one == again
+    assert one != other
+
+
+def test_a_long_batch_is_shown_in_part_and_says_where_the_rest_is() -> None:
+    text = urdfkin("velocity", "ur5", "--q", "random:9", "--v", "random").text
+    assert "sample 4" in text
+    assert "sample 5" not in text
+    assert "4 more samples" in text
+
+
+def test_output_goes_to_a_file_whole_and_the_check_to_stderr(tmp_path: Path) -> None:
+    path = tmp_path / "J.npy"
+    done = urdfkin("jacobian", "panda", "--format", "npy", "--output", str(path))
+    assert (done.code, done.out) == (0, b"")
+    assert "verified by Pinocchio" in done.err
+    assert np.load(path).shape == (1, 6, 8)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["J.npy"]
+
+
+def test_an_output_that_is_a_link_or_a_device_is_written_through(tmp_path: Path) -> None:
+    target, link = tmp_path / "target.csv", tmp_path / "link.csv"
+    target.write_text("old")
+    link.symlink_to(target)
+    assert urdfkin("jacobian", "panda", "--format", "csv", "-o", str(link)).code == 0
+    assert link.is_symlink()
+    assert target.read_text().startswith("sample,row,panda_joint1")
+    assert urdfkin("jacobian", "panda", "--format", "csv", "-o", "/dev/null").code == 0
+    assert Path("/dev/null").is_char_device()
+    dash = urdfkin("jacobian", "panda", "--format", "csv", "-o", "-")
+    assert dash.text.startswith("sample,row,panda_joint1")
+
+
+def test_limits_that_are_left_are_warned_of_by_name_and_computed_all_the_same() -> None:
+    done = urdfkin("placement", "panda", "--q", "0,0,0,-1,0,0,0,0.5", "--format", "json")
+    assert done.code == 0
+    assert "warning: joint panda_finger_joint1: 0.5 is outside [0, 0.04]" in done.err
+    assert "warning: joint panda_finger_joint2: 0.5 is outside [0, 0.04]" in done.err
+    assert "panda_joint4" not in done.err
+    assert done.data["verified"] is True
+
+
+def test_the_default_frame_is_said_and_is_the_catalogues_tip() -> None:
+    assert "jacobian of panda_hand_tcp" in urdfkin("jacobian", "panda").text
+    assert "jacobian of tool0" in urdfkin("jacobian", "ur5").text
+
+
+@pytest.mark.parametrize("root_joint", ["planar", "floating"])
+def test_a_root_joint_adds_its_coordinates(root_joint: str) -> None:
+    data = urdfkin("velocity", "a1", "--root-joint", root_joint, "--v", "random", "--format", "json").data
+    assert data["rates"][0] == "root_joint.vx"
+    assert len(data["q"][0]) == 12 + (7 if root_joint == "floating" else 3)
+
+
+def test_mimic_joints_follow_or_are_free_as_asked() -> None:
+    assert len(urdfkin("jacobian", "panda", "--format", "json").data["rates"]) == 8
+    assert len(urdfkin("jacobian", "panda", "--no-mimic", "--format", "json").data["rates"]) == 9
+    assert urdfkin("jacobian", "alex_psyonic_hands").code == 0
+    assert urdfkin("jacobian", "alex_psyonic_hands", "--mimic").code == 2
+
+
+@pytest.mark.parametrize("name", ["single_link", "fixed_only", "odd_names", "same_names", "mimic_hand_40"])
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_odd_robots_pass_through_the_command(quantity: str, name: str) -> None:
+    words = [word for letter in QUANTITIES[quantity] for word in (f"--{letter}", "random:2")]
+    for format_ in ("table", "json", "csv", "npy"):
+        done = urdfkin(quantity, "-", *words, "--format", format_, stdin=urdf_of(name))
+        assert done.code == 0, done.err
+        assert done.out
+
+
+def test_without_verification_exit_3_says_so() -> None:
+    done = urdfkin("jacobian", "panda", "--no-verify")
+    assert done.code == 3
+    assert "NOT VERIFIED" in done.text
+    assert "verify=False was asked for" in done.text
+    done = urdfkin("jacobian", "panda", "--no-verify", "--format", "json")
+    assert done.code == 3
+    assert done.data["verified"] is False
