@@ -24,16 +24,17 @@ def test_a_mutant_depends_on_seed_and_number_alone() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_every_mutator_is_used_and_nearly_all_change_something() -> None:
     robots = fuzz.files()
     originals = {path.stem: path.read_bytes() for path in robots}
     used, changed = set(), 0
-    for number in range(2000):
+    for number in range(1000):
         what, data = mutant(5, number, robots)
         used |= set(what.split()[1:])
         changed += data != originals[what.split()[0]]
     assert used == {mutate.__name__.strip("_") for family in FAMILIES for mutate in family}
-    assert changed > 1900
+    assert changed > 950
 
 
 @pytest.mark.parametrize(

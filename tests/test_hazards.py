@@ -24,6 +24,7 @@ def chain(count: int, kind: JointKind = JointKind.FIXED) -> KinematicTree:
     return build_tree("chain", "l0", joints)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["main thread", "another thread"])
 def test_a_chain_deeper_than_any_stack_is_verified(where: str) -> None:
     """Pinocchio's parser kills a process at about 3,800 links, at 480 on a thread with 1 MB of stack."""

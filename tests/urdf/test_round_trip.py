@@ -49,6 +49,7 @@ def test_writing_twice_changes_nothing_but_the_last_digits_of_angles(tree: Kinem
     assert_same(read_tree(to_urdf(once).encode()), once)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.too_slow])
 @given(trees(max_joints=6))
 def test_pinocchio_agrees_on_every_written_tree(tree: KinematicTree) -> None:

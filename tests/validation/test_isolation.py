@@ -34,6 +34,7 @@ def _sleeping_child(pipe: Any, work: list[Chunk]) -> None:
     time.sleep(60)
 
 
+@pytest.mark.slow
 def test_isolation_changes_no_number() -> None:
     with_it = validate(["ur5", "double_pendulum"], samples=30, isolate=True)
     without = validate(["ur5", "double_pendulum"], samples=30)
@@ -48,6 +49,7 @@ def test_isolation_changes_no_number() -> None:
     assert numbers(with_it) == numbers(without)
 
 
+@pytest.mark.slow
 def test_a_death_is_that_robots_result_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(isolation, "_child", _deadly_child)
     report = validate(["double_pendulum", DEADLY, "iris_simple"], samples=3, isolate=True, jobs=2)

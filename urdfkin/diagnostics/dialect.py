@@ -30,7 +30,7 @@ _SRDF = {"group", "group_state", "end_effector", "virtual_joint", "disable_colli
 
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 _XACRO_NAMESPACE = re.compile(r"https?://(www\.)?(ros|wiki\.ros)\.org/(wiki/)?xacro")
-_EXPRESSION = re.compile(r"\$\{|\$\((find|arg|env|optenv|eval|anon|dirname)\b")
+_EXPRESSION = re.compile(r"\$\{[^}]*\}|\$\((find|arg|env|optenv|eval|anon|dirname)\b")
 _XINCLUDE = "http://www.w3.org/2001/XInclude"
 
 #: Newest version urdfdom 6 knows.
