@@ -1,0 +1,40 @@
+"""The front page is true: its example runs, its commands exist, its transcript is what one sees."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from urdfkin.cli import COMMANDS
+
+README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+
+
+def block(language: str) -> str:
+    """The first fenced block of a language."""
+    found = re.search(rf"```{language}\n(.*?)```", README, re.DOTALL)
+    assert found is not None, language
+    return found.group(1)
+
+
+def test_the_smallest_example_runs_and_is_verified() -> None:
+    names: dict[str, Any] = {}
+    exec(compile(block("python"), "README.md", "exec"), names)
+    assert names["J"].shape == (1000, 6, 8)
+    assert names["robot"].certificate().verified
+
+
+def test_every_command_stands_on_the_front_page() -> None:
+    assert [name for name in COMMANDS if f"`{name}" not in README and f"urdfkin {name}" not in README] == []
+
+
+def test_the_transcript_is_what_one_sees() -> None:
+    command, *expected = block("console").splitlines()
+    words = command.removeprefix("$ urdfkin ").split()
+    run = subprocess.run(
+        [sys.executable, "-m", "urdfkin", *words], capture_output=True, text=True, check=True
+    )
+    # The table is the same on every machine; the disagreement in the last line is not.
+    assert [line.rstrip() for line in run.stdout.splitlines()[:5]] == expected[:5]
+    assert run.stdout.splitlines()[5].startswith("verified by Pinocchio")
