@@ -94,7 +94,7 @@ def main() -> None:
     # The line under a result says that it was not verified, and why; once is enough.
     warnings.filterwarnings("ignore", message="not verified")
     try:
-        cli(standalone_mode=True)
+        cli(prog_name="urdfkin")
     except UrdfkinError as error:
         click.echo(f"urdfkin: error: {error}", err=True)
         sys.exit(1 if error.is_disagreement else 2)

@@ -1,0 +1,127 @@
+"""Help is quick, complete and true: its examples are run."""
+
+import glob
+import shlex
+import subprocess
+import sys
+import time
+from importlib import import_module, metadata
+from pathlib import Path
+
+import pytest
+
+from tests.cli.running import process, urdfkin
+from tests.robots.odd_urdfs import urdf_of
+from urdfkin.cli import COMMANDS
+from urdfkin.resources import robots_dir
+
+#: Heavy, or needless where nothing is computed.
+HEAVY = {"numpy", "numba", "llvmlite", "pinocchio", "yourdfpy", "trimesh", "lxml", "scipy", "rich"}
+
+
+def examples(command: str) -> list[str]:
+    """The examples of the command in its help."""
+    text = urdfkin(command, "--help").text.partition("Example:")[2].partition("Options:")[0]
+    lines = " ".join(text.split()).split("urdfkin ")[1:]
+    return [line.strip() for line in lines if line.split()[0] == command]
+
+
+def run_examples(command: str) -> None:
+    """Run them here, as a shell would."""
+    assert examples(command)
+    for example in examples(command):
+        words = [sorted(glob.glob(word)) or [word] for word in shlex.split(example)]  # noqa: PTH207  relative
+        done = urdfkin(*(word for expanded in words for word in expanded))
+        assert done.code == 0, (example, done.err, done.text)
+        assert done.out
+
+
+def test_every_command_stands_on_the_help_page_with_a_summary() -> None:
+    text = urdfkin("--help").text
+    for name, (_, summary) in COMMANDS.items():
+        assert f"  {name} " in text
+        assert summary.split()[0] in text
+
+
+def elbow() -> str:
+    """A robot with nothing to find fault with."""
+    return (robots_dir() / "elbow.urdf").read_text()
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_with_an_example_of_itself(command: str) -> None:
+    done = urdfkin(command, "--help")
+    assert done.code == 0
+    assert done.text.startswith(f"Usage: urdfkin {command} ")
+    assert examples(command)
+    assert urdfkin(command, "-h").out == done.out
+
+
+AFTER_WORK = ("validate", "report", "compare")
+
+
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name not in AFTER_WORK])
+def test_the_examples_of_the_help_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "robots").mkdir()
+    for name in ("my", "robot", "arm", "robots/one"):
+        (tmp_path / f"{name}.urdf").write_text(elbow())
+    run_examples(command)
+
+
+@pytest.mark.slow
+def test_the_examples_of_validation_run_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my.urdf").write_text(urdf_of("tree_1"))
+    for name in ("results", "main", "branch"):
+        assert urdfkin("validate", "ur5", "--samples", "10", "--json", f"{name}.json").code == 0
+    for command in AFTER_WORK:
+        run_examples(command)
+
+
+def test_help_imports_nothing_heavy() -> None:
+    for words in ("import urdfkin", "import urdfkin.cli", "from urdfkin.cli import cli; cli.get_help"):
+        code = f"import sys; {words}; print(sorted({HEAVY!r} & set(sys.modules)))"
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert done.stdout == "[]\n"
+    code = (
+        "import sys\nfrom urdfkin.cli import main\nsys.argv = ['urdfkin', '--help']\n"
+        f"try: main()\nexcept SystemExit: print(sorted({HEAVY!r} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("\n[]\n")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_commands_help_imports_neither_numpy_nor_pinocchio(command: str) -> None:
+    code = (
+        f"import sys\nfrom urdfkin.cli import main\nsys.argv = ['urdfkin', {command!r}, '--help']\n"
+        f"try: main()\nexcept SystemExit: print(sorted({HEAVY!r} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("\n[]\n"), done.stdout[-200:]
+
+
+def test_help_is_there_at_once() -> None:
+    # 0.06 s was measured; the bound leaves room for a loaded machine.
+    best = min(_seconds() for _ in range(3))
+    assert best < 0.6
+
+
+def _seconds() -> float:
+    begin = time.perf_counter()
+    assert process("--help").code == 0
+    return time.perf_counter() - begin
+
+
+def test_the_version_names_pinocchios_too() -> None:
+    done = urdfkin("--version")
+    assert done.code == 0
+    assert done.text.strip().endswith(f"Pinocchio {metadata.version('pin')}")
+
+
+def test_every_summary_and_module_is_there() -> None:
+    for module, _ in COMMANDS.values():
+        assert callable(import_module(module).command)

@@ -1,0 +1,163 @@
+"""What a user gets wrong: exit 2, one clear message on stderr, nothing on stdout, never a traceback."""
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.cli.running import process, urdfkin
+from tests.robots.odd_urdfs import urdf_of
+
+ZEROS = "0,0,0,-1,0,0,0,0"
+
+MISTAKES = {
+    "no such name": (["jacobian", "pandaa"], "unknown robot 'pandaa'; did you mean panda"),
+    "no such file": (["info", "./nowhere.urdf"], "nowhere.urdf: no such file"),
+    "no such folder": (["info", "nowhere/arm.urdf"], "no such file; there is no folder nowhere"),
+    "a folder": (["info", "."], "a folder, not a file; name the .urdf inside"),
+    "nothing": (["info", ""], "no robot is named"),
+    "no urdf": (["info", __file__], "URDF105 error: not well-formed XML"),
+    "an empty file": (["info", "/dev/null"], "URDF101 error: the file is empty"),
+    "a web page": (["info", "<html><body/></html>"], "this is a web page"),
+    "no such frame": (
+        ["jacobian", "panda", "--frame", "panda_hnd"],
+        "unknown frame 'panda_hnd'; did you mean panda_hand",
+    ),
+    "too few numbers": (["jacobian", "panda", "--q", "0,0"], "8 numbers are expected (panda_joint1, "),
+    "too many numbers": (["velocity", "ur5", "--v", "0," * 6 + "0"], "6 numbers are expected (shoulder_"),
+    "a word": (["jacobian", "panda", "--q", ZEROS.replace("-1", "one")], "not a finite number: found 'one'"),
+    "nan": (["jacobian", "panda", "--q", ZEROS.replace("-1", "nan")], "not a finite number: found 'nan'"),
+    "inf": (["velocity", "panda", "--v", "0,0,0,0,0,0,0,inf"], "--v: not a finite number: found 'inf'"),
+    "no csv file": (["jacobian", "panda", "--q", "@nowhere.csv"], "nowhere.csv: cannot be read: found No"),
+    "a binary csv file": (["jacobian", "panda", "--q", "@/bin/sh"], "/bin/sh: cannot be read: found no UTF"),
+    "an empty csv file": (["jacobian", "panda", "--q", "@/dev/null"], "no samples; one line a sample"),
+    "random:many": (["jacobian", "panda", "--q", "random:many"], "random:N wants a whole number"),
+    "random:0": (["jacobian", "panda", "--q", "random:0"], "random:N wants a whole number from 1 on"),
+    "a zero quaternion": (
+        ["jacobian", "ur5", "--root-joint", "floating", "--q", ",".join("0" * 13)],
+        "the quaternion of joint root_joint must be a unit quaternion: found norm 0",
+    ),
+    "numbers too large": (
+        ["acceleration", "ur5", "--v", ",".join(["1e200"] * 6)],
+        "leaves the range of double precision; give smaller numbers",
+    ),
+    "no such command": (["jacobain", "panda"], "unknown command 'jacobain'; did you mean jacobian"),
+    "no such option": (["jacobian", "panda", "--fram", "x"], "No such option"),
+    "no such reference": (["jacobian", "panda", "--reference", "global"], "Invalid value for '--reference'"),
+    "no such format": (["jacobian", "panda", "--format", "xml"], "Invalid value for '--format'"),
+    "no such family": (["robots", "--family", "armchair"], "no robot of family 'armchair'; there are: "),
+    "a negative seed": (["jacobian", "panda", "--seed", "-1"], "Invalid value for '--seed'"),
+    "no robot": (["validate"], "name robots, or say --all"),
+    "robots and all": (["validate", "panda", "--all"], "name robots, or say --all"),
+    "negative samples": (["validate", "panda", "--samples", "-1"], "Invalid value for '--samples'"),
+    "no jobs": (["validate", "panda", "--jobs", "0"], "Invalid value for '--jobs'"),
+    "an output nowhere": (["jacobian", "ur5", "-o", "/nowhere/J.csv"], "J.csv: cannot be written: found No"),
+    "a report nowhere": (["validate", "ur5", "--json", "/nowhere/r.json"], "r.json: cannot be written"),
+    "mimic leaders that do not exist": (["info", "alex_psyonic_hands", "--mimic"], "--no-mimic"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_gives_one_clear_message_and_exit_2(
+    mistake: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words, message = MISTAKES[mistake]
+    done = urdfkin(*words)
+    assert message in done.err
+    assert done.code == 2
+    assert done.out == b""
+    assert "Traceback" not in done.err
+    lines = [line for line in done.err.splitlines() if not line.startswith("warning: joint")]
+    assert lines[0].startswith(("urdfkin: error: ", "Usage: "))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("1,2\n", "q.csv:1: 6 numbers are expected"),
+        ("0,0,0,0,0,0\n0,0,0,0,x,0\n", "q.csv:2: not a finite number: found 'x'"),
+        ("0,0,0,0,0,0\n\n0,0,0,0,nan,0\n", "q.csv:3: not a finite number: found 'nan'"),
+        ("a,b,c,d,e,f\n0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
+        ("\x00\x00", "q.csv"),
+        ("0;0;0;0;0;0\n", "q.csv:1"),
+    ],
+)
+def test_a_mistake_in_a_csv_file_is_located(content: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "q.csv"
+    path.write_text(content)
+    done = urdfkin("jacobian", "ur5", "--q", f"@{path}")
+    assert (done.code, done.out) == (2, b"")
+    assert message in done.err
+    assert "Traceback" not in done.err
+
+
+def test_a_column_named_twice_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "q.csv"
+    path.write_text("shoulder_pan_joint," * 6 + "\n" + "0," * 6 + "\n")
+    assert urdfkin("jacobian", "ur5", "--q", f"@{path}").code == 2
+
+
+def test_a_report_that_must_not_be_written_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Permissions do not bind the superuser, whom tests may run as: the system's answer is stood in for.
+    def refuse(*args: object, **kwargs: object) -> None:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr("tempfile.NamedTemporaryFile", refuse)
+    for words in (["validate", "ur5", "--json", "r.json"], ["jacobian", "ur5", "-o", "J.csv"]):
+        done = urdfkin(*words[:-1], str(tmp_path / words[-1]))
+        assert (done.code, done.out) == (2, b"")
+        assert "cannot be written: found Permission denied" in done.err
+        assert done.err.count("\n") == 1
+
+
+def test_a_report_that_is_read_only_is_not_renamed_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "J.csv"
+    path.write_text("mine")
+    monkeypatch.setattr(os, "access", lambda _, mode: mode != os.W_OK)
+    done = urdfkin("jacobian", "ur5", "-o", str(path))
+    assert done.code == 2
+    assert "Permission denied" in done.err
+    assert path.read_text() == "mine"
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    import subprocess  # noqa: PLC0415
+    import sys  # noqa: PLC0415
+
+    words = [sys.executable, "-m", "urdfkin", "velocity", "ur5", "--q", "random:20000", "--format", "csv"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+        assert running.stdout is not None
+        assert running.stderr is not None
+        assert running.stdout.readline() == b"sample,vx,vy,vz,wx,wy,wz\n"
+        running.stdout.close()
+        assert b"Traceback" not in running.stderr.read()
+
+
+def test_a_robot_pinocchio_cannot_check_says_so_once_with_exit_3() -> None:
+    chain = "".join(
+        f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'
+        f'<child link="l{i + 1}"/><origin xyz="0.1 0 0"/><axis xyz="0 0 1"/></joint>'
+        for i in range(316)
+    )
+    done = process(
+        "placement", "-", "--format", "json",
+        stdin=f'<robot name="snake"><link name="l0"/>{chain}</robot>'.encode(),
+    )  # fmt: skip
+    assert done.code == 3
+    assert done.data["verified"] is False
+    assert "memory grows with the cube" in done.data["check"]
+    assert "Warning" not in done.err
+
+
+@pytest.mark.parametrize("stdin", [b"", b"\xff\xfe\x00", b"<robot", urdf_of("single_link").encode()[:-3]])
+def test_standard_input_that_is_no_urdf_is_an_input_error(stdin: bytes) -> None:
+    done = urdfkin("placement", "-", stdin=stdin)
+    assert (done.code, done.out) == (2, b"")
+    assert "<stdin>" in done.err
