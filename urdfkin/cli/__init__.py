@@ -29,6 +29,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "explain": ("urdfkin.cli.explain", "what a finding's code means, or an equation's number"),
     "report": ("urdfkin.cli.report", "show or write the report of an earlier validation"),
     "plot": ("urdfkin.cli.plot", "a frame's motion along a trajectory, as a picture"),
+    "view": ("urdfkin.cli.view", "a robot in a browser tab, with sliders and arrows"),
     "compare": ("urdfkin.cli.compare", "what changed between two validations"),
 }
 

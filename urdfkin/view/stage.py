@@ -1,0 +1,203 @@
+"""The border to viser: a robot's picture, which is told where things are and draws them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from urdfkin.dh.table import DHTable
+from urdfkin.robot import Robot
+from urdfkin.tree import FloatArray, KinematicTree
+from urdfkin.view.meshes import mesh
+from urdfkin.view.overlays import Arrows, Ellipsoid, scalar_first
+from urdfkin.view.shapes import GREY, Shape, shapes
+
+_BONE, _TURN, _SLIDE = (142, 153, 168), (47, 111, 208), (208, 122, 28)
+_NORMAL, _OFFSET = (194, 52, 139), (22, 128, 138)
+
+
+class Stage:
+    """A robot in viser's scene: links as frames, shapes or a skeleton below them, overlays beside them.
+
+    Attributes:
+        missing: Meshes that could not be shown.
+        reach: The robot's size in metres.
+    """
+
+    def __init__(self, server: Any, robot: Robot) -> None:
+        self._scene, self._server, self.robot = server.scene, server, robot
+        tree = robot.tree
+        Ts = robot.placements(robot.neutral(), verify=False)
+        self.reach = float(np.linalg.norm(np.ptp(Ts[:, :3, 3], axis=0))) or 1.0
+        self._scene.set_up_direction("+z")
+        self._scene.add_grid(
+            "/floor", width=3 * self.reach, height=3 * self.reach, cell_size=self.reach / 5,
+            position=(0.0, 0.0, min(0.0, float(Ts[:, 2, 3].min()))),
+        )  # fmt: skip
+        middle = 0.5 * (Ts[:, :3, 3].max(axis=0) + Ts[:, :3, 3].min(axis=0))
+        server.initial_camera.position = middle + self.reach * np.array([1.1, -1.3, 0.6])
+        server.initial_camera.look_at = middle
+        self._links = [self._scene.add_frame(f"/robot/{i}", show_axes=False) for i in range(len(tree.links))]
+        self._axes = self._scene.add_batched_axes(
+            "/axes",
+            batched_wxyzs=scalar_first(Ts[:, :3, :3]),
+            batched_positions=Ts[:, :3, 3],
+            axes_length=0.07 * self.reach,
+            axes_radius=0.0015 * self.reach,
+            visible=False,
+        )
+        self._skeleton: list[Any] = []
+        self._shapes: list[Any] = []
+        bare = self._add_shapes(tree)
+        self._add_skeleton(tree, Ts)
+        self.show(shapes=True, skeleton=bare, axes=False)
+        self._dh: list[Any] = []
+
+    def _add_shapes(self, tree: KinematicTree) -> bool:
+        """Returns whether so little can be shown that the skeleton is wanted."""
+        self.missing: list[Shape] = []
+        for k, shape in enumerate(shapes(self.robot)):
+            handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)
+            if handle is None:
+                self.missing.append(shape)
+            else:
+                self._shapes.append(handle)
+        return not self._shapes or bool(self.missing)
+
+    def _add_shape(self, name: str, shape: Shape) -> Any | None:
+        if shape.kind == "mesh":
+            whole = mesh(shape)
+            return None if whole is None else self._scene.add_mesh_trimesh(name, whole)
+        place = {"wxyz": scalar_first(shape.T_link_shape[:3, :3]), "position": shape.T_link_shape[:3, 3]}
+        *rgb, opacity = shape.colour or GREY
+        look = {"color": tuple(round(255 * x) for x in rgb), "opacity": None if opacity == 1.0 else opacity}
+        if shape.kind == "box":
+            return self._scene.add_box(name, dimensions=shape.size, **look, **place)
+        if shape.kind == "sphere":
+            return self._scene.add_icosphere(name, radius=shape.size[0], **look, **place)
+        return self._scene.add_cylinder(name, radius=shape.size[0], height=shape.size[1], **look, **place)
+
+    def _add_skeleton(self, tree: KinematicTree, Ts: FloatArray) -> None:
+        r = 0.014 * self.reach
+        for i, joint in enumerate(tree.joints):
+            p = joint.T_parent_joint[:3, 3]
+            if (length := float(np.linalg.norm(p))) > 1e-6 * self.reach:
+                R = _towards(p / length)
+                self._skeleton.append(
+                    self._scene.add_cylinder(
+                        f"/robot/{joint.parent}/bone{i}",
+                        radius=0.3 * r,
+                        height=length,
+                        color=_BONE,
+                        wxyz=scalar_first(R),
+                        position=p / 2,
+                    )
+                )
+            if joint.kind.has_axis:
+                self._skeleton.append(
+                    self._scene.add_cylinder(
+                        f"/robot/{i + 1}/joint{i}",
+                        radius=r if joint.kind.turns else 0.6 * r,
+                        height=2.2 * r if joint.kind.turns else 3.4 * r,
+                        color=_TURN if joint.kind.turns else _SLIDE,
+                        wxyz=scalar_first(_towards(joint.axis)),
+                    )
+                )
+
+    def show(self, *, shapes: bool, skeleton: bool, axes: bool) -> None:
+        """Which parts are seen."""
+        self.skeleton_shown = skeleton
+        for handle in self._shapes:
+            handle.visible = shapes
+        for handle in self._skeleton:
+            handle.visible = skeleton
+        self._axes.visible = axes
+
+    def move(self, Ts: FloatArray) -> None:
+        """Put every link where (links, 4, 4) says."""
+        wxyzs, positions = scalar_first(Ts[:, :3, :3]), Ts[:, :3, 3]
+        with self._server.atomic():
+            for link, wxyz, position in zip(self._links, wxyzs, positions, strict=True):
+                link.wxyz, link.position = wxyz, position
+            self._axes.batched_wxyzs, self._axes.batched_positions = wxyzs, positions
+
+    # -- overlays ------------------------------------------------------------------------------------
+
+    def arrows(self, name: str, arrows: Arrows | None) -> None:
+        """Draw arrows in place of what had the same name; None draws none."""
+        size = 0.008 * self.reach
+        none = arrows is None or not len(arrows.points)
+        self._scene.add_arrows(
+            f"/{name}",
+            points=np.zeros((1, 2, 3)) if arrows is None or none else arrows.points,
+            colors=(0, 0, 0) if arrows is None or none else arrows.colours,
+            shaft_radius=0.4 * size,
+            head_radius=size,
+            head_length=2.4 * size,
+            visible=not none,
+        )
+
+    def ellipsoid(self, shape: Ellipsoid | None) -> None:
+        """Draw the ellipsoid of velocity; None draws none."""
+        self._scene.add_icosphere(
+            "/ellipsoid",
+            radius=1.0,
+            color=(0, 114, 178),
+            opacity=0.35,
+            scale=(1.0, 1.0, 1.0) if shape is None else tuple(float(x) for x in shape.half),
+            wxyz=(1.0, 0.0, 0.0, 0.0) if shape is None else shape.wxyz,
+            position=(0.0, 0.0, 0.0) if shape is None else shape.centre,
+            visible=shape is not None,
+        )
+
+    def table(self, table: DHTable | None, q: FloatArray, T_world_base: FloatArray) -> None:
+        """Draw a table's frames, offsets d and common normals a at its own coordinates; None draws none."""
+        for handle in self._dh:
+            handle.remove()
+        self._dh = []
+        if table is None:
+            return
+        frames = T_world_base @ table.frames(q)
+        starts, corners, ends = _segments(table, q, frames)
+        parts = ((starts, corners, _OFFSET), (corners, ends, _NORMAL))
+        if str(table.convention) == "modified":
+            parts = ((starts, corners, _NORMAL), (corners, ends, _OFFSET))
+        self._dh.append(
+            self._scene.add_batched_axes(
+                "/dh/frames",
+                batched_wxyzs=scalar_first(frames[:, :3, :3]),
+                batched_positions=frames[:, :3, 3],
+                axes_length=0.1 * self.reach,
+                axes_radius=0.0035 * self.reach,
+            )
+        )
+        for k, (start, end, colour) in enumerate(parts):
+            if len(start):
+                self._dh.append(
+                    self._scene.add_line_segments(
+                        f"/dh/lines{k}",
+                        points=np.stack([start, end], axis=1),
+                        colors=colour,
+                        thickness=0.006 * self.reach,
+                    )
+                )
+
+
+def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(rows, 3) each: where a row's frame begins, turns from its first axis to its second, and ends."""
+    starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
+    if str(table.convention) == "standard":
+        # d along the old z, then a along the new x.
+        a = np.array([row.a for row in table.rows]).reshape(-1, 1)
+        return starts, ends - a * frames[1:, :3, 0], ends
+    a = np.array([row.a for row in table.rows]).reshape(-1, 1)
+    return starts, starts + a * frames[:-1, :3, 0], ends
+
+
+def _towards(axis: FloatArray) -> FloatArray:
+    """(3, 3) a rotation whose z is `axis`."""
+    side = np.eye(3)[int(np.abs(axis).argmin())]
+    x = np.cross(side, axis)
+    x = x / np.linalg.norm(x)
+    return np.stack([x, np.cross(axis, x), axis], axis=-1)
