@@ -1,11 +1,15 @@
 """A batch gives the same numbers however it is cut."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
 import urdfkin
 from urdfkin.errors import InputError
+from urdfkin.recursion.batch import in_blocks
 from urdfkin.recursion.lanes import LANES
+from urdfkin.tree import FloatArray
 
 
 @pytest.fixture(scope="module")
@@ -36,3 +40,26 @@ def test_a_batch_large_enough_for_threads_by_itself_is_the_same(panda: urdfkin.R
 def test_less_than_one_thread_is_refused(panda: urdfkin.Robot) -> None:
     with pytest.raises(InputError, match="threads"):
         panda.placement(panda.neutral(), "panda_hand", threads=0)
+
+
+@pytest.mark.parametrize("rows", [1, 2, LANES - 1])
+def test_a_block_is_filled_whole_so_that_nothing_beyond_the_inputs_is_read(rows: int) -> None:
+    seen: list[list[tuple[int, ...]]] = []
+
+    def compute(inputs: Sequence[FloatArray], out: FloatArray) -> None:
+        seen.append([x.shape for x in inputs])
+        out[:] = inputs[1][:, :1]
+
+    base, q, out = np.zeros((1, 24)), np.arange(3.0 * rows).reshape(rows, 3), np.empty((rows, 1))
+    in_blocks(compute, [base, q], out, threads=1)
+    np.testing.assert_array_equal(out[:, 0], q[:, 0])
+    assert seen == [[(LANES if rows == 1 else 1, 24), (LANES, 3)]]
+
+
+def test_a_single_configuration_gives_the_same_bits_whatever_lies_beside_it(panda: urdfkin.Robot) -> None:
+    q = panda.sample(1, seed=6)
+    expected = panda.placement(q[0], "panda_hand")
+    for neighbour in (np.nan, 1e300, -7.0):
+        memory = np.full((3, panda.nq), neighbour)
+        memory[0] = q[0]
+        np.testing.assert_array_equal(panda.placement(memory[:1], "panda_hand"), expected[None])

@@ -56,7 +56,7 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
         compute(_rows(inputs, n, 0, whole), out[:whole])
     if whole < n:
         filled = np.empty((LANES, *out.shape[1:]))
-        compute([_filled(x) for x in _rows(inputs, n, whole, n)], filled)
+        compute([_filled(x, n - whole) for x in _rows(inputs, n, whole, n)], filled)
         out[whole:] = filled[: n - whole]
 
 
@@ -71,8 +71,9 @@ def _rows(inputs: Sequence[FloatArray], n: int, start: int, stop: int) -> list[F
     return [x[start:stop] if len(x) == n else x for x in inputs]
 
 
-def _filled(x: FloatArray) -> FloatArray:
-    return x if len(x) == 1 else np.concatenate((x, np.repeat(x[-1:], LANES - len(x), axis=0)))
+def _filled(x: FloatArray, rows: int) -> FloatArray:
+    """A whole block from fewer rows; an input that is one for all stays so."""
+    return np.concatenate((x, np.repeat(x[-1:], LANES - rows, axis=0))) if len(x) == rows else x
 
 
 @cache

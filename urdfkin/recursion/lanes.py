@@ -23,11 +23,12 @@ LANES = 16
 #: A vector as the compiler sees it: three numbers of one lane.
 Vec = tuple[float, float, float]
 
-#: How every function here and in the kernels is compiled. Fused multiply-adds are allowed (they round once
-#: instead of twice), nothing else is reordered. Division by zero gives inf as in C, so that no loop carries
-#: a branch that raises. Nothing is allocated, so that arrays need no reference counts: counting them took
-#: half of the time.
-COMPILED: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "_nrt": False}
+#: How every function here and in the kernels is compiled. Nothing is reordered and multiplications are not
+#: fused with additions: the compiler would fuse differently in its vector code and in its scalar code, and
+#: the last bit would depend on where arrays happen to lie in memory. Division by zero gives inf as in C, so
+#: that no loop carries a branch that raises. Nothing is allocated, so that arrays need no reference counts:
+#: counting them took half of the time.
+COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 lane_function: Any = numba.njit(forceinline=True, **COMPILED)
 
 
