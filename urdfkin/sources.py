@@ -141,3 +141,27 @@ def _nearest_file(path: Path) -> str:
     return (
         f"did you mean {', '.join(nearest)}?" if nearest else "'urdfkin robots' lists names that need no file"
     )
+
+
+def source_alone(words: str) -> str:
+    """The source out of the words that name it on a command line: without quotes and options.
+
+    >>> source_alone("'my arm.urdf' --root-joint floating")
+    'my arm.urdf'
+    """
+    try:
+        return next(iter(shlex.split(words)), words)
+    except ValueError:
+        return words
+
+
+def options_alone(words: str) -> str:
+    """The options that follow the source in the words that name it.
+
+    >>> options_alone("'my arm.urdf' --root-joint floating")
+    '--root-joint floating'
+    """
+    try:
+        return shlex.join(shlex.split(words)[1:])
+    except ValueError:
+        return ""

@@ -52,6 +52,17 @@ window.probe = {
     return tables.filter((table) => table.checkVisibility()).map((table) => table.caption.textContent.split(" ")[0]);
   },
 
+  // Where the first view draws the ends of its first chain for a configuration, in rows of four.
+  chainEnds(q) {
+    const { robot } = document.querySelector("[data-view]").view, chain = robot.chains[0];
+    robot.q = q;
+    robot.move();
+    const rows = (T) => T.clone().transpose().toArray();
+    const ends = [rows(robot.poses[chain.tip])];
+    for (const convention of ["standard", "modified"]) ends.push(rows(robot.dh(chain, convention).tip));
+    return ends;
+  },
+
   heads: () => [...document.querySelectorAll("#overview thead th")].map((head) => head.textContent),
   column: (index) => [...document.querySelectorAll("#overview tbody tr")].map((row) => row.cells[index].textContent),
   sortBy(index) {

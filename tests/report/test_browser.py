@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import urdfkin
 from tests.report.browser import Browser, opened
 from tests.report.documents import arms, failing, hostile
 from urdfkin.report.html import as_html
@@ -82,6 +84,25 @@ def test_the_tables_frames_can_be_shown_in_both_conventions(browser: Browser) ->
         assert browser.probe("visibleTables") == [convention.capitalize()]
     browser.screenshot("report-dh")
     assert len({plain, *shown}) == 3
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5"])
+def test_links_and_tables_are_drawn_where_the_robot_has_them(
+    name: str, desk: Browser, pages: dict[str, Path]
+) -> None:
+    """The view's own kinematics, from seven digits, against the library's."""
+    robot = urdfkin.load(name)
+    document = arms()
+    document["robots"] = [entry for entry in document["robots"] if entry["name"] == name]
+    page = pages["arms"].with_name(f"{name}.html")
+    page.write_text(as_html(document), encoding="utf-8")
+    desk.open(page)
+    desk.settle()
+    tip = document["robots"][0]["chains"][0]["tip"]
+    for q in robot.sample(5, seed=1):
+        expected = robot.placement(q, tip)
+        for drawn in desk.probe("chainEnds", q.tolist()):
+            np.testing.assert_allclose(np.reshape(drawn, (4, 4)), expected, atol=1e-5)
 
 
 def test_the_overview_sorts_both_ways(browser: Browser) -> None:

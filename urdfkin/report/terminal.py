@@ -82,14 +82,9 @@ def _counts(robot: Robot) -> list[str]:
 
 def _wide(robots: Sequence[Robot]) -> Table:
     quantities_of = columns(robots)
-    heads = ["robot", "joints", "frames", "results", *quantities_of, "of bound", "verdict"]
+    heads = ["robot", "joints", "frames", "results", *quantities_of, "verdict"]
     rows = (
-        [
-            *_counts(robot),
-            *(worst_of(robot, names) for names in quantities_of.values()),
-            percent(share_of(robot)) if robot["checks"] else "",
-            robot["verdict"],
-        ]
+        [*_counts(robot), *(worst_of(robot, names) for names in quantities_of.values()), robot["verdict"]]
         for robot in robots
     )
     return plain_table(heads, rows, words=(0, len(heads) - 1))

@@ -14,6 +14,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.catalogue import examples
+from urdfkin.sources import options_alone, source_alone
 from urdfkin.validation.clock import Clock
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
 from urdfkin.validation.tally import HISTOGRAM_EDGES, Key, Tally, WorstCase
@@ -164,7 +165,7 @@ def _finite(units: float) -> float | None:
 def replay(source: str, quantity: Quantity, reference: str, case: WorstCase) -> str:
     """The command for one case; numbers are written so that they read back exactly."""
     command = _COMMANDS.get(quantity, quantity.value)
-    words = ["urdfkin", command, _quoted(source), "--frame", _quoted(case.frame)]
+    words = ["urdfkin", command, source, "--frame", _quoted(case.frame)]
     if reference:
         words += ["--reference", reference]
     given = {"placement": "q", "jacobian": "q", "acceleration": "qva"}.get(command, "qv")
@@ -204,16 +205,11 @@ class ValidationReport:
     @property
     def command(self) -> str:
         """The command that repeats the run; the options of its first robot stand for all."""
-        sources = tuple(robot.source for robot in self.robots)
-        whole = sources == examples()
-        words = ["urdfkin", "validate", *(["--all"] if whole else map(_quoted, sources))]
-        words += ["--samples", str(self.samples), "--seed", str(self.seed)]
-        models = [robot.portrait.model for robot in self.robots if robot.portrait.model]
-        if models and models[0]["mimic"] is not None and not whole:
-            words.append("--mimic" if models[0]["mimic"] else "--no-mimic")
-        if models and models[0]["root_joint"]:
-            words += ["--root-joint", models[0]["root_joint"]]
-        return " ".join(words)
+        sources = tuple(source_alone(robot.source) for robot in self.robots)
+        named = ["--all"] if sources == examples() else [_quoted(source) for source in sources]
+        options = options_alone(self.robots[0].source) if self.robots else ""
+        settings = f"--samples {self.samples} --seed {self.seed}"
+        return " ".join(["urdfkin", "validate", *named, settings, *([options] if options else [])])
 
     @property
     def passed(self) -> bool:

@@ -94,7 +94,7 @@
         if (convention === "standard") { screw(); link(); } else { link(); screw(); }
         frames.push(T.clone());
       }
-      return { frames, normals, offsets };
+      return { frames, normals, offsets, tip: T.clone().multiply(pose(table.tool)) };
     }
   }
 
@@ -458,7 +458,7 @@
     for (const { target, isIntersecting } of entries) {
       if (!isIntersecting) continue;
       watcher.unobserve(target);
-      if (renderer()) new View(target);
+      if (renderer()) target.view = new View(target);
       else {
         target.querySelector(".fallback").hidden = false;
         target.querySelectorAll("canvas, .hint, .panel").forEach((part) => { part.hidden = true; });
