@@ -1,0 +1,109 @@
+"""Imports go in one direction, and each foreign library has one door."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parent.parent / "urdfkin"
+
+#: Every part of the package, in the order in which they may build on one another: a module imports what
+#: stands in its own row or above it. Imports inside functions count; those for types alone do not.
+LAYERS = (
+    ("errors",),
+    ("rotation", "motion", "equations", "resources", "figure"),
+    ("tree", "reference"),
+    ("coupling", "followers", "configuration", "chain"),
+    ("recursion",),
+    ("diagnostics", "urdf"),
+    ("dh",),
+    ("catalogue", "sources", "deep_stack"),
+    ("oracle", "verification"),
+    ("call", "manipulator", "tables", "robot"),
+    ("loading", "from_table", "checking", "description", "trajectory", "frame_motion"),
+    ("judge", "validation"),
+    ("plot", "report", "view"),
+    ("cli",),
+)
+RANK = {part: rank for rank, row in enumerate(LAYERS) for part in row}
+
+#: The one way up: a table makes itself a robot, on request.
+UPWARDS = {("dh", "urdfkin.from_table")}
+
+#: Who may import a foreign library: one door each.
+DOORS = {
+    "yourdfpy": {"urdf"},
+    "pinocchio": {"oracle", "deep_stack"},
+    "numba": {"recursion"},
+    "llvmlite": {"recursion"},
+    "click": {"cli"},
+    "rich": {"cli", "report"},
+    "matplotlib": {"figure", "plot"},
+    "viser": {"view"},
+    "jinja2": {"report"},
+    "xacrodoc": {"urdf"},
+    "mpmath": {"judge"},
+}
+
+
+def modules() -> Iterator[tuple[str, Path]]:
+    for path in sorted(PACKAGE.rglob("*.py")):
+        part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+        if part not in ("__init__", "__main__"):
+            yield part, path
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Names of the modules a file imports, without those under `if TYPE_CHECKING`."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for_types = {
+        id(inner)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        for inner in ast.walk(node)
+    }
+    for node in ast.walk(tree):
+        if id(node) in for_types:
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            if node.module == "urdfkin":
+                yield from (f"urdfkin.{alias.name}" for alias in node.names)
+            else:
+                yield node.module
+
+
+def test_every_part_has_its_place() -> None:
+    assert {part for part, _ in modules()} == set(RANK)
+
+
+@pytest.mark.parametrize("part", RANK)
+def test_a_part_builds_on_what_stands_above_it(part: str) -> None:
+    below = sorted(
+        f"{path.relative_to(PACKAGE)} imports {name}"
+        for own, path in modules()
+        if own == part
+        for name in imported(path)
+        if name.startswith("urdfkin.")
+        and RANK[name.split(".")[1]] > RANK[part]
+        and (part, name) not in UPWARDS
+    )
+    assert below == []
+
+
+@pytest.mark.parametrize("library", DOORS)
+def test_a_foreign_library_has_one_door(library: str) -> None:
+    users = {part for part, path in modules() for name in imported(path) if name.split(".")[0] == library}
+    assert users <= DOORS[library]
+
+
+def test_importing_the_package_or_asking_for_help_loads_nothing_heavy() -> None:
+    heavy = "{'numpy', 'numba', 'pinocchio', 'yourdfpy', 'rich', 'matplotlib', 'lxml'}"
+    for code in ("import urdfkin", "import urdfkin.cli as c; c.cli(['--help'], standalone_mode=False)"):
+        script = f"import sys; {code}; print(sorted({heavy} & set(sys.modules)))"
+        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+        assert done.stdout.strip().endswith("[]"), code

@@ -1,0 +1,64 @@
+"""A wheel, installed away from the checkout, does the main job with the robots it brings."""
+
+import os
+import subprocess
+import sys
+import sysconfig
+import venv
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+
+def run(*command: str | Path, cwd: Path) -> str:
+    """What a command prints; it sees neither the checkout nor the tests' paths."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    done = subprocess.run(
+        list(map(str, command)), cwd=cwd, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A virtual environment that holds the wheel; the libraries it needs are lent by this one's."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    pip = [sys.executable, "-m", "pip"]
+    run(*pip, "wheel", "--no-deps", "--no-build-isolation", "-w", folder, ROOT, cwd=folder)
+    venv.create(folder / "env", with_pip=False)
+    (wheel,) = folder.glob("urdfkin-*.whl")
+    run(*pip, "--python", folder / "env/bin/python", "install", "--no-deps", wheel, cwd=folder)
+    libraries = Path(sysconfig.get_path("purelib"))
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    lent = f"{libraries}\n{libraries}/cmeel.prefix/lib/{version}/site-packages\n"
+    (folder / "env/lib" / version / "site-packages/lent.pth").write_text(lent)
+    return folder
+
+
+@pytest.mark.slow
+def test_the_wheel_is_what_is_imported(elsewhere: Path) -> None:
+    printed = run(
+        elsewhere / "env/bin/python", "-c", "import urdfkin; print(urdfkin.__file__)", cwd=elsewhere
+    )
+    assert Path(printed.strip()).is_relative_to(elsewhere / "env")
+
+
+@pytest.mark.slow
+def test_the_main_job_works(elsewhere: Path) -> None:
+    printed = run(elsewhere / "env/bin/urdfkin", "validate", "panda", "--samples", "5", cwd=elsewhere)
+    assert "0 outside their bound" in printed
+
+
+@pytest.mark.slow
+def test_the_robots_and_tables_of_the_project_travel_with_it(elsewhere: Path) -> None:
+    assert "polar" in run(elsewhere / "env/bin/urdfkin", "robots", cwd=elsewhere)
+    assert "polar" in run(elsewhere / "env/bin/urdfkin", "info", "polar", cwd=elsewhere)
+    assert "7.130" in run(elsewhere / "env/bin/urdfkin", "explain", "7.130", cwd=elsewhere)
+
+
+@pytest.mark.slow
+def test_types_travel_with_it(elsewhere: Path) -> None:
+    assert list((elsewhere / "env").glob("lib/*/site-packages/urdfkin/py.typed"))
