@@ -74,7 +74,10 @@ def _is_number(cell: str) -> bool:
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_the_table_says_what_was_computed_checked_and_how_closely(quantity: str) -> None:
+def test_the_table_says_what_was_computed_checked_and_how_closely(
+    quantity: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "120")  # names are folded where a terminal is narrow
     text = command(quantity, 1, "local_world_aligned", "table").decode()
     assert "panda" in text
     assert "panda_hand" in text

@@ -41,7 +41,9 @@ def command(
     document = read_document(results)
     check_writable(html, junit, markdown)
     write_reports(document, html=html, junit=junit, markdown=markdown)
-    if not (html or junit or markdown):
+    if written := [str(path) for path in (html, junit, markdown) if path]:
+        click.echo(f"wrote {', '.join(written)}")
+    else:
         from urdfkin.report.terminal import print_report  # noqa: PLC0415
 
         print_report(document, console(), cases=cases)
