@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import importlib
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from numba.core import event
+
+from urdfkin.recursion.compiling import cache_folder
 
 _Listener: Any = event.Listener  # numba has no types
 
@@ -35,10 +41,34 @@ def announced(tell: Callable[[], None]) -> Iterator[None]:
 
 
 def load_kernels() -> None:
-    """Compile every kernel, or read it from disk: before processes are started that would all compile."""
-    from urdfkin.recursion import (  # noqa: F401, PLC0415
-        jacobian_kernel,
-        jacobian_rate_kernel,
-        local_kernel,
-        motion_kernel,
+    """Compile every kernel, or read it from disk: before processes are started that would all compile.
+
+    Compiling takes one processor; a second process does half of it, and this one then reads it from disk.
+    """
+    other_half = ("jacobian_rate_kernel", "local_kernel")
+    helper = None if all(map(_on_disk, other_half)) else _compile_elsewhere(other_half)
+    try:
+        for name in ("jacobian_kernel", "motion_kernel"):
+            importlib.import_module(f"urdfkin.recursion.{name}")
+    finally:
+        if helper is not None:
+            helper.wait()
+    for name in other_half:
+        importlib.import_module(f"urdfkin.recursion.{name}")
+
+
+def _on_disk(name: str) -> bool:
+    folder = cache_folder()
+    return folder is None or any(folder.rglob(f"{name}.*.nbi"))
+
+
+def _compile_elsewhere(names: Iterable[str]) -> subprocess.Popen[bytes]:
+    """Another interpreter that does nothing but compile; what it fails to do is done here after all."""
+    code = "; ".join(f"import urdfkin.recursion.{name}" for name in names)
+    return subprocess.Popen(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
     )

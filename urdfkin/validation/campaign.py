@@ -82,6 +82,7 @@ def validate(
     started, begin = datetime.datetime.now(datetime.UTC), time.perf_counter()
     run = _Run(subjects, samples, seed, progress)
     try:
+        load_kernels()  # once, here, so that no worker has to compile
         if executor is not None:
             run.spread(executor)
         elif isolate:
@@ -104,7 +105,6 @@ def validate(
 
 def _spread_over_processes(run: _Run, jobs: int) -> None:
     """Workers leave an interrupt to this process, which ends the run and keeps what is there."""
-    load_kernels()  # once, here, so that the workers find them on disk
     context = multiprocessing.get_context("spawn")
     ignore = (signal.SIGINT, signal.SIG_IGN)
     with ProcessPoolExecutor(jobs, context, initializer=signal.signal, initargs=ignore) as pool:
