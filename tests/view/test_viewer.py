@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import socket
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -113,3 +115,19 @@ def test_a_browser_draws_it_without_errors_and_without_asking_elsewhere(
         elsewhere = [url for url in asked if not url.startswith((address, "data:", "blob:", "chrome"))]
         assert [url for url in elsewhere if not url.startswith("ws://127.0.0.1")] == []
         assert browser.errors() == []
+
+
+@pytest.mark.slow
+def test_the_command_serves_until_it_is_interrupted(tmp_path: Path) -> None:
+    port = free_port()
+    words = [sys.executable, "-m", "urdfkin", "view", "planar_two_link", "--port", str(port)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            line = next(line for line in process.stdout if "planar_two_link: http" in line)
+            with urlopen(line.split(": ", 1)[1].strip()) as answer:
+                assert answer.status == 200
+            process.send_signal(signal.SIGINT)
+            assert process.wait(timeout=30) == 0
+        finally:
+            process.kill()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import click
 
 from urdfkin.cli.arguments import load_robot, robot_argument
@@ -32,6 +34,7 @@ def command(robot: str, mimic: bool | None, root_joint: str | None, host: str, p
     with compiling():
         Viewer(server, loaded)
     click.echo(f"{loaded.name}: http://{host}:{server.get_port()}")
+    sys.stdout.flush()  # whoever reads a pipe wants the address now
     try:
         server.sleep_forever()
     except KeyboardInterrupt:
