@@ -49,9 +49,10 @@ def commands() -> list[tuple[str, str]]:
 @pytest.mark.parametrize(("page", "line"), commands())
 def test_every_command_on_the_pages_is_understood(page: str, line: str) -> None:
     words = shlex.split(line.split(" || ", maxsplit=1)[0].split(" > ", maxsplit=1)[0])[1:]
-    command = cli.get_command(cli.make_context("urdfkin", ["--help"], resilient_parsing=True), words[0])
+    group = cli.make_context("urdfkin", ["--help"], resilient_parsing=True)
+    command = cli.get_command(group, words[0])
     assert command is not None, (page, line)
-    command.make_context(words[0], words[1:])  # raises what the command line would say
+    command.make_context(words[0], words[1:], parent=group)  # raises what the command line would say
 
 
 def test_the_pages_have_commands_to_understand() -> None:

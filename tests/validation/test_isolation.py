@@ -78,7 +78,7 @@ def test_a_check_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch
 def test_the_command_isolates() -> None:
     from click.testing import CliRunner  # noqa: PLC0415
 
-    from urdfkin.cli.validate import command  # noqa: PLC0415
+    from urdfkin.cli import cli  # noqa: PLC0415
 
-    done = CliRunner().invoke(command, ["iris_simple", "--samples", "2", "--isolate"])
+    done = CliRunner().invoke(cli, ["validate", "iris_simple", "--samples", "2", "--isolate"])
     assert done.exit_code == 0, done.output
