@@ -8,13 +8,17 @@ import re
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import cast
 
 import pytest
 
 from tests.report.documents import HOSTILE_JOINT, HOSTILE_LINK, HOSTILE_ROBOT, arms, failing, hostile
+from urdfkin.catalogue import examples
 from urdfkin.report import html as html_module
+from urdfkin.report.document import Document
 from urdfkin.report.html import as_html
 from urdfkin.report.pages import angle
+from urdfkin.validation.campaign import validate
 
 pytestmark = pytest.mark.slow
 
@@ -143,6 +147,15 @@ def test_a_robot_costs_little_beside_what_every_page_carries() -> None:
     two, one = arms(), arms()
     del one["robots"][0]
     assert len(as_html(two)) - len(as_html(one)) < 140_000
+
+
+@pytest.mark.slow
+def test_the_page_of_all_68_robots_is_at_most_10_megabytes() -> None:
+    document = cast("Document", validate(examples(), samples=0, jobs=2).as_dict())
+    assert len(document["robots"]) == 68
+    text = as_html(document)
+    assert 3_000_000 < len(text.encode()) <= 10_000_000
+    assert text.count('class="plot"') == 68
 
 
 @pytest.mark.parametrize(
