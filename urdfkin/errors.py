@@ -57,6 +57,10 @@ class InputError(UrdfkinError, ValueError):
     """A value handed to urdfkin cannot be used: wrong length, not finite, not a rotation, ..."""
 
 
+class NotFiniteError(InputError):
+    """A coordinate or rate that is infinite or no number."""
+
+
 class RangeError(InputError):
     """Numbers so large that what is computed from them leaves the range of double precision."""
 

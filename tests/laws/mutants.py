@@ -26,16 +26,49 @@ FACTOR = "1.0000000001"
 SAMPLES = 5
 FRAMES = ("panda_hand_tcp", "panda_leftfinger")
 
-#: Written in the machine's own language for the compiler; the same in Python.
-_INTRINSICS = """
+#: Written in the machine's own language for the compiler; the same in Python, by the module they stand in.
+_INTRINSICS = {
+    "lanes": """
+import ctypes
+
 
 def pointer_to(array):
     return array.reshape(-1)
 
 
-def _copy_whole_row(s, source, target):
-    s[target * LANES : (target + 1) * LANES] = s[source * LANES : (source + 1) * LANES]
-"""
+def numbers_at(address):
+    return ctypes.cast(int(address), ctypes.POINTER(ctypes.c_double))
+
+
+def whole_numbers_at(address):
+    return ctypes.cast(int(address), ctypes.POINTER(ctypes.c_int64))
+
+
+def copy_rows(s, source, target, count):
+    s[target * LANES : (target + count) * LANES] = s[source * LANES : (source + count) * LANES]
+""",
+    "transposing": """
+
+def read_rows(m, x, at, stride, count, s, row):
+    for i in range(count):
+        for k in range(m):
+            s[(row + i) * LANES + k] = x[at + k * stride + i]
+
+
+def write_rows(m, s, rows, first, count, to, at, stride):
+    for i in range(count):
+        for k in range(m):
+            to[at + k * stride + i] = s[rows[first + i] * LANES + k]
+
+
+def fetch_inputs(m, x, at, count):
+    pass
+
+
+def fetch_output(m, i, of, to, at, count):
+    pass
+""",
+}
 
 
 @dataclass(frozen=True)
@@ -100,11 +133,11 @@ MUTANTS = {
                                     f"({FACTOR} * 2.0 * v * w[1], -2.0", _ACC),
     # 7.85, its rate, and the placement
     "7.85 z x d": Mutant("jacobian_kernel", "cross(z, d), z", _times("cross(z, d)") + ", z", ("jacobian",)),
-    "7.85 z": Mutant("jacobian_kernel", "store(s, _Z, k, ang)",
-                     f"store(s, _Z, k, ({FACTOR} * ang[0], ang[1], {FACTOR} * ang[2]))", ("jacobian",)),
+    "7.85 z": Mutant("jacobian_kernel", "store(s, ANGULAR, k, ang)",
+                     f"store(s, ANGULAR, k, ({FACTOR} * ang[0], ang[1], {FACTOR} * ang[2]))", ("jacobian",)),
     "rate of 7.85, z-dot": Mutant(
-        "jacobian_rate_kernel", "z_rate = cross(load(s, _CARRIER_W, k), z)",
-        f"z_rate = cross(load(s, _CARRIER_W, k), ({FACTOR} * z[0], {FACTOR} * z[1], z[2]))",
+        "jacobian_rate_kernel", "z_rate = cross(load(s, CARRIER_W, k), z)",
+        f"z_rate = cross(load(s, CARRIER_W, k), ({FACTOR} * z[0], {FACTOR} * z[1], z[2]))",
         ("jacobian rate",),
     ),
     "rate of 7.85, z-dot x d": Mutant("jacobian_rate_kernel", "cross(z_rate, d), cross(z, d_rate)",
@@ -132,8 +165,7 @@ class _Changed(importlib.machinery.SourceFileLoader):
             source = source.replace(mutant.before, mutant.after)
             if mutant.module == "jacobian_kernel" or "times(" in mutant.after:
                 source += "\nfrom urdfkin.recursion.lanes import times\n"
-        if name == "lanes":
-            source += _INTRINSICS
+        source += _INTRINSICS.get(name, "")
         return compile(source, path, "exec")
 
 
@@ -151,8 +183,8 @@ class _Finder(importlib.abc.MetaPathFinder):
         return spec
 
 
-_WALKED = ("lanes", "steps", "walk", "columns", "motion_kernel", "local_kernel", "jacobian_kernel",
-           "jacobian_rate_kernel")  # fmt: skip
+_WALKED = ("lanes", "transposing", "steps", "walk", "columns", "motion_kernel", "local_kernel",
+           "jacobian_kernel", "jacobian_rate_kernel")  # fmt: skip
 
 
 def _forget() -> None:

@@ -46,9 +46,10 @@ def test_less_than_one_thread_is_refused(panda: urdfkin.Robot) -> None:
 def test_a_block_is_filled_whole_so_that_nothing_beyond_the_inputs_is_read(rows: int) -> None:
     seen: list[list[tuple[int, ...]]] = []
 
-    def compute(inputs: Sequence[FloatArray], out: FloatArray) -> None:
+    def compute(inputs: Sequence[FloatArray], out: FloatArray) -> int:
         seen.append([x.shape for x in inputs])
         out[:] = inputs[1][:, :1]
+        return 1
 
     base, q, out = np.zeros((1, 24)), np.arange(3.0 * rows).reshape(rows, 3), np.empty((rows, 1))
     in_blocks(compute, [base, q], out, threads=1)

@@ -6,7 +6,7 @@ import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -40,21 +40,28 @@ def announced(tell: Callable[[], None]) -> Iterator[None]:
         yield
 
 
+#: The kernels for batches, by the module they stand in: half of the work each.
+_ONE_HALF = {"jacobian_kernel": "jacobians", "motion_kernel": "motions"}
+_OTHER_HALF = {"jacobian_rate_kernel": "jacobian_rates", "local_kernel": "local_motions"}
+
+
 def load_kernels() -> None:
-    """Compile every kernel, or read it from disk: before processes are started that would all compile.
+    """Compile every kernel for batches, or read it from disk: before processes start that would all compile.
 
     Compiling takes one processor; a second process does half of it, and this one then reads it from disk.
     """
-    other_half = ("jacobian_rate_kernel", "local_kernel")
-    helper = None if all(map(_on_disk, other_half)) else _compile_elsewhere(other_half)
+    helper = None if all(map(_on_disk, _OTHER_HALF)) else _compile_elsewhere(_OTHER_HALF)
     try:
-        for name in ("jacobian_kernel", "motion_kernel"):
-            importlib.import_module(f"urdfkin.recursion.{name}")
+        _compile(_ONE_HALF)
     finally:
         if helper is not None:
             helper.wait()
-    for name in other_half:
-        importlib.import_module(f"urdfkin.recursion.{name}")
+    _compile(_OTHER_HALF)
+
+
+def _compile(kernels: Mapping[str, str]) -> None:
+    for module, name in kernels.items():
+        _ = getattr(importlib.import_module(f"urdfkin.recursion.{module}"), name).compiled
 
 
 def _on_disk(name: str) -> bool:
@@ -62,9 +69,9 @@ def _on_disk(name: str) -> bool:
     return folder is None or any(folder.rglob(f"{name}.*.nbi"))
 
 
-def _compile_elsewhere(names: Iterable[str]) -> subprocess.Popen[bytes]:
+def _compile_elsewhere(kernels: Mapping[str, str]) -> subprocess.Popen[bytes]:
     """Another interpreter that does nothing but compile; what it fails to do is done here after all."""
-    code = "; ".join(f"import urdfkin.recursion.{name}" for name in names)
+    code = f"from urdfkin.recursion import announcing; announcing._compile({dict(kernels)!r})"
     return subprocess.Popen(
         [sys.executable, "-c", code],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},

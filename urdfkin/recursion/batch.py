@@ -22,8 +22,8 @@ from urdfkin.tree import FloatArray
 #: A batch is spread over threads by itself only from here on: a thread costs some ten microseconds.
 _WORTH_THREADS = 4096
 
-#: Computes rows of inputs into rows of an output: (inputs, out).
-Compute = Callable[[Sequence[FloatArray], FloatArray], None]
+#: Computes rows of inputs into rows of an output, (inputs, out); 0 where an input is not finite.
+Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
 def default_threads(n: int) -> int:
@@ -31,8 +31,8 @@ def default_threads(n: int) -> int:
     return len(os.sched_getaffinity(0)) if n >= _WORTH_THREADS else 1
 
 
-def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> None:
-    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...) for all.
+def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> bool:
+    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...) for all; whether these are finite.
 
     Args:
         compute: A kernel for whole blocks; releases the interpreter's lock.
@@ -47,17 +47,18 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
         raise InputError("threads must be at least 1", found=str(threads))
     n = len(out)
     whole = n - n % LANES
+    good = 1
     parts = _parts(whole, default_threads(n) if threads is None else threads)
     if len(parts) > 1:
         work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
-        for future in work:
-            future.result()
+        good = min(future.result() for future in work)
     elif whole:
-        compute(_rows(inputs, n, 0, whole), out[:whole])
+        good = compute(_rows(inputs, n, 0, whole), out[:whole])
     if whole < n:
         filled = np.empty((LANES, *out.shape[1:]))
-        compute([_filled(x, n - whole) for x in _rows(inputs, n, whole, n)], filled)
+        good &= compute([_filled(x, n - whole) for x in _rows(inputs, n, whole, n)], filled)
         out[whole:] = filled[: n - whole]
+    return bool(good)
 
 
 def _parts(whole: int, threads: int) -> list[tuple[int, int]]:

@@ -1,45 +1,38 @@
-"""Columns of a matrix on their way out: written, added to a leader's, or zero.
+"""Columns of a matrix on their way out: kept, added to a leader's, written.
 
 Section 7.4.4: column i of 7.85 belongs to joint i. A follower's column is added to its leader's.
 """
 
 from __future__ import annotations
 
-from urdfkin.recursion.lanes import LANES, lane_function, pointer_to
+from urdfkin.recursion.lanes import LANES, copy_rows, lane_function
+from urdfkin.recursion.plan import Column
+from urdfkin.recursion.rows import COLUMN_ROWS, LEADER, LINEAR
+from urdfkin.recursion.transposing import write_rows
+
+STEP, AXIS_OF, TURNS = int(Column.STEP), int(Column.AXIS), int(Column.TURNS)
 
 
 @lane_function
-def put_column(m, s, b, place, linear, angular, at, factor, adds, out):
-    """Write `factor` times the column in rows `linear` and `angular`, or add it to what is there."""
-    frames, nv = out.shape[1], out.shape[3]
-    to, here = pointer_to(out), (b * frames + place) * 6 * nv + at
-    if adds:
-        for k in range(m):
-            for row in range(3):
-                to[here + row * nv] += factor * s[(linear + row) * LANES + k]
-                to[here + (row + 3) * nv] += factor * s[(angular + row) * LANES + k]
-            here += frames * 6 * nv
-    else:
-        # Written out: a loop over the rows would be unrolled too late to become a run of plain stores.
-        for k in range(m):
-            to[here] = factor * s[linear * LANES + k]
-            to[here + nv] = factor * s[(linear + 1) * LANES + k]
-            to[here + 2 * nv] = factor * s[(linear + 2) * LANES + k]
-            to[here + 3 * nv] = factor * s[angular * LANES + k]
-            to[here + 4 * nv] = factor * s[(angular + 1) * LANES + k]
-            to[here + 5 * nv] = factor * s[(angular + 2) * LANES + k]
-            here += frames * 6 * nv
+def put_column(m, s, plan, f, c):
+    """Column `c` of frame `f`, times its multiplier, to where its leader's is put together."""
+    leader = plan.leaders[f * plan.column_count + c]
+    multiplier, at = plan.multipliers[c], plan.results + COLUMN_ROWS * leader
+    if multiplier != 1.0:
+        for row in range(COLUMN_ROWS):
+            for k in range(m):
+                s[(LINEAR + row) * LANES + k] *= multiplier
+    if leader != c:
+        copy_rows(s, at, LEADER, COLUMN_ROWS)
+        for row in range(COLUMN_ROWS):
+            for k in range(m):
+                s[(LINEAR + row) * LANES + k] += s[(LEADER + row) * LANES + k]
+    copy_rows(s, LINEAR, at, COLUMN_ROWS)
 
 
 @lane_function
-def clear_idle(m, b, f, place, idle, out):
-    """Zero the columns of rates that do not move frame `f`."""
-    frames, nv = out.shape[1], out.shape[3]
-    to = pointer_to(out)
-    for at in range(nv):
-        if idle[f, at]:
-            here = (b * frames + place) * 6 * nv + at
-            for _ in range(m):
-                for row in range(6):
-                    to[here + row * nv] = 0.0
-                here += frames * 6 * nv
+def write_matrix(m, s, plan, f, b, to):
+    """The whole matrix of frame `f`: its columns, and zeros for the rates that do not move it."""
+    frames, size = plan.frame_count, 6 * plan.nv
+    at, rows = (b * frames + plan.frames[2 * f + 1]) * size, plan.sources
+    write_rows(m, s, rows, f * size, size, to, at, frames * size)

@@ -7,9 +7,10 @@ unnoticed, and an old kernel would be run. Here every source file of `recursion`
 from __future__ import annotations
 
 import hashlib
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -22,27 +23,55 @@ from urdfkin.recursion.lanes import COMPILED
 _config: Any = numba.config  # settings that numba sets at run time
 
 # Inputs may be read-only; a writable array converts without a copy. One signature, compiled once.
-WHOLE = types.Array(types.int64, 2, "C", readonly=True)
+PLAN = types.Array(types.int64, 1, "C", readonly=True)
+NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
-ROW = types.Array(types.float64, 1, "C", readonly=True)
 SCRATCH = types.Array(types.float64, 1, "C")
 INT = types.int64
 
 
-def kernel(*arguments: Any) -> Callable[[Callable[..., None]], Any]:
-    """Decorator: compile for these argument types, keep the result on disk, release the lock."""
+def output(axes: int) -> Any:
+    """A kernel's output with so many axes."""
+    return types.Array(types.float64, axes, "C")
 
-    def compile_(function: Callable[..., None]) -> Any:
-        folder = cache_folder()
-        with _numba_cache(folder):
-            return numba.njit(
-                [types.void(*arguments)],
-                nogil=True,
-                cache=folder is not None,
-                **COMPILED,
-            )(function)
 
-    return compile_
+class Kernel:
+    """A function that is compiled, or read from disk, when it is first called."""
+
+    def __init__(self, function: Callable[..., int], arguments: tuple[Any, ...], nogil: bool) -> None:
+        self._function, self._arguments, self._nogil = function, arguments, nogil
+        self._lock = threading.Lock()
+        self.__doc__, self.__name__ = function.__doc__, function.__name__
+
+    @cached_property
+    def compiled(self) -> Any:
+        """The compiled function itself: a call through it takes a tenth of a microsecond."""
+        with self._lock:
+            if (ready := self.__dict__.get("compiled")) is not None:
+                return ready
+            folder = cache_folder()
+            with _numba_cache(folder):
+                self.__dict__["compiled"] = numba.njit(
+                    [types.int64(*self._arguments)],
+                    nogil=self._nogil,
+                    cache=folder is not None,
+                    **COMPILED,
+                )(self._function)
+            return self.__dict__["compiled"]
+
+    def __call__(self, *arguments: Any) -> int:
+        """Compute."""
+        return int(self.compiled(*arguments))
+
+
+def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
+    """Decorator: compile for these argument types when first called, keep the result on disk.
+
+    Args:
+        arguments: Numba's types.
+        nogil: Whether the interpreter's lock is released meanwhile; for a microsecond it is not worth it.
+    """
+    return lambda function: Kernel(function, arguments, nogil)
 
 
 @cache

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from urdfkin.errors import NotFiniteError
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.recursion.batch import in_blocks
 from urdfkin.recursion.lanes import LANES
 from urdfkin.recursion.plan import Plan
-from urdfkin.recursion.walk import scratch_rows
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
 
@@ -77,19 +77,19 @@ def _motion(
     out: FloatArray,
     threads: int | None,
 ) -> None:
-    walk = plan.steps, plan.geometry, plan.frames, plan.offsets
+    packed = plan.packed
     if order and reference is Reference.LOCAL:
-        from urdfkin.recursion.local_kernel import local_motion  # noqa: PLC0415
+        from urdfkin.recursion.local_kernel import local_motions  # noqa: PLC0415
 
-        def compute(x: Sequence[FloatArray], part: FloatArray) -> None:
-            local_motion(order, *walk, *x, part, _scratch(plan))
+        def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
+            return local_motions(order, packed, *x, part, _scratch(plan))
     else:
-        from urdfkin.recursion.motion_kernel import motion  # noqa: PLC0415
+        from urdfkin.recursion.motion_kernel import motions  # noqa: PLC0415
 
-        def compute(x: Sequence[FloatArray], part: FloatArray) -> None:
-            motion(order, int(reference), *walk, *x, part, _scratch(plan))
+        def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
+            return motions(order, int(reference), packed, *x, part, _scratch(plan))
 
-    in_blocks(compute, [base, *qva], out, threads)
+    _demand(in_blocks(compute, [base, *qva], out, threads))
 
 
 def jacobians(
@@ -102,15 +102,15 @@ def jacobians(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 6, nv) velocity Jacobians: 7.85."""
-    from urdfkin.recursion.jacobian_kernel import jacobian  # noqa: PLC0415
+    from urdfkin.recursion.jacobian_kernel import jacobians as kernel  # noqa: PLC0415
 
     out = np.empty((len(q), len(plan.frames), 6, plan.nv)) if out is None else out
-    in_blocks(
-        lambda x, part: jacobian(int(reference), *_columns(plan), *x, part, _scratch(plan)),
-        [base, q],
-        out,
-        threads,
-    )
+    packed = plan.packed
+
+    def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
+        return kernel(int(reference), packed, *x, part, _scratch(plan))
+
+    _demand(in_blocks(compute, [base, q], out, threads))
     return out
 
 
@@ -125,35 +125,25 @@ def jacobian_rates(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 6, nv) time derivatives of the velocity Jacobians: the J-dot of 7.126."""
-    from urdfkin.recursion import jacobian_rate_kernel as compiled  # noqa: PLC0415
+    from urdfkin.recursion.jacobian_rate_kernel import jacobian_rates as kernel  # noqa: PLC0415
 
     out = np.empty((len(q), len(plan.frames), 6, plan.nv)) if out is None else out
-    rows = compiled.scratch_rows(plan.slots, len(plan.columns))
-    in_blocks(
-        lambda x, part: compiled.jacobian_rate(
-            int(reference), *_columns(plan), *x, part, np.empty(rows * LANES)
-        ),
-        [base, q, v],
-        out,
-        threads,
-    )
+    packed = plan.packed
+
+    def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
+        return kernel(int(reference), packed, *x, part, _scratch(plan))
+
+    _demand(in_blocks(compute, [base, q, v], out, threads))
     return out
 
 
-def _columns(plan: Plan) -> tuple[object, ...]:
-    """What the kernels with columns take of a plan, in their order."""
-    return (
-        plan.steps,
-        plan.geometry,
-        plan.slots,
-        plan.frames,
-        plan.offsets,
-        plan.columns,
-        plan.multipliers,
-        plan.uses,
-        plan.idle,
-    )
+def _demand(finite: bool) -> None:
+    if not finite:
+        raise NotFiniteError("q, v and a must be finite")
 
 
 def _scratch(plan: Plan) -> FloatArray:
-    return np.empty(scratch_rows(plan.slots, len(plan.columns)) * LANES)
+    """Rows for the lanes, at an address where a vector does not reach over two cache lines."""
+    numbers = np.empty(plan.areas.rows * LANES + 8)
+    first = -(numbers.ctypes.data // 8) % 8
+    return numbers[first : first + plan.areas.rows * LANES]

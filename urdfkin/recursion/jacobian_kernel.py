@@ -2,113 +2,109 @@
 
 from __future__ import annotations
 
-from numba import types
-
-from urdfkin.recursion.columns import clear_idle, put_column
-from urdfkin.recursion.lanes import LANES, copy_rows, cross, lane_function, load, minus, rotate_back, store
-from urdfkin.recursion.steps import FRAME, STATE_ROWS, P, R
-from urdfkin.recursion.walk import (
-    COLUMN,
-    INT,
-    ROW,
-    ROWS,
-    SCRATCH,
-    SLOTS,
-    WHOLE,
-    advance,
-    frame_state,
-    kernel,
-    start,
+from urdfkin.recursion.columns import AXIS_OF, STEP, TURNS, put_column, write_matrix
+from urdfkin.recursion.compiling import INT, NUMBERS, PLAN, ROWS, SCRATCH, kernel, output
+from urdfkin.recursion.lanes import (
+    LANES,
+    copy_rows,
+    cross,
+    lane_function,
+    load,
+    minus,
+    pointer_to,
+    rotate_back,
+    store,
 )
+from urdfkin.recursion.plan import COLUMN_WIDTH
+from urdfkin.recursion.rows import ANGULAR, AXIS, FRAME, KEPT_ROWS, LINEAR, ORIGIN, P, R
+from urdfkin.recursion.steps import step
+from urdfkin.recursion.transposing import fetch_output
+from urdfkin.recursion.walk import finite, frame_state, read_input, resume, rows_of, save, start, walk_of
 
 _LOCAL, _WORLD = 0, 1
-_Z, _O, _LINEAR = COLUMN, COLUMN + 3, COLUMN + 6
 
 
 @lane_function
-def _remember_column(m, s, at, axis):
+def _keep_column(m, s, at, axis):
     """Keep the axis z_{i-1} and the origin O_{i-1} of a rate: what 7.85 needs."""
     for r in range(3):
-        copy_rows(m, s, R + 3 * r + axis, at + r, 1)
-    copy_rows(m, s, P, at + 3, 3)
+        copy_rows(s, R + 3 * r + axis, at + r, 1)
+    copy_rows(s, P, at + 3, 3)
 
 
 @lane_function
 def _jacobian_column(m, s, turns, reference):
     """[z x d_{i-1,n}; z] for a turning rate, [z; 0] for a sliding one (7.85), in the wanted reference."""
     for k in range(m):
-        z = load(s, _Z, k)
+        z = load(s, AXIS, k)
         lin, ang = z, (0.0, 0.0, 0.0)
         if turns:
             if reference == _WORLD:
-                d = minus((0.0, 0.0, 0.0), load(s, _O, k))
+                d = minus((0.0, 0.0, 0.0), load(s, ORIGIN, k))
             else:
-                d = minus(load(s, FRAME + P, k), load(s, _O, k))
+                d = minus(load(s, FRAME + P, k), load(s, ORIGIN, k))
             lin, ang = cross(z, d), z
         if reference == _LOCAL:
             lin, ang = rotate_back(s, FRAME + R, lin, k), rotate_back(s, FRAME + R, ang, k)
-        store(s, _LINEAR, k, lin)
-        store(s, _Z, k, ang)
+        store(s, LINEAR, k, lin)
+        store(s, ANGULAR, k, ang)
 
 
 @lane_function
-def _write_jacobian(m, s, b, f, place, reference, first, columns, multipliers, uses, idle, out):
-    for c in range(columns.shape[0]):
-        if uses[f, c] == 0:
-            continue
-        copy_rows(m, s, first + 6 * c, _Z, 6)
-        _jacobian_column(m, s, columns[c, 2] == 1, reference)
-        put_column(
-            m, s, b, place, _LINEAR, _Z, columns[c, 3], multipliers[c], uses[f, c] == 2, out
-        )  # fmt: skip
-    clear_idle(m, b, f, place, idle, out)
+def _frame_jacobian(m, s, plan, f, b, reference, to):
+    for c in range(plan.column_count):
+        if plan.leaders[f * plan.column_count + c] >= 0:
+            copy_rows(s, plan.kept + KEPT_ROWS * c, AXIS, 6)
+            _jacobian_column(m, s, plan.columns[COLUMN_WIDTH * c + TURNS] == 1, reference)
+            put_column(m, s, plan, f, c)
+    write_matrix(m, s, plan, f, b, to)
 
 
 @lane_function
-def _jacobian_block(
-    m, b, reference, steps, g, slots, frames, offsets, columns, multipliers, uses, idle, base, q, out, s
-):
+def _jacobian_block(m, s, plan, b, reference, base, q, to):
     order = 0 * b
-    rows = start(m, s, b, base, order)
-    first = SLOTS + STATE_ROWS * slots
+    read_input(m, s, q, b, plan.nq, plan.blocks_q, plan.block_count_q, plan.q)
+    start(m, s, plan, b, base, order)
+    rows = rows_of(order)
     f = c = order
-    for i in range(-1, steps.shape[0]):
+    size = plan.frame_count * 6 * plan.nv
+    for i in range(-1, plan.step_count):
         if i >= 0:
-            advance(m, s, b, i, steps, g, q, q, q, order, rows)
-            while c < columns.shape[0] and columns[c, 0] == i:
-                _remember_column(m, s, first + 6 * c, columns[c, 1])
+            fetch_output(m, i, plan.step_count, to, b * size, m * size)
+            resume(s, plan, i, rows)
+            step(m, s, plan, i, order)
+            save(s, plan, i, rows)
+            while c < plan.column_count and plan.columns[COLUMN_WIDTH * c + STEP] == i:
+                _keep_column(m, s, plan.kept + KEPT_ROWS * c, plan.columns[COLUMN_WIDTH * c + AXIS_OF])
                 c += 1
-        while f < frames.shape[0] and frames[f, 0] == i:
-            frame_state(m, s, offsets, f, order, rows, reference == _LOCAL)
-            _write_jacobian(m, s, b, f, frames[f, 1], reference, first, columns, multipliers, uses, idle, out)
+        while f < plan.frame_count and plan.frames[2 * f] == i:
+            frame_state(m, s, plan, f, order, reference == _LOCAL)
+            _frame_jacobian(m, s, plan, f, b, reference, to)
             f += 1
+    return int(finite(q, b * plan.nq, m * plan.nq))
 
 
-@kernel(
-    INT,
-    WHOLE,
-    ROWS,
-    INT,
-    WHOLE,
-    ROWS,
-    WHOLE,
-    ROW,
-    WHOLE,
-    WHOLE,
-    ROWS,
-    ROWS,
-    types.Array(types.float64, 4, "C"),
-    SCRATCH,
-)
-def jacobian(reference, steps, g, slots, frames, offsets, columns, multipliers, uses, idle, base, q, out, s):
-    """Velocity Jacobians (7.85) of frames.
+@kernel(INT, PLAN, ROWS, ROWS, output(4), SCRATCH)
+def jacobians(reference, packed, base, q, out, s):
+    """Velocity Jacobians (7.85) of frames: 1, or 0 where a coordinate is not finite.
 
     Shapes: base (1 or n, 24), q (n, nq), out (n, frames, 6, nv), s (rows * LANES,).
     """
-    n = q.shape[0]
+    n, plan, good = q.shape[0], walk_of(packed), 1
     lanes = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
     for b in range(0, n, LANES):
-        _jacobian_block(
-            lanes, b, reference, steps, g, slots, frames, offsets, columns, multipliers, uses, idle,
-            base, q, out, s,
-        )  # fmt: skip
+        good &= _jacobian_block(lanes, s, plan, b, reference, base, pointer_to(q), pointer_to(out))
+    return good
+
+
+@kernel(INT, PLAN, ROWS, NUMBERS, output(2), SCRATCH, nogil=False)
+def jacobian(reference, packed, base, q, out, s):
+    """The velocity Jacobian (7.85) of one frame in one configuration; -1 where the shapes are others.
+
+    Shapes: base (1, 24), q (nq,), out (6, nv), s (rows * LANES,).
+    """
+    plan = walk_of(packed)
+    if q.shape[0] != plan.nq or out.shape[0] != 6 or out.shape[1] != plan.nv:
+        return -1
+    one = 1 + 0 * plan.nq
+    return _jacobian_block(one, s, plan, 0 * one, reference, base, pointer_to(q), pointer_to(out))

@@ -15,9 +15,8 @@ the text in LOCAL_WORLD_ALIGNED, and the *spatial* acceleration in the other two
 
 from __future__ import annotations
 
-from numba import types
-
-from urdfkin.recursion.columns import clear_idle, put_column
+from urdfkin.recursion.columns import AXIS_OF, STEP, TURNS, put_column, write_matrix
+from urdfkin.recursion.compiling import INT, PLAN, ROWS, SCRATCH, kernel, output
 from urdfkin.recursion.lanes import (
     LANES,
     copy_rows,
@@ -26,129 +25,107 @@ from urdfkin.recursion.lanes import (
     load,
     minus,
     plus,
+    pointer_to,
     rotate_back,
     store,
 )
-from urdfkin.recursion.steps import FRAME, SLIDE, STATE_ROWS, TURN_RATE, P, R, V, W
-from urdfkin.recursion.walk import (
-    COLUMN,
-    INT,
-    ROW,
-    ROWS,
-    SCRATCH,
-    SLOTS,
-    WHOLE,
-    advance,
-    frame_state,
-    kernel,
-    start,
+from urdfkin.recursion.plan import COLUMN_WIDTH
+from urdfkin.recursion.rows import (
+    ANGULAR,
+    AXIS,
+    CARRIER_V,
+    CARRIER_W,
+    FRAME,
+    KEPT_ROWS,
+    LINEAR,
+    ORIGIN,
+    P,
+    R,
+    V,
+    W,
 )
+from urdfkin.recursion.steps import step
+from urdfkin.recursion.transposing import fetch_output
+from urdfkin.recursion.walk import finite, frame_state, read_inputs, resume, rows_of, save, start, walk_of
 
 _LOCAL, _WORLD = 0, 1
-_Z, _O, _LINEAR = COLUMN, COLUMN + 3, COLUMN + 6
-# What is kept of each column: axis, origin, and the angular velocity and velocity they ride with.
-_KEPT = 12
-# On the way out the rows of the joint's own motion are free: angular velocity and velocity, then the result.
-_CARRIER_W, _CARRIER_V, _ANGULAR = SLIDE, SLIDE + 3, TURN_RATE
-
-
-def scratch_rows(slots: int, columns: int) -> int:
-    """Rows of scratch that a plan needs."""
-    return SLOTS + STATE_ROWS * slots + _KEPT * columns
 
 
 @lane_function
-def _remember_column(m, s, at, axis):
+def _keep_column(m, s, at, axis):
     """Keep z, O, and w and vel of link i; `w_i x z` and `w_{i-1} x z` are the same."""
     for r in range(3):
-        copy_rows(m, s, R + 3 * r + axis, at + r, 1)
-    copy_rows(m, s, P, at + 3, 3)
-    copy_rows(m, s, W, at + 6, 3)
-    copy_rows(m, s, V, at + 9, 3)
+        copy_rows(s, R + 3 * r + axis, at + r, 1)
+    copy_rows(s, P, at + 3, 3)
+    copy_rows(s, W, at + 6, 3)
+    copy_rows(s, V, at + 9, 3)
 
 
 @lane_function
 def _column_rate(m, s, turns, reference):
     """The rate of one column, in the wanted reference."""
     for k in range(m):
-        z = load(s, _Z, k)
-        z_rate = cross(load(s, _CARRIER_W, k), z)
+        z = load(s, AXIS, k)
+        z_rate = cross(load(s, CARRIER_W, k), z)
         lin, lin_rate, ang, ang_rate = z, z_rate, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         if turns:
             to, to_rate = load(s, FRAME + P, k), load(s, FRAME + V, k)
             if reference == _WORLD:
                 to, to_rate = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-            d, d_rate = minus(to, load(s, _O, k)), minus(to_rate, load(s, _CARRIER_V, k))
+            d, d_rate = minus(to, load(s, ORIGIN, k)), minus(to_rate, load(s, CARRIER_V, k))
             lin, lin_rate = cross(z, d), plus(cross(z_rate, d), cross(z, d_rate))
             ang, ang_rate = z, z_rate
         if reference == _LOCAL:
             w = load(s, FRAME + W, k)
             lin_rate = rotate_back(s, FRAME + R, minus(lin_rate, cross(w, lin)), k)
             ang_rate = rotate_back(s, FRAME + R, minus(ang_rate, cross(w, ang)), k)
-        store(s, _LINEAR, k, lin_rate)
-        store(s, _ANGULAR, k, ang_rate)
+        store(s, LINEAR, k, lin_rate)
+        store(s, ANGULAR, k, ang_rate)
 
 
 @lane_function
-def _write_rates(m, s, b, f, place, reference, first, columns, multipliers, uses, idle, out):
-    for c in range(columns.shape[0]):
-        if uses[f, c] == 0:
-            continue
-        copy_rows(m, s, first + _KEPT * c, _Z, 6)
-        copy_rows(m, s, first + _KEPT * c + 6, _CARRIER_W, 6)
-        _column_rate(m, s, columns[c, 2] == 1, reference)
-        put_column(m, s, b, place, _LINEAR, _ANGULAR, columns[c, 3], multipliers[c], uses[f, c] == 2, out)
-    clear_idle(m, b, f, place, idle, out)
+def _frame_rates(m, s, plan, f, b, reference, to):
+    for c in range(plan.column_count):
+        if plan.leaders[f * plan.column_count + c] >= 0:
+            copy_rows(s, plan.kept + KEPT_ROWS * c, AXIS, KEPT_ROWS)
+            _column_rate(m, s, plan.columns[COLUMN_WIDTH * c + TURNS] == 1, reference)
+            put_column(m, s, plan, f, c)
+    write_matrix(m, s, plan, f, b, to)
 
 
 @lane_function
-def _rate_block(
-    m, b, reference, steps, g, slots, frames, offsets, columns, multipliers, uses, idle, base, q, v, out, s
-):
+def _rate_block(m, s, plan, b, reference, base, q, v, to):
     order = 1 + 0 * b
-    rows = start(m, s, b, base, order)
-    first = SLOTS + STATE_ROWS * slots
+    read_inputs(m, s, plan, b, q, v, v, order)
+    start(m, s, plan, b, base, order)
+    rows = rows_of(order)
     f = c = 0 * b
-    for i in range(-1, steps.shape[0]):
+    size = plan.frame_count * 6 * plan.nv
+    for i in range(-1, plan.step_count):
         if i >= 0:
-            advance(m, s, b, i, steps, g, q, v, v, order, rows)
-            while c < columns.shape[0] and columns[c, 0] == i:
-                _remember_column(m, s, first + _KEPT * c, columns[c, 1])
+            fetch_output(m, i, plan.step_count, to, b * size, m * size)
+            resume(s, plan, i, rows)
+            step(m, s, plan, i, order)
+            save(s, plan, i, rows)
+            while c < plan.column_count and plan.columns[COLUMN_WIDTH * c + STEP] == i:
+                _keep_column(m, s, plan.kept + KEPT_ROWS * c, plan.columns[COLUMN_WIDTH * c + AXIS_OF])
                 c += 1
-        while f < frames.shape[0] and frames[f, 0] == i:
-            frame_state(m, s, offsets, f, order, rows, reference == _LOCAL)
-            _write_rates(m, s, b, f, frames[f, 1], reference, first, columns, multipliers, uses, idle, out)
+        while f < plan.frame_count and plan.frames[2 * f] == i:
+            frame_state(m, s, plan, f, order, reference == _LOCAL)
+            _frame_rates(m, s, plan, f, b, reference, to)
             f += 1
+    return int(finite(q, b * plan.nq, m * plan.nq) and finite(v, b * plan.nv, m * plan.nv))
 
 
-@kernel(
-    INT,
-    WHOLE,
-    ROWS,
-    INT,
-    WHOLE,
-    ROWS,
-    WHOLE,
-    ROW,
-    WHOLE,
-    WHOLE,
-    ROWS,
-    ROWS,
-    ROWS,
-    types.Array(types.float64, 4, "C"),
-    SCRATCH,
-)
-def jacobian_rate(
-    reference, steps, g, slots, frames, offsets, columns, multipliers, uses, idle, base, q, v, out, s
-):
-    """Rates of the velocity Jacobians (7.126) of frames.
+@kernel(INT, PLAN, ROWS, ROWS, ROWS, output(4), SCRATCH)
+def jacobian_rates(reference, packed, base, q, v, out, s):
+    """Rates of the velocity Jacobians (7.126) of frames: 1, or 0 for an input that is not finite.
 
     Shapes: base (1 or n, 24), q (n, nq), v (n, nv), out (n, frames, 6, nv), s (rows * LANES,).
     """
-    n = q.shape[0]
+    n, plan, good = q.shape[0], walk_of(packed), 1
     lanes = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    x, y, to = pointer_to(q), pointer_to(v), pointer_to(out)
     for b in range(0, n, LANES):
-        _rate_block(
-            lanes, b, reference, steps, g, slots, frames, offsets, columns, multipliers, uses, idle,
-            base, q, v, out, s,
-        )  # fmt: skip
+        good &= _rate_block(lanes, s, plan, b, reference, base, x, y, to)
+    return good

@@ -14,6 +14,7 @@ from typing import Any
 import numba
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 #: Configurations side by side. Two AVX-512 or four AVX2 registers a row: enough to hide latencies, and a
@@ -42,10 +43,19 @@ def pointer_to(context: Any, array: Any) -> Any:
     return types.CPointer(array.dtype)(array), generate
 
 
-@lane_function
-def entry(x, row, number):
-    """`x[row, number]` of a table, read through its pointer."""
-    return pointer_to(x)[row * x.shape[1] + number]
+def _pointer_from_address(number: Any) -> Any:
+    @intrinsic
+    def pointer(context: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
+
+        return types.CPointer(number)(types.int64), generate
+
+    return pointer
+
+
+#: The numbers, or whole numbers, at an address.
+numbers_at, whole_numbers_at = map(_pointer_from_address, (types.float64, types.int64))
 
 
 @lane_function
@@ -114,35 +124,25 @@ def rotate_back(s, row, x, k):
 
 
 @intrinsic
-def _copy_whole_row(context: Any, s: Any, source: Any, target: Any) -> Any:
-    """All lanes of a row at once.
+def copy_rows(context: Any, s: Any, source: Any, target: Any, count: Any) -> Any:
+    """Copy `count` whole rows, each at once.
 
-    Where a row's number is not a constant, the compiler cannot see that two rows are apart and would copy
-    number by number.
+    Rows whose number is not a constant are met here and nowhere else: the compiler cannot see that two of
+    them are apart, and would copy number by number.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        numbers = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        source, target, count = arguments[1:]
         row = ir.VectorType(ir.DoubleType(), LANES).as_pointer()
-        at, to = (
-            builder.bitcast(builder.gep(array.data, [builder.mul(number, number.type(LANES))]), row)
-            for number in arguments[1:]
-        )
-        builder.store(builder.load(at, align=8), to, align=8)
+        with cgutils.for_range(builder, count) as loop:
+            places = (builder.add(first, loop.index) for first in (source, target))
+            begin = (builder.mul(place, place.type(LANES)) for place in places)
+            at, to = (builder.bitcast(builder.gep(numbers, [number]), row) for number in begin)
+            builder.store(builder.load(at, align=8), to, align=8)
         return context.get_dummy_value()
 
-    return types.void(s, types.intp, types.intp), generate
-
-
-@lane_function
-def copy_rows(m, s, source, target, count):
-    """Copy `count` rows; the one place where rows are met by a number that is not a constant."""
-    for r in range(count):
-        if m == LANES:
-            _copy_whole_row(s, source + r, target + r)
-        else:
-            for k in range(m):
-                s[(target + r) * LANES + k] = s[(source + r) * LANES + k]
+    return types.void(s, types.intp, types.intp, types.intp), generate
 
 
 # Sine and cosine of a whole block: Cody and Waite's reduction to [-pi/4, pi/4] with pi/2 in three parts,

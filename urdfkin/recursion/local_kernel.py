@@ -9,14 +9,12 @@ Pinocchio, which works in the links' axes, on short chains.
 
 from __future__ import annotations
 
-from numba import types
-
+from urdfkin.recursion.compiling import INT, NUMBERS, PLAN, ROWS, SCRATCH, kernel, output
 from urdfkin.recursion.lanes import (
     LANES,
     copy_rows,
     cross,
     dot,
-    entry,
     lane_function,
     load,
     plus,
@@ -24,18 +22,20 @@ from urdfkin.recursion.lanes import (
     sine_cosine,
     store,
 )
-from urdfkin.recursion.plan import Geometry, Motion
-from urdfkin.recursion.steps import (
+from urdfkin.recursion.motion_kernel import inputs_finite, write_motion
+from urdfkin.recursion.plan import GEOMETRY_WIDTH, OFFSET_WIDTH, STEP_WIDTH, Geometry, Motion, Step
+from urdfkin.recursion.rows import (
     ALPHA,
     ANGLE,
     COSINE,
     FRAME,
+    QUATERNION,
     RATE,
     RATE_2,
     SINE,
+    SLIDE,
     SLIDE_RATE,
     SLIDE_RATE_2,
-    STATE_ROWS,
     TURN_RATE,
     TURN_RATE_2,
     A,
@@ -44,12 +44,11 @@ from urdfkin.recursion.steps import (
     R,
     V,
     W,
-    carry,
-    gather_free,
-    gather_joint,
 )
-from urdfkin.recursion.walk import INT, ROWS, SCRATCH, SLOTS, WHOLE, kernel
+from urdfkin.recursion.steps import carry, gather_joint, gather_place, gather_rates
+from urdfkin.recursion.walk import read_inputs, resume, save, walk_of
 
+_KIND = int(Step.KIND)
 _OFFSET = int(Geometry.OFFSET)
 _TURN, _SLIDE, _PLANAR = int(Motion.TURN), int(Motion.SLIDE), int(Motion.PLANAR)
 
@@ -61,7 +60,13 @@ def _vectors(order):
 
 
 @lane_function
-def _start(m, s, b, base, order):
+def _rows_of(order):
+    """How much of the state there is: the places and rotations of `steps` are not followed."""
+    return P + 3 + 3 * _vectors(order)
+
+
+@lane_function
+def _start(m, s, plan, b, base, order):
     """The state of the base in its own axes; places are not followed."""
     fixed = base.shape[0] == 1
     for k in range(m):
@@ -73,17 +78,15 @@ def _start(m, s, b, base, order):
             second = (base[row, R + 1], base[row, R + 4], base[row, R + 7])
             third = (base[row, R + 2], base[row, R + 5], base[row, R + 8])
             store(s, at, k, (dot(first, x), dot(second, x), dot(third, x)))
-    rows = P + 3 + 3 * _vectors(order)
-    copy_rows(m, s, 0, SLOTS, rows)
-    return rows
+    copy_rows(s, 0, plan.slots, _rows_of(order))
 
 
 @lane_function
 def _turn_back_by_constant(m, s, at, g, i, order):
-    """Turn back: x <- G^T x for each vector, with the constant rotation G in row `i` of `g`."""
-    first = (g[i, 0], g[i, 3], g[i, 6])
-    second = (g[i, 1], g[i, 4], g[i, 7])
-    third = (g[i, 2], g[i, 5], g[i, 8])
+    """Turn back: x <- G^T x for each vector, with the constant rotation G in `g[i]`."""
+    first = (g[i], g[i + 3], g[i + 6])
+    second = (g[i + 1], g[i + 4], g[i + 7])
+    third = (g[i + 2], g[i + 5], g[i + 8])
     for row in range(at + W, at + W + 3 * _vectors(order), 3):
         for k in range(m):
             x = load(s, row, k)
@@ -102,15 +105,11 @@ def _turn_back_about_z(m, s, order):
 
 
 @lane_function
-def _turn_back_by_quaternion(m, s, q, b, at, order):
-    """Turn back: x <- R(quat)^T x for each vector, with (x, y, z, w) in columns `at` to `at + 3` of `q`."""
+def _turn_back_by_quaternion(m, s, order):
+    """Turn back: x <- R(quat)^T x for each vector, with the unit quaternion (x, y, z, w)."""
     for k in range(m):
-        x, y, z, w = (
-            entry(q, b + k, at),
-            entry(q, b + k, at + 1),
-            entry(q, b + k, at + 2),
-            entry(q, b + k, at + 3),
-        )
+        x, y, z = load(s, QUATERNION, k)
+        w = s[(QUATERNION + 3) * LANES + k]
         first = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
         second = (2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x))
         third = (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y))
@@ -123,7 +122,7 @@ def _turn_back_by_quaternion(m, s, q, b, at, order):
 def _place(m, s, g, i):
     """d, a constant of the link."""
     for k in range(m):
-        store(s, D, k, (g[i, _OFFSET], g[i, _OFFSET + 1], g[i, _OFFSET + 2]))
+        store(s, D, k, (g[i + _OFFSET], g[i + _OFFSET + 1], g[i + _OFFSET + 2]))
 
 
 @lane_function
@@ -167,85 +166,87 @@ def _move_free(m, s, order):
 
 
 @lane_function
-def _step_free(m, s, b, i, steps, q, v, a, order):
-    at, rate_at, planar = steps[i, 3], steps[i, 4], steps[i, 0] == _PLANAR
+def _step_free(m, s, plan, i, order):
+    gather_place(m, s, plan, i)
     for k in range(m):
-        z = 0.0 if planar else entry(q, b + k, at + 2)
-        store(s, D, k, plus(load(s, D, k), (entry(q, b + k, at), entry(q, b + k, at + 1), z)))
+        store(s, D, k, plus(load(s, D, k), load(s, SLIDE, k)))
     carry(m, s, 0, order)
-    if planar:
-        for k in range(m):
-            s[ANGLE * LANES + k] = entry(q, b + k, at + 2)
+    if plan.steps[STEP_WIDTH * i + _KIND] == _PLANAR:
         sine_cosine(m, s, ANGLE, SINE, COSINE)
         _turn_back_about_z(m, s, order)
     else:
-        _turn_back_by_quaternion(m, s, q, b, at + 3, order)
-    gather_free(m, s, b, rate_at, planar, v, SLIDE_RATE, TURN_RATE)
-    if order >= 2:
-        gather_free(m, s, b, rate_at, planar, a, SLIDE_RATE_2, TURN_RATE_2)
+        _turn_back_by_quaternion(m, s, order)
+    gather_rates(m, s, plan, i, order)
     _move_free(m, s, order)
 
 
 @lane_function
-def _step(m, s, b, i, steps, g, q, v, a, order):
+def _step(m, s, plan, i, order):
     """The state of link i-1 in its axes becomes the state of link i in its own."""
-    _turn_back_by_constant(m, s, 0, g, i, order)
-    _place(m, s, g, i)
-    kind = steps[i, 0]
+    _turn_back_by_constant(m, s, 0, plan.geometry, GEOMETRY_WIDTH * i, order)
+    _place(m, s, plan.geometry, GEOMETRY_WIDTH * i)
+    kind = plan.steps[STEP_WIDTH * i + _KIND]
     if kind == _TURN:
         carry(m, s, 0, order)
-        gather_joint(m, s, b, i, steps, g, q, v, a, order)
+        gather_joint(m, s, plan, i, order)
         sine_cosine(m, s, ANGLE, SINE, COSINE)
         _move_revolute(m, s, order)
     elif kind == _SLIDE:
-        gather_joint(m, s, b, i, steps, g, q, v, a, order)
+        gather_joint(m, s, plan, i, order)
         for k in range(m):
             store(s, D, k, plus(load(s, D, k), (0.0, 0.0, s[ANGLE * LANES + k])))
         carry(m, s, 0, order)
         _move_prismatic(m, s, order)
     else:
-        _step_free(m, s, b, i, steps, q, v, a, order)
+        _step_free(m, s, plan, i, order)
 
 
 @lane_function
-def _write(m, s, b, place, order, out):
-    linear, angular = (FRAME + V, FRAME + W) if order == 1 else (FRAME + A, FRAME + ALPHA)
-    frames, to = out.shape[1], pointer_to(out)
-    for k in range(m):
-        lin, ang = load(s, linear, k), load(s, angular, k)
-        here = ((b + k) * frames + place) * 6
-        for row in range(3):
-            to[here + row] = lin[row]
-            to[here + 3 + row] = ang[row]
-
-
-@lane_function
-def _block(m, b, order, steps, g, frames, offsets, base, q, v, a, out, s):
-    rows = _start(m, s, b, base, order)
+def _local_block(m, s, plan, b, order, base, q, v, a, to):
+    read_inputs(m, s, plan, b, q, v, a, order)
+    _start(m, s, plan, b, base, order)
+    rows = _rows_of(order)
     f = 0 * b
-    for i in range(-1, steps.shape[0]):
+    for i in range(-1, plan.step_count):
         if i >= 0:
-            if steps[i, 1] >= 0:
-                copy_rows(m, s, SLOTS + STATE_ROWS * steps[i, 1], 0, rows)
-            _step(m, s, b, i, steps, g, q, v, a, order)
-            if steps[i, 2] >= 0:
-                copy_rows(m, s, 0, SLOTS + STATE_ROWS * steps[i, 2], rows)
-        while f < frames.shape[0] and frames[f, 0] == i:
-            copy_rows(m, s, 0, FRAME, rows)
-            _place(m, s, offsets, f)  # in the link's axes, as in `walk.frame_state`
+            resume(s, plan, i, rows)
+            _step(m, s, plan, i, order)
+            save(s, plan, i, rows)
+        while f < plan.frame_count and plan.frames[2 * f] == i:
+            copy_rows(s, 0, FRAME, rows)
+            _place(m, s, plan.offsets, OFFSET_WIDTH * f)  # in the link's axes, as in `walk.frame_state`
             carry(m, s, FRAME, order)
-            _turn_back_by_constant(m, s, FRAME, offsets, f, order)
-            _write(m, s, b, frames[f, 1], order, out)
+            _turn_back_by_constant(m, s, FRAME, plan.offsets, OFFSET_WIDTH * f, order)
+            write_motion(m, s, plan, f, b, order, to)
             f += 1
+    return inputs_finite(m, plan, b, order, q, v, a)
 
 
-@kernel(INT, WHOLE, ROWS, WHOLE, ROWS, ROWS, ROWS, ROWS, ROWS, types.Array(types.float64, 3, "C"), SCRATCH)
-def local_motion(order, steps, g, frames, offsets, base, q, v, a, out, s):
-    """Velocities (order 1) or accelerations (2) of frames, in their own axes.
+@kernel(INT, PLAN, ROWS, ROWS, ROWS, ROWS, output(3), SCRATCH)
+def local_motions(order, packed, base, q, v, a, out, s):
+    """Velocities (order 1) or accelerations (2) of frames, in their own axes; 0 for an input not finite.
 
     Shapes: base (1 or n, 24), q (n, nq), v and a (n, nv), out (n, frames, 6), s (rows * LANES,).
     """
-    n = q.shape[0]
+    n, plan, good = q.shape[0], walk_of(packed), 1
     lanes = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    x, y, z, to = pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
     for b in range(0, n, LANES):
-        _block(lanes, b, order, steps, g, frames, offsets, base, q, v, a, out, s)
+        good &= _local_block(lanes, s, plan, b, order, base, x, y, z, to)
+    return good
+
+
+@kernel(INT, PLAN, ROWS, NUMBERS, NUMBERS, NUMBERS, output(1), SCRATCH, nogil=False)
+def local_motion(order, packed, base, q, v, a, out, s):
+    """The same of one frame in one configuration; -1 where the shapes are others.
+
+    Shapes: base (1, 24), q (nq,), v and a (nv,), out (6,), s (rows * LANES,).
+    """
+    plan = walk_of(packed)
+    if q.shape[0] != plan.nq or v.shape[0] != plan.nv or out.shape[0] != 6:
+        return -1
+    if order >= 2 and a.shape[0] != plan.nv:
+        return -1
+    one = 1 + 0 * plan.nq
+    x, y, z, to = pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
+    return _local_block(one, s, plan, 0 * one, order, base, x, y, z, to)

@@ -2,31 +2,39 @@
 
 from __future__ import annotations
 
-from numba import types
+import numpy as np
 
-from urdfkin.recursion.lanes import LANES, cross, lane_function, load, minus, plus, pointer_to, rotate_back
-from urdfkin.recursion.steps import ALPHA, FRAME, A, P, R, V, W
-from urdfkin.recursion.walk import INT, ROWS, SCRATCH, WHOLE, advance, frame_state, kernel, start
+from urdfkin.recursion.compiling import INT, NUMBERS, PLAN, ROWS, SCRATCH, kernel, output
+from urdfkin.recursion.lanes import (
+    LANES,
+    cross,
+    lane_function,
+    load,
+    minus,
+    plus,
+    pointer_to,
+    rotate_back,
+    store,
+)
+from urdfkin.recursion.rows import ALPHA, FRAME, ONE, ZERO, A, P, R, V, W
+from urdfkin.recursion.steps import step
+from urdfkin.recursion.transposing import write_rows
+from urdfkin.recursion.walk import finite, frame_state, read_inputs, resume, rows_of, save, start, walk_of
 
 _LOCAL, _WORLD = 0, 1
 
+#: The rows that hold the 4 by 4 pose, row by row, and those of [linear; angular] for velocity, acceleration.
+_POSE = np.array(
+    [FRAME + row for i in range(3) for row in (R + 3 * i, R + 3 * i + 1, R + 3 * i + 2, P + i)]
+    + [ZERO, ZERO, ZERO, ONE]
+)
+_SIX = np.array([[FRAME + first + i for first in pair for i in range(3)] for pair in ((V, W), (A, ALPHA))])
+
 
 @lane_function
-def _write_motion(m, s, b, place, order, reference, out):
-    """Six numbers [linear; angular], or for order 0 the 4 by 4 pose row by row."""
-    frames, to = out.shape[1], pointer_to(out)
-    if order == 0:
-        for k in range(m):
-            here = ((b + k) * frames + place) * 16
-            for row in range(3):
-                for c in range(3):
-                    to[here + 4 * row + c] = s[(FRAME + R + 3 * row + c) * LANES + k]
-                to[here + 4 * row + 3] = s[(FRAME + P + row) * LANES + k]
-                to[here + 12 + row] = 0.0
-            to[here + 15] = 1.0
-        return
-    angular = FRAME + (W if order == 1 else ALPHA)
-    linear = FRAME + (V if order == 1 else A)
+def _refer(m, s, order, reference):
+    """[linear; angular] of the frame in the wanted reference."""
+    linear, angular = FRAME + (V if order == 1 else A), FRAME + (W if order == 1 else ALPHA)
     for k in range(m):
         lin, ang = load(s, linear, k), load(s, angular, k)
         if reference == _WORLD:
@@ -37,37 +45,79 @@ def _write_motion(m, s, b, place, order, reference, out):
                 w = load(s, FRAME + W, k)
                 inward = cross(w, cross(w, to_origin))
                 shifted = plus(shifted, inward)
-            lin = plus(lin, shifted)
+            store(s, linear, k, plus(lin, shifted))
         elif reference == _LOCAL:
-            lin, ang = rotate_back(s, FRAME + R, lin, k), rotate_back(s, FRAME + R, ang, k)
-        here = ((b + k) * frames + place) * 6
-        for row in range(3):
-            to[here + row] = lin[row]
-            to[here + 3 + row] = ang[row]
+            store(s, linear, k, rotate_back(s, FRAME + R, lin, k))
+            store(s, angular, k, rotate_back(s, FRAME + R, ang, k))
 
 
 @lane_function
-def _motion_block(m, b, order, reference, steps, g, frames, offsets, base, q, v, a, out, s):
-    rows = start(m, s, b, base, order)
+def write_motion(m, s, plan, f, b, order, to):
+    """The 4 by 4 pose of a frame (order 0), or its [linear; angular] velocity (1) or acceleration (2)."""
+    frames = plan.frame_count
+    at = b * frames + plan.frames[2 * f + 1]
+    if order == 0:
+        write_rows(m, s, pointer_to(_POSE), 0, 16, to, at * 16, frames * 16)
+    else:
+        write_rows(m, s, pointer_to(_SIX), 6 * (order - 1), 6, to, at * 6, frames * 6)
+
+
+@lane_function
+def inputs_finite(m, plan, b, order, q, v, a):
+    """Whether all coordinates and rates are that motion of this order takes."""
+    good = finite(q, b * plan.nq, m * plan.nq)
+    if order >= 1:
+        good &= finite(v, b * plan.nv, m * plan.nv)
+    if order >= 2:
+        good &= finite(a, b * plan.nv, m * plan.nv)
+    return int(good)
+
+
+@lane_function
+def _motion_block(m, s, plan, b, order, reference, base, q, v, a, to):
+    read_inputs(m, s, plan, b, q, v, a, order)
+    start(m, s, plan, b, base, order)
+    rows = rows_of(order)
     f = 0 * b
-    for i in range(-1, steps.shape[0]):
+    for i in range(-1, plan.step_count):
         if i >= 0:
-            advance(m, s, b, i, steps, g, q, v, a, order, rows)
-        while f < frames.shape[0] and frames[f, 0] == i:
-            frame_state(m, s, offsets, f, order, rows, order == 0 or reference == _LOCAL)
-            _write_motion(m, s, b, frames[f, 1], order, reference, out)
+            resume(s, plan, i, rows)
+            step(m, s, plan, i, order)
+            save(s, plan, i, rows)
+        while f < plan.frame_count and plan.frames[2 * f] == i:
+            frame_state(m, s, plan, f, order, order == 0 or reference == _LOCAL)
+            if order > 0:
+                _refer(m, s, order, reference)
+            write_motion(m, s, plan, f, b, order, to)
             f += 1
+    return inputs_finite(m, plan, b, order, q, v, a)
 
 
-@kernel(
-    INT, INT, WHOLE, ROWS, WHOLE, ROWS, ROWS, ROWS, ROWS, ROWS, types.Array(types.float64, 3, "C"), SCRATCH
-)
-def motion(order, reference, steps, g, frames, offsets, base, q, v, a, out, s):
-    """Placements (order 0), velocities (1) or accelerations (2) of frames.
+@kernel(INT, INT, PLAN, ROWS, ROWS, ROWS, ROWS, output(3), SCRATCH)
+def motions(order, reference, packed, base, q, v, a, out, s):
+    """Placements (order 0), velocities (1) or accelerations (2) of frames: 1, or 0 for an input not finite.
 
     Shapes: base (1 or n, 24), q (n, nq), v and a (n, nv), out (n, frames, 16 or 6), s (rows * LANES,).
     """
-    n = q.shape[0]
+    n, plan, good = q.shape[0], walk_of(packed), 1
     lanes = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    x, y, z, to = pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
     for b in range(0, n, LANES):
-        _motion_block(lanes, b, order, reference, steps, g, frames, offsets, base, q, v, a, out, s)
+        good &= _motion_block(lanes, s, plan, b, order, reference, base, x, y, z, to)
+    return good
+
+
+@kernel(INT, INT, PLAN, ROWS, NUMBERS, NUMBERS, NUMBERS, output(1), SCRATCH, nogil=False)
+def motion(order, reference, packed, base, q, v, a, out, s):
+    """The same of one frame in one configuration; -1 where the shapes are others.
+
+    Shapes: base (1, 24), q (nq,), v and a (nv,), out (16 or 6,), s (rows * LANES,).
+    """
+    plan = walk_of(packed)
+    if q.shape[0] != plan.nq or out.shape[0] != (16 if order == 0 else 6):
+        return -1
+    if (order >= 1 and v.shape[0] != plan.nv) or (order >= 2 and a.shape[0] != plan.nv):
+        return -1
+    one = 1 + 0 * plan.nq
+    x, y, z, to = pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
+    return _motion_block(one, s, plan, 0 * one, order, reference, base, x, y, z, to)

@@ -8,14 +8,16 @@ frame's ancestors alone; a plan for several frames holds every joint one of them
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from enum import IntEnum
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from urdfkin.recursion import rows
 from urdfkin.rotation.aligning import axis_aligning
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree
 
@@ -30,6 +32,29 @@ class Step(IntEnum):
     SAVE = 2
     Q = 3
     V = 4
+
+
+class Packed(IntEnum):
+    """Entries of `Plan.packed`: addresses of the plan's arrays, then their sizes, then rows of scratch."""
+
+    STEPS = 0
+    GEOMETRY = 1
+    FRAMES = 2
+    OFFSETS = 3
+    COLUMNS = 4
+    MULTIPLIERS = 5
+    LEADERS = 6
+    SOURCES = 7
+    BLOCKS_Q = 8
+    BLOCKS_V = 9
+    STEP_COUNT = 10
+    FRAME_COUNT = 11
+    COLUMN_COUNT = 12
+    BLOCK_COUNT_Q = 13
+    BLOCK_COUNT_V = 14
+    NQ = 15
+    NV = 16
+    AREAS = 17
 
 
 class Motion(IntEnum):
@@ -57,6 +82,11 @@ class Column(IntEnum):
     AXIS = 1
     TURNS = 2
     V = 3
+
+
+#: Numbers in a row of `Plan.steps`, `geometry`, `offsets` and `columns`.
+STEP_WIDTH, GEOMETRY_WIDTH, OFFSET_WIDTH = len(Step), int(Geometry.CONSTANT) + 1, 12
+COLUMN_WIDTH = len(Column)
 
 
 _MOTION = {
@@ -94,9 +124,11 @@ class Plan:
             in the axes of the step.
         columns: (columns, 4), columns `Column`: every rate of every step.
         multipliers: (columns,) the mimic multiplier of each column.
-        uses: (frames, columns): 0 where the column is not the frame's ancestor, 1 where it is written
-            first to its place in the Jacobian, 2 where it is added to what is there.
-        idle: (frames, nv): 1 where a frame's Jacobian has a zero column.
+        leaders: (frames, columns): -1 where the column is not the frame's ancestor, else the column that
+            it is added to: itself, but for followers.
+        sources: (frames, 6 * nv): for each number of a frame's Jacobian, the row of scratch that holds it.
+        blocks_q: Where the blocks of eight coordinates begin of which the walk needs at least one.
+        blocks_v: The same for rates.
         parents: (steps,) the step that each step goes on from, -1 for the base.
         lengths: (steps + frames,) metres: the sum of the lengths of all URDF offsets, fixed joints' too,
             from a step's parent to it, then from a frame's step to the frame (in the order of `frames`).
@@ -113,8 +145,10 @@ class Plan:
     offsets: FloatArray
     columns: IntArray
     multipliers: FloatArray
-    uses: IntArray
-    idle: IntArray
+    leaders: IntArray
+    sources: IntArray
+    blocks_q: IntArray
+    blocks_v: IntArray
     parents: IntArray
     lengths: FloatArray
     depth: IntArray
@@ -123,7 +157,30 @@ class Plan:
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, np.ndarray):
+                value = np.ascontiguousarray(value)
+                object.__setattr__(self, field.name, value)
                 value.setflags(write=False)
+
+    @cached_property
+    def areas(self) -> rows.Areas:
+        """Where the rows of scratch begin that depend on the plan."""
+        return rows.areas(self.nq, self.nv, self.slots, len(self.columns))
+
+    @cached_property
+    def packed(self) -> IntArray:
+        """Everything a kernel needs, as one array: handing over each array by itself costs more than a step.
+
+        It holds addresses, and is good while the plan lives.
+        """
+        arrays = (
+            self.steps, self.geometry, self.frames, self.offsets, self.columns, self.multipliers,
+            self.leaders, self.sources, self.blocks_q, self.blocks_v,
+        )  # fmt: skip
+        sizes = (
+            len(self.steps), len(self.frames), len(self.columns), len(self.blocks_q), len(self.blocks_v),
+            self.nq, self.nv,
+        )  # fmt: skip
+        return np.array([*(array.ctypes.data for array in arrays), *sizes, *self.areas], dtype=np.int64)
 
     def __reduce__(self) -> tuple[type[Plan], tuple[Any, ...]]:
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
@@ -145,7 +202,9 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
     slots = _slots(steps, parents)
     columns, multipliers = _columns(steps, geometry)
     ancestors = [{step_of_joint[i] for i in path if i in step_of_joint} for path in paths]
-    uses, idle = _uses(columns, ancestors, tree.nv)
+    leaders = _leaders(columns, ancestors)
+    places = zip(steps[:, Step.Q].tolist(), needed, strict=True)
+    layout = rows.areas(tree.nq, tree.nv, slots, len(columns))
     order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)
     ends = [anchors[links[place]] for place in order]
     return Plan(
@@ -161,8 +220,10 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
         offsets=np.array([(*end.T[:3, :3].ravel(), *end.T[:3, 3]) for end in ends]).reshape(-1, 12),
         columns=columns,
         multipliers=multipliers,
-        uses=uses[order],
-        idle=idle[order],
+        leaders=leaders[order],
+        sources=_sources(columns, leaders[order], layout.results, tree.nv),
+        blocks_q=_blocks(at + c for at, i in places for c in range(tree.joints[i].kind.nq)),
+        blocks_v=_blocks(columns[:, Column.V]),
         parents=np.array(parents, dtype=np.int64),
         lengths=np.array(
             [anchors[tree.joints[i].parent].length + _length(tree.joints[i]) for i in needed]
@@ -251,13 +312,23 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
     return columns, geometry[columns[:, Column.STEP], Geometry.MULTIPLIER].copy()
 
 
-def _uses(columns: IntArray, ancestors: Sequence[set[int]], nv: int) -> tuple[IntArray, IntArray]:
-    uses = np.zeros((len(ancestors), len(columns)), dtype=np.int64)
-    idle = np.ones((len(ancestors), nv), dtype=np.int64)
+def _leaders(columns: IntArray, ancestors: Sequence[set[int]]) -> IntArray:
+    leaders = np.full((len(ancestors), len(columns)), -1, dtype=np.int64)
     for frame, steps in enumerate(ancestors):
-        for c, column in enumerate(columns):
+        first: dict[int, int] = {}
+        for c, column in enumerate(columns.tolist()):
             if column[Column.STEP] in steps:
-                place = column[Column.V]
-                uses[frame, c] = 1 if idle[frame, place] else 2
-                idle[frame, place] = 0
-    return uses, idle
+                leaders[frame, c] = first.setdefault(column[Column.V], c)
+    return leaders
+
+
+def _sources(columns: IntArray, leaders: IntArray, first: int, nv: int) -> IntArray:
+    sources = np.full((len(leaders), 6, nv), rows.ZERO, dtype=np.int64)
+    for frame, c in zip(*np.nonzero(leaders == np.arange(len(columns))), strict=True):
+        sources[frame, :, columns[c, Column.V]] = first + rows.COLUMN_ROWS * c + np.arange(6)
+    return sources.reshape(len(leaders), 6 * nv)
+
+
+def _blocks(places: Iterable[int]) -> IntArray:
+    """Where the blocks of eight begin that hold any of the places."""
+    return np.array(sorted({int(place) // 8 * 8 for place in places}), dtype=np.int64)

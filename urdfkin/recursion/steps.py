@@ -26,9 +26,9 @@ from __future__ import annotations
 from urdfkin.recursion.lanes import (
     LANES,
     column,
+    copy_rows,
     cross,
     dot,
-    entry,
     lane_function,
     load,
     plus,
@@ -37,30 +37,39 @@ from urdfkin.recursion.lanes import (
     store,
     times,
 )
-from urdfkin.recursion.plan import Geometry, Motion
+from urdfkin.recursion.plan import GEOMETRY_WIDTH, STEP_WIDTH, Geometry, Motion, Step
+from urdfkin.recursion.rows import (
+    ALPHA,
+    ANGLE,
+    COSINE,
+    QUATERNION,
+    RATE,
+    RATE_2,
+    SINE,
+    SLIDE,
+    SLIDE_RATE,
+    SLIDE_RATE_2,
+    TURN_RATE,
+    TURN_RATE_2,
+    A,
+    D,
+    P,
+    R,
+    V,
+    W,
+)
 
-# Rows of the scratch array. The state comes first, in one piece, so that it can be saved and restored.
-R, P, W, V, ALPHA, A = 0, 9, 12, 15, 18, 21
-STATE_ROWS = 24
-#: How much of the state each order of motion has: placement, velocity, acceleration.
-ROWS_OF_ORDER = (12, 18, 24)
-# The state of a frame on the way out, and what a single step needs.
-FRAME = 24
-D, ANGLE, SINE, COSINE = 48, 51, 52, 53
-SLIDE, SLIDE_RATE, TURN_RATE, SLIDE_RATE_2, TURN_RATE_2 = 54, 57, 60, 63, 66
-RATE, RATE_2 = 69, 70
-FIXED_ROWS = 71
-
+_KIND, _Q, _V = int(Step.KIND), int(Step.Q), int(Step.V)
 _OFFSET, _MULTIPLIER, _CONSTANT = int(Geometry.OFFSET), int(Geometry.MULTIPLIER), int(Geometry.CONSTANT)
 _TURN, _SLIDE, _PLANAR = int(Motion.TURN), int(Motion.SLIDE), int(Motion.PLANAR)
 
 
 @lane_function
 def turn_by_constant(m, s, at, g, i):
-    """R <- R G with the constant rotation G in row `i` of `g`."""
-    x = (g[i, 0], g[i, 3], g[i, 6])
-    y = (g[i, 1], g[i, 4], g[i, 7])
-    z = (g[i, 2], g[i, 5], g[i, 8])
+    """R <- R G with the constant rotation G that lies in `g[i]`, row by row."""
+    x = (g[i], g[i + 3], g[i + 6])
+    y = (g[i + 1], g[i + 4], g[i + 7])
+    z = (g[i + 2], g[i + 5], g[i + 8])
     for row in range(3):
         for k in range(m):
             r = load(s, at + 3 * row, k)
@@ -80,15 +89,11 @@ def turn_about_z(m, s):
 
 
 @lane_function
-def turn_by_quaternion(m, s, q, b, at):
-    """R <- R R(quat) for the unit quaternion (x, y, z, w) in columns `at` to `at + 3` of `q`."""
+def turn_by_quaternion(m, s):
+    """R <- R R(quat) for the unit quaternion (x, y, z, w)."""
     for k in range(m):
-        x, y, z, w = (
-            entry(q, b + k, at),
-            entry(q, b + k, at + 1),
-            entry(q, b + k, at + 2),
-            entry(q, b + k, at + 3),
-        )
+        x, y, z = load(s, QUATERNION, k)
+        w = s[(QUATERNION + 3) * LANES + k]
         e = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y))
         f = (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x))
         g = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
@@ -100,8 +105,8 @@ def turn_by_quaternion(m, s, q, b, at):
 
 @lane_function
 def interorigin(m, s, g, i):
-    """D = R p for the constant offset p in row `i` of `g`, seen in the axes of R."""
-    p = (g[i, _OFFSET], g[i, _OFFSET + 1], g[i, _OFFSET + 2])
+    """D = R p for the constant offset p that lies behind the rotation in `g[i]`, seen in the axes of R."""
+    p = (g[i + _OFFSET], g[i + _OFFSET + 1], g[i + _OFFSET + 2])
     for k in range(m):
         store(s, D, k, rotate(s, R, p, k))
 
@@ -185,86 +190,95 @@ def move_free(m, s, order):
 
 
 @lane_function
-def gather_joint(m, s, b, i, steps, g, q, v, a, order):
+def gather_joint(m, s, plan, i, order):
     """Coordinate and rates of a joint with one coordinate; a follower's come from its leader's."""
-    at, rate_at = steps[i, 3], steps[i, 4]
-    multiplier, constant = g[i, _MULTIPLIER], g[i, _CONSTANT]
+    at, rate_at = plan.steps[STEP_WIDTH * i + _Q], plan.steps[STEP_WIDTH * i + _V]
+    rule = GEOMETRY_WIDTH * i
+    multiplier, constant = plan.geometry[rule + _MULTIPLIER], plan.geometry[rule + _CONSTANT]
+    copy_rows(s, plan.q + at, ANGLE, 1)
     for k in range(m):
-        s[ANGLE * LANES + k] = multiplier * entry(q, b + k, at) + constant
+        s[ANGLE * LANES + k] = multiplier * s[ANGLE * LANES + k] + constant
     if order >= 1:
+        copy_rows(s, plan.v + rate_at, RATE, 1)
         for k in range(m):
-            s[RATE * LANES + k] = multiplier * entry(v, b + k, rate_at)
+            s[RATE * LANES + k] = multiplier * s[RATE * LANES + k]
     if order >= 2:
+        copy_rows(s, plan.a + rate_at, RATE_2, 1)
         for k in range(m):
-            s[RATE_2 * LANES + k] = multiplier * entry(a, b + k, rate_at)
+            s[RATE_2 * LANES + k] = multiplier * s[RATE_2 * LANES + k]
 
 
 @lane_function
-def gather_free(m, s, b, at, planar, x, slide, turn):
+def gather_place(m, s, plan, i):
+    """Place of a planar joint (x, y and the angle) or of a floating one (x, y, z and the quaternion)."""
+    at = plan.q + plan.steps[STEP_WIDTH * i + _Q]
+    if plan.steps[STEP_WIDTH * i + _KIND] == _PLANAR:
+        copy_rows(s, at, SLIDE, 2)
+        for k in range(m):
+            s[(SLIDE + 2) * LANES + k] = 0.0
+        copy_rows(s, at + 2, ANGLE, 1)
+    else:
+        copy_rows(s, at, SLIDE, 3)
+        copy_rows(s, at + 3, QUATERNION, 4)
+
+
+@lane_function
+def _gather_rates(m, s, planar, at, slide, turn):
     """Rates of a planar (x, y, about z) or floating (three and three) joint into two vectors."""
-    for k in range(m):
-        if planar:
-            store(s, slide, k, (entry(x, b + k, at), entry(x, b + k, at + 1), 0.0))
-            store(s, turn, k, (0.0, 0.0, entry(x, b + k, at + 2)))
-        else:
-            store(
-                s,
-                slide,
-                k,
-                (entry(x, b + k, at), entry(x, b + k, at + 1), entry(x, b + k, at + 2)),
-            )
-            store(
-                s,
-                turn,
-                k,
-                (
-                    entry(x, b + k, at + 3),
-                    entry(x, b + k, at + 4),
-                    entry(x, b + k, at + 5),
-                ),
-            )
+    if planar:
+        copy_rows(s, at, slide, 2)
+        copy_rows(s, at + 2, turn + 2, 1)
+        for k in range(m):
+            s[(slide + 2) * LANES + k] = 0.0
+            s[turn * LANES + k] = 0.0
+            s[(turn + 1) * LANES + k] = 0.0
+    else:
+        copy_rows(s, at, slide, 3)
+        copy_rows(s, at + 3, turn, 3)
 
 
 @lane_function
-def step_free(m, s, b, i, steps, q, v, a, order):
+def gather_rates(m, s, plan, i, order):
+    """Rates of a planar or floating joint, in the axes of the moved frame."""
+    at, planar = plan.steps[STEP_WIDTH * i + _V], plan.steps[STEP_WIDTH * i + _KIND] == _PLANAR
+    _gather_rates(m, s, planar, plan.v + at, SLIDE_RATE, TURN_RATE)
+    if order >= 2:
+        _gather_rates(m, s, planar, plan.a + at, SLIDE_RATE_2, TURN_RATE_2)
+
+
+@lane_function
+def _step_free(m, s, plan, i, order):
     """A planar or floating joint, after R <- R G and d = R p."""
-    at, rate_at, planar = steps[i, 3], steps[i, 4], steps[i, 0] == _PLANAR
-    for k in range(m):
-        z = 0.0 if planar else entry(q, b + k, at + 2)
-        store(s, SLIDE, k, (entry(q, b + k, at), entry(q, b + k, at + 1), z))
+    gather_place(m, s, plan, i)
     add_slide(m, s)
     carry(m, s, 0, order)
-    if planar:
-        for k in range(m):
-            s[ANGLE * LANES + k] = entry(q, b + k, at + 2)
+    if plan.steps[STEP_WIDTH * i + _KIND] == _PLANAR:
         sine_cosine(m, s, ANGLE, SINE, COSINE)
         turn_about_z(m, s)
     else:
-        turn_by_quaternion(m, s, q, b, at + 3)
+        turn_by_quaternion(m, s)
     if order >= 1:
-        gather_free(m, s, b, rate_at, planar, v, SLIDE_RATE, TURN_RATE)
-        if order >= 2:
-            gather_free(m, s, b, rate_at, planar, a, SLIDE_RATE_2, TURN_RATE_2)
+        gather_rates(m, s, plan, i, order)
         move_free(m, s, order)
 
 
 @lane_function
-def step(m, s, b, i, steps, g, q, v, a, order):
+def step(m, s, plan, i, order):
     """The state of link i-1 becomes the state of link i."""
-    turn_by_constant(m, s, 0, g, i)
-    interorigin(m, s, g, i)
-    kind = steps[i, 0]
+    turn_by_constant(m, s, 0, plan.geometry, GEOMETRY_WIDTH * i)
+    interorigin(m, s, plan.geometry, GEOMETRY_WIDTH * i)
+    kind = plan.steps[STEP_WIDTH * i + _KIND]
     if kind == _TURN:
         carry(m, s, 0, order)
-        gather_joint(m, s, b, i, steps, g, q, v, a, order)
+        gather_joint(m, s, plan, i, order)
         sine_cosine(m, s, ANGLE, SINE, COSINE)
         move_revolute(m, s, order)
     elif kind == _SLIDE:
-        gather_joint(m, s, b, i, steps, g, q, v, a, order)
+        gather_joint(m, s, plan, i, order)
         for k in range(m):
             store(s, SLIDE, k, (0.0, 0.0, s[ANGLE * LANES + k]))
         add_slide(m, s)
         carry(m, s, 0, order)
         move_prismatic(m, s, order)
     else:
-        step_free(m, s, b, i, steps, q, v, a, order)
+        _step_free(m, s, plan, i, order)

@@ -1,68 +1,162 @@
-"""What both walks share: initial conditions, going on from saved state, frames fixed to a link.
+"""What every walk shares: its inputs, initial conditions, going on from saved state, frames fixed to a link.
 
-Each kernel works through a batch in whole blocks of `LANES` configurations; `batch` cuts and fills them.
+Each kernel works through a batch in whole blocks of `LANES` configurations; `batch` cuts and fills them. The
+same walk takes a single configuration, one lane wide: the number of lanes `m` is a constant in both.
 
 `0 * b` is 0 to the compiler but not a literal to Numba, which would compile what it is handed to once more.
 """
 
 from __future__ import annotations
 
-from urdfkin.recursion.compiling import INT, ROW, ROWS, SCRATCH, WHOLE, kernel
-from urdfkin.recursion.lanes import LANES, copy_rows, lane_function
-from urdfkin.recursion.steps import (
-    FIXED_ROWS,
-    FRAME,
-    STATE_ROWS,
-    carry,
-    interorigin,
-    step,
-    turn_by_constant,
-)
+from typing import Any, NamedTuple
 
-__all__ = [
-    "COLUMN", "INT", "ROW", "ROWS", "SCRATCH", "SLOTS", "WHOLE",
-    "advance", "frame_state", "kernel", "scratch_rows", "start",
-]  # fmt: skip
+import numba
 
-# After the rows of `steps`: a column of the Jacobian on its way out, then slots of saved state, then the
-# axis and origin of each column met so far.
-COLUMN = FIXED_ROWS
-SLOTS = FIXED_ROWS + 9
-_RESUME, _SAVE = 1, 2
+from urdfkin.recursion.lanes import COMPILED, LANES, copy_rows, lane_function, numbers_at, whole_numbers_at
+from urdfkin.recursion.plan import OFFSET_WIDTH, STEP_WIDTH, Packed, Step
+from urdfkin.recursion.rows import FRAME, ONE, STATE_ROWS, ZERO
+from urdfkin.recursion.steps import carry, interorigin, turn_by_constant
+from urdfkin.recursion.transposing import fetch_inputs, read_rows
+
+# Enumerations are Python's; compiled code takes plain numbers.
+_STEPS, _GEOMETRY, _FRAMES = int(Packed.STEPS), int(Packed.GEOMETRY), int(Packed.FRAMES)
+_OFFSETS, _COLUMNS, _MULTIPLIERS = int(Packed.OFFSETS), int(Packed.COLUMNS), int(Packed.MULTIPLIERS)
+_LEADERS, _SOURCES = int(Packed.LEADERS), int(Packed.SOURCES)
+_BLOCKS_Q, _BLOCKS_V = int(Packed.BLOCKS_Q), int(Packed.BLOCKS_V)
+_COUNTS, _AREAS = int(Packed.STEP_COUNT), int(Packed.AREAS)
+_RESUME, _SAVE = int(Step.RESUME), int(Step.SAVE)
 
 
-def scratch_rows(slots: int, columns: int) -> int:
-    """Rows of scratch that a plan needs."""
-    return SLOTS + STATE_ROWS * slots + 6 * columns
+class Walk(NamedTuple):
+    """A plan in a kernel: where its arrays lie, their sizes, and the first row of each area of scratch."""
+
+    steps: Any
+    geometry: Any
+    frames: Any
+    offsets: Any
+    columns: Any
+    multipliers: Any
+    leaders: Any
+    sources: Any
+    blocks_q: Any
+    blocks_v: Any
+    step_count: int
+    frame_count: int
+    column_count: int
+    block_count_q: int
+    block_count_v: int
+    nq: int
+    nv: int
+    q: int
+    v: int
+    a: int
+    slots: int
+    kept: int
+    results: int
 
 
 @lane_function
-def start(m, s, b, base, order):
+def walk_of(packed):
+    """The plan that `Plan.packed` was made from."""
+    return Walk(
+        whole_numbers_at(packed[_STEPS]),
+        numbers_at(packed[_GEOMETRY]),
+        whole_numbers_at(packed[_FRAMES]),
+        numbers_at(packed[_OFFSETS]),
+        whole_numbers_at(packed[_COLUMNS]),
+        numbers_at(packed[_MULTIPLIERS]),
+        whole_numbers_at(packed[_LEADERS]),
+        whole_numbers_at(packed[_SOURCES]),
+        whole_numbers_at(packed[_BLOCKS_Q]),
+        whole_numbers_at(packed[_BLOCKS_V]),
+        packed[_COUNTS],
+        packed[_COUNTS + 1],
+        packed[_COUNTS + 2],
+        packed[_COUNTS + 3],
+        packed[_COUNTS + 4],
+        packed[_COUNTS + 5],
+        packed[_COUNTS + 6],
+        packed[_AREAS],
+        packed[_AREAS + 1],
+        packed[_AREAS + 2],
+        packed[_AREAS + 3],
+        packed[_AREAS + 4],
+        packed[_AREAS + 5],
+    )
+
+
+@lane_function
+def read_input(m, s, x, b, width, blocks, count, row):
+    """The numbers that the walk needs of `m` rows of x (n, width), from row `b` on, into rows of lanes."""
+    for block in range(count):
+        at = blocks[block]
+        wide = width - at
+        read_rows(m, x, b * width + at, width, 8 if wide > 8 else wide, s, row + at)
+    fetch_inputs(m, x, (b + m) * width, m * width)
+
+
+@lane_function
+def read_inputs(m, s, plan, b, q, v, a, order):
+    """Coordinates, and the rates that motion of this order takes."""
+    read_input(m, s, q, b, plan.nq, plan.blocks_q, plan.block_count_q, plan.q)
+    if order >= 1:
+        read_input(m, s, v, b, plan.nv, plan.blocks_v, plan.block_count_v, plan.v)
+    if order >= 2:
+        read_input(m, s, a, b, plan.nv, plan.blocks_v, plan.block_count_v, plan.a)
+
+
+@lane_function
+def rows_of(order):
+    """How much of the state motion of this order has."""
+    return 12 if order == 0 else (18 if order == 1 else 24)
+
+
+@lane_function
+def start(m, s, plan, b, base, order):
     """The initial conditions: the state of the base (the text's frame -1 to frame 0)."""
-    rows = 12 if order == 0 else (18 if order == 1 else 24)
+    rows = rows_of(order)
     fixed = base.shape[0] == 1
     for r in range(rows):
         for k in range(m):
             s[r * LANES + k] = base[0 if fixed else b + k, r]
-    copy_rows(m, s, 0, SLOTS, rows)
-    return rows
+    for k in range(m):
+        s[ZERO * LANES + k] = 0.0
+        s[ONE * LANES + k] = 1.0
+    copy_rows(s, 0, plan.slots, rows)
 
 
 @lane_function
-def frame_state(m, s, offsets, f, order, rows, turned):
+def resume(s, plan, i, rows):
+    """Go on from saved state where the plan says so."""
+    if plan.steps[STEP_WIDTH * i + _RESUME] >= 0:
+        copy_rows(s, plan.slots + STATE_ROWS * plan.steps[STEP_WIDTH * i + _RESUME], 0, rows)
+
+
+@lane_function
+def save(s, plan, i, rows):
+    """Save the state where a later step goes on from it."""
+    if plan.steps[STEP_WIDTH * i + _SAVE] >= 0:
+        copy_rows(s, 0, plan.slots + STATE_ROWS * plan.steps[STEP_WIDTH * i + _SAVE], rows)
+
+
+@lane_function
+def frame_state(m, s, plan, f, order, turned):
     """The state of a frame that is fixed to the present link; its rotation only where it is `turned`."""
-    copy_rows(m, s, 0, FRAME, rows)
-    interorigin(m, s, offsets, f)
+    copy_rows(s, 0, FRAME, rows_of(order))
+    at = OFFSET_WIDTH * f
+    interorigin(m, s, plan.offsets, at)
     carry(m, s, FRAME, order)
     if turned:
-        turn_by_constant(m, s, FRAME, offsets, f)
+        turn_by_constant(m, s, FRAME, plan.offsets, at)
 
 
-@lane_function
-def advance(m, s, b, i, steps, g, q, v, a, order, rows):
-    """Step `i`, going on from saved state and saving its own where the plan says so."""
-    if steps[i, _RESUME] >= 0:
-        copy_rows(m, s, SLOTS + STATE_ROWS * steps[i, _RESUME], 0, rows)
-    step(m, s, b, i, steps, g, q, v, a, order)
-    if steps[i, _SAVE] >= 0:
-        copy_rows(m, s, 0, SLOTS + STATE_ROWS * steps[i, _SAVE], rows)
+@numba.njit(forceinline=True, fastmath={"reassoc"}, **COMPILED)
+def finite(x, at, count):
+    """Whether `count` numbers are: 0 times one that is not is no number, and stays so in a sum.
+
+    The order of this sum is left to the compiler.
+    """
+    total = 0.0
+    for i in range(count):
+        total += 0.0 * x[at + i]
+    return total == 0.0

@@ -159,7 +159,7 @@ def column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
     """(frames, nv) each: the sum of the mimic multipliers that turn, or slide, along each column."""
     weights = np.zeros((2, len(plan.frames), plan.nv))
     for f, (_, place) in enumerate(plan.frames):
-        for c in np.flatnonzero(plan.uses[f]):
+        for c in np.flatnonzero(plan.leaders[f] >= 0):
             kind = 0 if plan.columns[c, Column.TURNS] else 1
             weights[kind, place, plan.columns[c, Column.V]] += abs(plan.multipliers[c])
     return weights[0], weights[1]
