@@ -20,7 +20,7 @@ LAYERS = (
     ("recursion",),
     ("diagnostics", "urdf"),
     ("dh",),
-    ("catalogue", "sources", "deep_stack"),
+    ("catalogue", "sources", "origin", "deep_stack"),
     ("oracle", "verification"),
     ("call", "manipulator", "tables", "robot"),
     ("loading", "from_table", "checking", "description", "trajectory", "frame_motion"),

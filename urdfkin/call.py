@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Bound, Quantity
 from urdfkin.verification.certificate import VerificationError, compare
 from urdfkin.verification.magnitudes import magnitudes
+from urdfkin.verification.replay import replay_line
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
@@ -137,9 +137,20 @@ class Call:
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
     def _replay(self, quantity: Quantity, k: int, frame: str) -> str:
-        words = ["urdfkin", str(quantity).replace(" ", "-"), self.robot.source, "--frame", shlex.quote(frame)]
-        if quantity is not Quantity.PLACEMENT:
-            words += ["--reference", self.reference.name.lower()]
-        for name, array in zip("qva", (self.q, self.v, self.a)[: self.given], strict=False):
-            words += [f"--{name}", ",".join(repr(float(x)) for x in array[k])]
-        return " ".join(words)
+        reference = None if quantity is Quantity.PLACEMENT else self.reference.name.lower()
+        values = {
+            name: array[k].tolist()
+            for name, array in zip("qva", (self.q, self.v, self.a)[: self.given], strict=False)
+        }
+        if self.base is None:
+            command = str(quantity).replace(" ", "-")
+            return replay_line(self.robot.origin, command, frame, reference, values)
+        # The command line has no words for a moving base.
+        base = self.flat_base or self.base
+        arguments = [*map(repr, values.values()), repr(frame), *([repr(reference)] if reference else [])]
+        fields = ((base.placement, 2), (base.velocity, 1), (base.acceleration, 1))
+        motion = (repr((x if x.ndim == own else x[k]).tolist()) for x, own in fields)
+        return (
+            f"{self.robot.origin.python}.{str(quantity).replace(' ', '_')}({', '.join(arguments)},"
+            f" base=urdfkin.BaseMotion({', '.join(motion)}))"
+        )

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 import warnings
 from collections.abc import Mapping
 
 from urdfkin.diagnostics import Finding, Oracle, Severity, UrdfError, UrdfWarning, check_text
+from urdfkin.origin import Origin
 from urdfkin.robot import Robot
-from urdfkin.sources import Source, Text, read_source
+from urdfkin.sources import Source, read_source
 from urdfkin.urdf.reader import read_tree
 
 
@@ -45,7 +45,7 @@ def load(
     (8, 0.926)
     """
     text = read_source(source, xacro_args=xacro_args)
-    words, given_mimic = _words(text, mimic, root_joint), mimic
+    origin = Origin(text.source, mimic, root_joint, text.xacro_args)
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     findings = check_text(text.data, file=text.label, mimic=mimic, root_joint=root_joint)
@@ -58,25 +58,14 @@ def load(
     return Robot(
         read_tree(text.data, mimic=mimic, root_joint=root_joint),
         text.data.decode("utf-8-sig"),
-        source=words,
+        origin=origin,
         verify=verify,
-        mimic=given_mimic if mimic else False,
-        root_joint=root_joint,
+        mimic=origin.mimic if mimic else False,
         findings=findings,
         unverifiable=_unverifiable(findings),
         base_frame=text.entry.base if text.entry else None,
         tip_frame=text.entry.tip if text.entry else None,
     )
-
-
-def _words(text: Text, mimic: bool | None, root_joint: str | None) -> str:
-    """What to write on a command line to get the same robot."""
-    words = [shlex.quote(text.source) + text.options]
-    if mimic is False:
-        words.append("--no-mimic")
-    if root_joint is not None:
-        words.append(f"--root-joint {root_joint}")
-    return " ".join(words)
 
 
 def _unverifiable(findings: tuple[Finding, ...]) -> str | None:

@@ -18,6 +18,7 @@ from urdfkin.diagnostics import Finding
 from urdfkin.errors import InputError
 from urdfkin.manipulator import Manipulator
 from urdfkin.oracle import Oracle, OracleError, version
+from urdfkin.origin import Origin
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import Plan, make_plan
@@ -46,10 +47,9 @@ class Robot(Manipulator, Tables):
     Attributes:
         tree: Links and joints.
         urdf: The URDF text that Pinocchio checks against.
-        source: The words that name it on a command line, for reproducing lines.
+        origin: What was given to `load`.
         verify: Whether results are checked unless a call says otherwise.
         mimic: As it was given to `load`; False too where the catalogue turns it off.
-        root_joint: As it was given to `load`.
         findings: What there was to say about the URDF; no errors.
         unverifiable: Why Pinocchio cannot check this robot; None if it can, as far as is known.
         base_frame: The catalogue's base for chains; for other robots the root link.
@@ -60,10 +60,9 @@ class Robot(Manipulator, Tables):
         tree: KinematicTree,
         urdf: str,
         *,
-        source: str,
+        origin: Origin,
         verify: bool = True,
         mimic: bool | None = None,
-        root_joint: str | None = None,
         findings: tuple[Finding, ...] = (),
         unverifiable: str | None = None,
         base_frame: str | None = None,
@@ -71,10 +70,9 @@ class Robot(Manipulator, Tables):
     ) -> None:
         self.tree = tree
         self.urdf = urdf
-        self.source = source
+        self.origin = origin
         self.verify = verify
         self.mimic = mimic
-        self.root_joint = root_joint
         self.findings = findings
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
@@ -96,6 +94,16 @@ class Robot(Manipulator, Tables):
     def name(self) -> str:
         """The robot's name in the URDF."""
         return self.tree.name
+
+    @property
+    def source(self) -> str:
+        """Where it comes from: a path, a catalogue name, `-`, `<text>`."""
+        return self.origin.source
+
+    @property
+    def root_joint(self) -> str | None:
+        """What the root link hangs from, as it was given to `load`."""
+        return self.origin.root_joint
 
     @property
     def nq(self) -> int:

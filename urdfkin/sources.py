@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -27,16 +26,16 @@ class Text:
     Attributes:
         data: Its bytes.
         label: What to call it in messages: the path, `<text>`, `<stdin>`.
-        source: What to write on a command line to get it again.
+        source: What to give again to get it again; `<text>`, `<bytes>` or `<file>` where that has no name.
         entry: The catalogue's entry, if that is where it came from.
-        options: What must follow `source` on a command line, with a leading space: xacro arguments.
+        xacro_args: Names and values that it was expanded with.
     """
 
     data: bytes
     label: str
     source: str
     entry: Entry | None = None
-    options: str = ""
+    xacro_args: tuple[tuple[str, str], ...] = ()
 
 
 def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, object] | None = None) -> Text:
@@ -89,8 +88,7 @@ def _expanded(path: Path, arguments: Mapping[str, object]) -> Text:
     from urdfkin.urdf.xacro import expand  # noqa: PLC0415  only for those who pass xacro
 
     words = {name: str(value) for name, value in arguments.items()}
-    options = "".join(f" --xacro-arg {shlex.quote(f'{name}:={value}')}" for name, value in words.items())
-    return Text(expand(path, words), f"{path} (expanded)", str(path), options=options)
+    return Text(expand(path, words), f"{path} (expanded)", as_word(path), xacro_args=tuple(words.items()))
 
 
 def _read_word(word: str, most: int) -> Text:
@@ -120,7 +118,7 @@ def _encoded(content: str | bytes, label: str, source: str) -> Text:
 def _read_file(path: Path, most: int) -> Text:
     try:
         with path.open("rb") as file:
-            return Text(file.read(most + 1), str(path), str(path))
+            return Text(file.read(most + 1), str(path), as_word(path))
     except FileNotFoundError:
         raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
     except IsADirectoryError:
@@ -128,6 +126,12 @@ def _read_file(path: Path, most: int) -> Text:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise SourceError("cannot be read", where=str(path), found=reason) from error
+
+
+def as_word(path: Path) -> str:
+    """A path that cannot be taken for a name of the catalogue, an option, standard input or text."""
+    word = str(path)
+    return f"./{word}" if word in catalogue() or word.startswith(("-", "<")) else word
 
 
 def _nearest_file(path: Path) -> str:
@@ -141,27 +145,3 @@ def _nearest_file(path: Path) -> str:
     return (
         f"did you mean {', '.join(nearest)}?" if nearest else "'urdfkin robots' lists names that need no file"
     )
-
-
-def source_alone(words: str) -> str:
-    """The source out of the words that name it on a command line: without quotes and options.
-
-    >>> source_alone("'my arm.urdf' --root-joint floating")
-    'my arm.urdf'
-    """
-    try:
-        return next(iter(shlex.split(words)), words)
-    except ValueError:
-        return words
-
-
-def options_alone(words: str) -> str:
-    """The options that follow the source in the words that name it.
-
-    >>> options_alone("'my arm.urdf' --root-joint floating")
-    '--root-joint floating'
-    """
-    try:
-        return shlex.join(shlex.split(words)[1:])
-    except ValueError:
-        return ""

@@ -77,7 +77,7 @@ def _is_number(cell: str) -> bool:
 def test_the_table_says_what_was_computed_checked_and_how_closely(
     quantity: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("COLUMNS", "120")  # names are folded where a terminal is narrow
+    monkeypatch.setenv("COLUMNS", "80")
     text = command(quantity, 1, "local_world_aligned", "table").decode()
     assert "panda" in text
     assert "panda_hand" in text
@@ -85,6 +85,29 @@ def test_the_table_says_what_was_computed_checked_and_how_closely(
     assert "eps*scale" in text
     if quantity.startswith("jacobian"):
         assert all(name in text for name in library.load("panda").rate_names)
+
+
+@pytest.mark.parametrize("words", [("jacobian",), ("acceleration", "--v", "random", "--explain")])
+@pytest.mark.parametrize("columns", [80, 200])
+def test_a_table_folds_no_name_and_is_no_wider_than_the_terminal(
+    words: tuple[str, ...], columns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    done = urdfkin(words[0], "talos", "--frame", "gripper_left_base_link", "--q", "random:1", *words[1:])
+    robot = library.load("talos")
+    *lines, _ = done.text.splitlines()  # the last one is the certificate
+    assert max(map(len, lines)) <= columns
+    path = [name for name in robot.rate_names if name.startswith(("torso", "arm_left"))]
+    assert len(path) == 9
+    stands = [line.split()[0] for line in lines if line.split()]
+    assert set(path) <= set(stands)
+    if words[0] == "jacobian":
+        rows = [line.split()[-6:] for line in lines]
+        shown = [list(map(float, row)) for row in rows if len(row) == 6 and all(map(_is_number, row))]
+        J = urdfkin(
+            *words, "talos", "--frame", "gripper_left_base_link", "--q", "random:1", "--format", "json"
+        )
+        assert np.allclose(np.array(shown).T, J.data["result"][0], rtol=1e-5, atol=1e-12)
 
 
 def test_the_json_says_all_that_is_needed_to_use_it() -> None:

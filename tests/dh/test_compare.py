@@ -40,22 +40,22 @@ def elbow(kinds: str = "RRRRRR") -> KinematicTree:
 def disguised(table: DHTable, seed: int) -> DHTable:
     """The same mechanism with x and z turned round here and there, zeros moved, base and tool dropped.
 
-    Rz(pi) before a step and after it negates a and alpha; reversing z_i-1 by Rx(pi) negates d and theta
-    and moves alpha by pi on both sides.
+    Rz(pi) before a step and after it negates a, alpha and beta; reversing z_i-1 by Rx(pi) negates d and theta
+    and moves alpha by pi on both sides, and beta, which stands between, changes its sign.
     """
     rng = np.random.default_rng(seed)
     flip_x, flip_z = rng.integers(0, 2, (2, len(table.rows) + 1)).astype(bool)
     rows = []
     for i, row in enumerate(table.rows):
         alpha = row.alpha + math.pi * (flip_z[i] != flip_z[i + 1])
-        a = row.a
+        a, beta = row.a, -row.beta if flip_z[i + 1] else row.beta
         if flip_x[i]:
-            a, alpha = -a, -alpha
+            a, alpha, beta = -a, -alpha, -beta
         z = -1.0 if flip_z[i] else 1.0
         turn = math.pi * (flip_x[i] != (flip_x[i - 1] if i else False))
         theta = z * row.theta + turn + (rng.uniform(-3, 3) if row.kind.turns else 0.0)
         d = z * row.d + (0.0 if row.kind.turns else rng.uniform(-1, 1))
-        rows.append(replace(row, a=a, alpha=alpha, d=d, theta=theta))
+        rows.append(replace(row, a=a, alpha=alpha, beta=beta, d=d, theta=theta))
     return replace(table, rows=tuple(rows), base=np.eye(4), tool=np.eye(4))
 
 

@@ -13,6 +13,7 @@ import pytest
 import urdfkin
 from tests.laws.mutants import MUTANTS
 from urdfkin.oracle import Oracle
+from urdfkin.origin import Origin
 from urdfkin.recursion.plan import make_plan
 from urdfkin.robot import Robot
 from urdfkin.urdf.reader import read_tree
@@ -47,7 +48,7 @@ def test_a_term_that_is_off_by_1e_10_is_caught(caught: dict[str, list[str]], mut
 
 def robot_that_misreads(text: str, wrong: str) -> Robot:
     """A robot whose own tree was read from `wrong` and which has Pinocchio check it against `text`."""
-    return Robot(read_tree(wrong.encode()), text, source="<text>")
+    return Robot(read_tree(wrong.encode()), text, origin=Origin("<text>"))
 
 
 @pytest.mark.parametrize("place", ["0.333", "-1.5707963267948966", "0.0825", "0.384"])

@@ -55,7 +55,7 @@ def _hostile() -> str:
 def hostile() -> Document:
     """A run over a robot whose names are attacks, and one that is sane."""
     document = cast("Document", json.loads(_hostile()))
-    document["robots"][0]["source"] = HOSTILE_ROBOT  # the words that named it are the whole URDF
+    document["robots"][0]["source"] = HOSTILE_ROBOT  # a file may be called so
     return document
 
 

@@ -47,7 +47,7 @@ def test_it_is_found_without_importing_pinocchio() -> None:
 
 
 def test_its_limbs_name_frames_that_exist_and_move(robot: Robot) -> None:
-    entry = catalogue()[robot.source.split()[0]]
+    entry = catalogue()[robot.source]
     for base, tip in entry.limbs.values():
         above = robot.tree.path(robot.tree.frame_link(base))
         path = robot.tree.path(robot.tree.frame_link(tip))
@@ -89,7 +89,7 @@ def test_a_robots_calls_agree_when_pinocchio_is_asked_directly(robot: Robot) -> 
 
 
 def test_joints_rates_and_frames_have_pinocchios_order_and_names(robot: Robot) -> None:
-    free = urdfkin.load(robot.source.split()[0], mimic=False)
+    free = urdfkin.load(robot.source, mimic=False)
     model = model_of(free)
     assert free.joint_names == tuple(model.names)[1:]
     assert free.nv == model.nv

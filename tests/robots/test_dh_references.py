@@ -49,7 +49,7 @@ def test_the_kinova_sheet_differs_by_its_rounding_and_the_way_its_joints_count()
     assert found.agrees
     assert [(one.row, one.cell) for one in found.differences] == [(3, "d")]
     assert found.differences[0].urdf == pytest.approx(-0.31105, abs=1e-9)
-    assert found.metres < 1.01e-4
+    assert found.metres < 5.01e-5
 
 
 @pytest.mark.parametrize("name", references())

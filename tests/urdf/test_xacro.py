@@ -65,7 +65,12 @@ def test_the_working_directory_is_left_alone(arm: Path, monkeypatch: pytest.Monk
 
 
 def test_the_line_that_replays_a_result_names_the_arguments(arm: Path) -> None:
-    assert urdfkin.load(arm, xacro_args={"n": "a b"} | {"n": 3}).source == f"{arm} --xacro-arg n:=3"
+    robot = urdfkin.load(arm, xacro_args={"n": 3})
+    assert robot.source == str(arm)
+    assert robot.origin.words == f"{arm} --xacro-arg n:=3"
+    assert eval(robot.origin.python, {"urdfkin": urdfkin}).urdf == robot.urdf
+    report = urdfkin.validate(arm, samples=0, xacro_args={"n": 3})
+    assert report.command == f"urdfkin validate {arm} --samples 0 --seed 0 --xacro-arg n:=3"
 
 
 def test_findings_are_about_the_expanded_text(arm: Path) -> None:

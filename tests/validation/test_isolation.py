@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from urdfkin.origin import Origin
 from urdfkin.validation import isolation
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, Subject, chunks, run_chunk
@@ -72,7 +73,7 @@ def test_what_cannot_be_read_is_reported_as_without_isolation() -> None:
 def test_a_check_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(isolation, "_child", _sleeping_child)
     with pytest.raises(DiedError, match=r"no answer in 0\.5 s"):
-        list(run_isolated(list(chunks(Subject("iris_simple"), 1, 0)), patience=0.5))
+        list(run_isolated(list(chunks(Subject("iris_simple", Origin("iris_simple")), 1, 0)), patience=0.5))
 
 
 def test_the_command_isolates() -> None:

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.arguments import Inputs
-from urdfkin.cli.output import SIX, check_line, console, make_table, write_file
+from urdfkin.cli.output import SIX, check_line, console, write_file
+from urdfkin.cli.tables import print_named
 
 if TYPE_CHECKING:
     from urdfkin.recursion.breakdown import AccelerationBreakdown
@@ -65,10 +66,8 @@ def _print(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> None
             out.print(f"sample {k}")
         noise = 1e-15 * float(abs(parts.terms[k]).max(initial=0.0))
         rows = [*_rows(parts, k), ("sum", "", parts.total[k])]
-        table = make_table(
-            _COLUMNS, ((joint, kind, *_cells(six, noise)) for joint, kind, six in rows), words=2
-        )
-        out.print(table)
+        cells = ((joint, kind, *_cells(six, noise)) for joint, kind, six in rows)
+        print_named(out, _COLUMNS, cells, words=2)
     if len(parts.base) > _SHOWN:
         more = len(parts.base) - _SHOWN
         out.print(f"... and {more} more samples: --format csv, json or npy has them all")

@@ -37,7 +37,8 @@ def command(robot: str, mimic: bool | None, root_joint: str | None, format_: str
 
 
 def _print(robot: Robot) -> None:
-    from urdfkin.cli.output import console, make_table  # noqa: PLC0415  json needs no tables
+    from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
+    from urdfkin.cli.tables import make_table  # noqa: PLC0415
 
     tree, out = robot.tree, console()
     out.print(

@@ -9,14 +9,15 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from urdfkin.cli.arguments import Inputs
+from urdfkin.cli.tables import make_table, print_named
 from urdfkin.errors import SourceError
 
 if TYPE_CHECKING:
@@ -216,15 +217,17 @@ def _print_table(
     for k, value in enumerate(result[:_SHOWN]):
         if len(result) > 1:
             out.print(f"sample {k}")
-        out.print(_table(inputs, quantity, value))
+        if quantity in MATRICES:
+            rows = zip(inputs.robot.rate_names, *value.tolist(), strict=True)
+            print_named(out, ["joint", *SIX], rows)
+        else:
+            out.print(_table(quantity, value))
     if len(result) > _SHOWN:
         out.print(f"... and {len(result) - _SHOWN} more samples: --format csv, json or npy has them all")
     out.print(check_line(certificate), style="green" if certificate.verified else "bold yellow")
 
 
-def _table(inputs: Inputs, quantity: str, value: FloatArray) -> Table:
-    if quantity in MATRICES:
-        return make_table(["joint", *SIX], zip(inputs.robot.rate_names, *value.tolist(), strict=True))
+def _table(quantity: str, value: FloatArray) -> Table:
     if quantity == "placement":
         return make_table(
             ["axis of the world", "x of frame", "y of frame", "z of frame", "position [m]"],
@@ -233,26 +236,3 @@ def _table(inputs: Inputs, quantity: str, value: FloatArray) -> Table:
     linear, angular = ("m/s", "rad/s") if quantity == "velocity" else ("m/s^2", "rad/s^2")
     rows = zip((f"linear [{linear}]", f"angular [{angular}]"), value.reshape(2, 3).tolist(), strict=True)
     return make_table(["", "x", "y", "z"], ((name, *row) for name, row in rows))
-
-
-def make_table(columns: Sequence[str], rows: Iterable[Sequence[str | float]], *, words: int = 1) -> Table:
-    """A plain table: the first `words` columns left, the others right, numbers at six digits.
-
-    What is below rounding of the table's largest number is shown as 0: full precision is for machines.
-    """
-    from rich import box  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
-
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, header_style="bold")
-    for i, column in enumerate(columns):
-        justify: Literal["left", "right"] = "left" if i < words else "right"
-        table.add_column(column, justify=justify, overflow="fold", no_wrap=i >= words)
-    cells = [list(row) for row in rows]
-    largest = max((abs(cell) for row in cells for cell in row if not isinstance(cell, str)), default=0.0)
-    for row in cells:
-        table.add_row(*(cell if isinstance(cell, str) else _number(cell, 1e-15 * largest) for cell in row))
-    return table
-
-
-def _number(value: float, noise: float) -> str:
-    return "0" if abs(value) <= noise else f"{value:.6g}"

@@ -29,7 +29,8 @@ def command(family: str | None, format_: str) -> None:
         json.dump([_as_dict(entry) for entry in entries], sys.stdout, indent=2)
         click.echo()
         return
-    from urdfkin.cli.output import console, make_table  # noqa: PLC0415  json needs no tables
+    from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
+    from urdfkin.cli.tables import make_table  # noqa: PLC0415
 
     rows = ((entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries)
     out = console()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from urdfkin.diagnostics.codes import joints as codes
+from urdfkin.diagnostics.document import Element
 from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.finding import Severity
 from urdfkin.diagnostics.records import AXIAL, JointRecord, LimitRecord, RobotRecord
@@ -15,6 +17,13 @@ SHORTEST, LONGEST = 1e-150, 1e150
 
 #: A length that differs from one by less is rounding of the last digits and worth a note at most.
 ROUNDING = 2e-4
+
+#: What Pinocchio takes for a coordinate axis: Eigen's isApprox compares squares with the square of this.
+_SNAPPED = 1e-12
+
+#: A tilt that turns vectors by no more than the two roundings that `verification.bounds` grants Pinocchio for
+#: an axis, which it does not use for a coordinate axis.
+_TILT = 2.0**-52
 
 
 def check_joints(report: Reporter, robot: RobotRecord) -> None:
@@ -59,6 +68,30 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
             severity=Severity.NOTE if abs(length - 1.0) < ROUNDING else None,
             weight=abs(length - 1.0),
         )
+    _check_snapped(report, joint, joint.axis, joint.axis_element)
+
+
+def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
+    for i in range(3):
+        unit = tuple(float(i == k) for k in range(3))
+        tilt = math.hypot(*(x for k, x in enumerate(axis) if k != i))
+        if tilt > _TILT and _is_approx(axis, unit):
+            written = " ".join(f"{x:g}" for x in unit)
+            report.add(
+                codes.NEARLY_COORDINATE_AXIS,
+                f"the axis is {tilt:.2g} rad off {written}, and Pinocchio takes {written}",
+                element,
+                attribute="xyz",
+                found=_written(joint),
+                remedy=f'write xyz="{written}"; if the tilt is meant, write the vector twice as long',
+                weight=tilt,
+            )
+
+
+def _is_approx(axis: Sequence[float], unit: Sequence[float]) -> bool:
+    """Eigen's `axis.isApprox(unit)`, square by square in its order."""
+    difference = sum((x - e) * (x - e) for x, e in zip(axis, unit, strict=True))
+    return difference <= _SNAPPED * _SNAPPED * min(sum(x * x for x in axis), 1.0)
 
 
 def _check_planar(report: Reporter, joint: JointRecord) -> None:

@@ -16,13 +16,15 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from pathlib import Path
 
 from urdfkin.diagnostics import UrdfError
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.oracle import OracleError
+from urdfkin.origin import Origin
 from urdfkin.recursion.announcing import load_kernels
 from urdfkin.robot import Robot
-from urdfkin.sources import Source, is_xacro, read_source
+from urdfkin.sources import Source, as_word, is_xacro, read_source
 from urdfkin.validation.chunk import SPECIAL, Chunk, ChunkResult, Subject, chunks, run_chunk
 from urdfkin.validation.clock import total
 from urdfkin.validation.isolation import DiedError, run_isolated
@@ -121,22 +123,25 @@ def _subject(
         return Subject.of(robot)
     if is_xacro(robot):
         text = read_source(robot, xacro_args=xacro_args)  # expanded once, here
-        return Subject(text.data, mimic, root_joint, text.source + text.options)
-    source = os.fspath(robot) if isinstance(robot, os.PathLike) else robot
+        return Subject(text.data, Origin(text.source, mimic, root_joint, text.xacro_args))
+    source = as_word(Path(robot)) if isinstance(robot, os.PathLike) else robot
     if isinstance(source, bytes):
-        return Subject(source, mimic, root_joint)
+        return Subject(source, Origin("<bytes>", mimic, root_joint))
     if isinstance(source, str) and source != "-":
-        return Subject(source, mimic, root_joint, stamp=_stamp(source))
+        return _word(source, mimic, root_joint)
     text = read_source(source)  # an open file, or standard input, is read once, here
-    return Subject(text.data, mimic, root_joint, text.source)
+    return Subject(text.data, Origin(text.source, mimic, root_joint))
 
 
-def _stamp(source: str) -> str:
-    """What tells one state of a file from another, so that no worker goes on with what it read before."""
+def _word(source: str, mimic: bool | None, root_joint: str | None) -> Subject:
+    """A path, a name or text."""
     try:
-        return hashlib.sha256(read_source(source).data).hexdigest()
+        text = read_source(source)
     except UrdfkinError:
-        return ""  # the chunk reports what is wrong
+        return Subject(source, Origin(source, mimic, root_joint))  # the chunk reports what is wrong
+    # It tells one state of a file from another, so that no worker goes on with what it read before.
+    stamp = hashlib.sha256(text.data).hexdigest()
+    return Subject(source, Origin(text.source, mimic, root_joint), stamp)
 
 
 class _Run:
@@ -237,7 +242,7 @@ def _refused(subject: Subject, error: UrdfkinError) -> RobotReport:
     verdict = Verdict.NOT_VERIFIED if isinstance(error, OracleError | DiedError) else Verdict.BAD_INPUT
     portrait = _portrait(subject, error)
     name = portrait.model["name"] if portrait.model else subject.label
-    return RobotReport(subject.label, name, verdict, str(error), (), (), {}, 0, 0.0, portrait)
+    return RobotReport(subject.origin, name, verdict, str(error), (), (), {}, 0, 0.0, portrait)
 
 
 def _portrait(subject: Subject, error: UrdfkinError) -> Portrait:
@@ -259,7 +264,7 @@ def _report(subject: Subject, results: Sequence[ChunkResult], samples: int) -> R
     failed = any(tally.failed for tally in tallies.values()) or not portrait.chains_agree
     first = results[0]
     return RobotReport(
-        source=first.source,
+        origin=subject.origin,
         name=first.name,
         verdict=Verdict.DISAGREES if failed else Verdict.VERIFIED,
         reason=None,

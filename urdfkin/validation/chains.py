@@ -17,7 +17,6 @@ from urdfkin.dh.make import dh_table
 from urdfkin.errors import InputError
 from urdfkin.oracle import Oracle
 from urdfkin.robot import Robot
-from urdfkin.sources import source_alone
 from urdfkin.verification.sampling import draw
 from urdfkin.verification.tables import check_table
 
@@ -46,7 +45,7 @@ def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[dict[str, Any], ...]
 
 
 def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
-    entry = catalogue().get(source_alone(robot.source))
+    entry = catalogue().get(robot.source)
     if entry is not None and entry.limbs:
         yield from ((limb, base, tip) for limb, (base, tip) in entry.limbs.items())
         return

@@ -14,9 +14,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from urdfkin.catalogue import catalogue
 from urdfkin.diagnostics import UrdfWarning
 from urdfkin.loading import load
 from urdfkin.oracle import Oracle, OracleError
+from urdfkin.origin import Origin
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.recursion.plan import Plan, make_plan
@@ -43,33 +45,32 @@ class Subject:
 
     Attributes:
         source: What `load` takes: a path, a catalogue name or the URDF itself.
-        mimic: As in `load`.
-        root_joint: As in `load`.
-        words: What names it on a command line, where `source` is the URDF itself.
+        origin: Where it comes from, also where `source` is the URDF itself, and how it was asked for.
         stamp: Differs between two states of the same file.
     """
 
     source: str | bytes
-    mimic: bool | None = None
-    root_joint: str | None = None
-    words: str | None = None
+    origin: Origin
     stamp: str = ""
 
     @classmethod
     def of(cls, robot: Robot) -> Subject:
         """A robot that was loaded already."""
-        return cls(robot.urdf.encode(), robot.mimic, robot.root_joint, robot.source)
+        source = robot.source if robot.source in catalogue() else robot.urdf.encode()
+        return cls(source, robot.origin)
 
     @property
     def label(self) -> str:
         """How to call it while it is not loaded."""
-        return self.words or (self.source if isinstance(self.source, str) else "<bytes>")
+        return self.origin.source
 
     def read(self) -> Robot:
         """The robot; its warnings are in its portrait."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
-            return load(self.source, mimic=self.mimic, root_joint=self.root_joint)
+            robot = load(self.source, mimic=self.origin.mimic, root_joint=self.origin.root_joint)
+        robot.origin = self.origin  # what was read here may be the text of a file
+        return robot
 
     def load(self) -> Robot:
         """The robot, to be checked.
@@ -107,7 +108,6 @@ class Chunk:
 class ChunkResult:
     """What a chunk found, about whom, and how long it took; the first chunk also says what it is."""
 
-    source: str
     name: str
     joints: tuple[str, ...]
     frames: tuple[str, ...]
@@ -142,7 +142,6 @@ def run_chunk(chunk: Chunk) -> ChunkResult:
     seconds = time.perf_counter() - begin
     clock.close(seconds)
     return ChunkResult(
-        source=chunk.subject.words or robot.source,
         name=robot.name,
         joints=robot.joint_names,
         frames=robot.all_frames,

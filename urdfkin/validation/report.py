@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 import platform
+import shlex
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,11 +16,12 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.catalogue import examples
-from urdfkin.sources import options_alone, source_alone
+from urdfkin.origin import Origin
 from urdfkin.validation.clock import Clock
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
 from urdfkin.validation.tally import HISTOGRAM_EDGES, Key, Tally, WorstCase
 from urdfkin.verification.bounds import Quantity
+from urdfkin.verification.replay import replay_line
 
 if TYPE_CHECKING:
     from urdfkin.judge import Judgement
@@ -41,7 +44,7 @@ class RobotReport:
     """One robot.
 
     Attributes:
-        source: The words that name it on a command line.
+        origin: Where it comes from and how it was asked for.
         name: The robot's name in the URDF.
         verdict: What it comes to.
         reason: Why it was not verified or could not be read; None otherwise.
@@ -54,7 +57,7 @@ class RobotReport:
         clock: Where the time went; None if nothing was computed.
     """
 
-    source: str
+    origin: Origin
     name: str
     verdict: Verdict
     reason: str | None
@@ -65,6 +68,11 @@ class RobotReport:
     seconds: float
     portrait: Portrait = NO_PORTRAIT
     clock: Clock | None = None
+
+    @property
+    def source(self) -> str:
+        """Where it comes from: a path, a catalogue name, `-`, `<text>`."""
+        return self.origin.source
 
     @property
     def results(self) -> int:
@@ -88,7 +96,7 @@ class RobotReport:
         """A command that computes a quantity's worst case again."""
         quantity, reference = key
         case = self.tallies[key].case
-        return None if case is None else replay(self.source, quantity, reference, case)
+        return None if case is None else replay(self.origin, quantity, reference, case)
 
     def as_dict(self) -> dict[str, Any]:
         """The robot's part of the JSON document."""
@@ -162,22 +170,14 @@ def _finite(units: float) -> float | None:
     return units if math.isfinite(units) else None
 
 
-def replay(source: str, quantity: Quantity, reference: str, case: WorstCase) -> str:
-    """The command for one case; numbers are written so that they read back exactly."""
+def replay(origin: Origin, quantity: Quantity, reference: str, case: WorstCase) -> str:
+    """The command for one case."""
     command = _COMMANDS.get(quantity, quantity.value)
-    words = ["urdfkin", command, source, "--frame", _quoted(case.frame)]
-    if reference:
-        words += ["--reference", reference]
     given = {"placement": "q", "jacobian": "q", "acceleration": "qva"}.get(command, "qv")
-    for letter in given:
-        words += [f"--{letter}", ",".join(repr(x) for x in getattr(case, letter)) or "neutral"]
-    return " ".join(words)
-
-
-def _quoted(frame: str) -> str:
-    import shlex  # noqa: PLC0415  only for the message
-
-    return shlex.quote(frame)
+    # Joints are compared under their plain names, which a link elsewhere may have too.
+    of_a_joint = quantity is Quantity.SCREWS or quantity.startswith("joint ")
+    frame = f"joint:{case.frame}" if of_a_joint else case.frame
+    return replay_line(origin, command, frame, reference, {letter: getattr(case, letter) for letter in given})
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,12 +204,16 @@ class ValidationReport:
 
     @property
     def command(self) -> str:
-        """The command that repeats the run; the options of its first robot stand for all."""
-        sources = tuple(source_alone(robot.source) for robot in self.robots)
-        named = ["--all"] if sources == examples() else [_quoted(source) for source in sources]
-        options = options_alone(self.robots[0].source) if self.robots else ""
+        """The command that repeats the run.
+
+        Robots with other options have a line of their own, and so has each that came as text: standard input
+        is one file.
+        """
         settings = f"--samples {self.samples} --seed {self.seed}"
-        return " ".join(["urdfkin", "validate", *named, settings, *([options] if options else [])])
+        return "\n".join(
+            f"urdfkin validate {_named(origins)} {settings} {origins[0].options}".rstrip()
+            for origins in _together([robot.origin for robot in self.robots])
+        )
 
     @property
     def passed(self) -> bool:
@@ -248,6 +252,23 @@ class ValidationReport:
             found = next(judgements, None) if robot.tallies else None
             entries.append(robot.as_dict() | {"judge": found.as_dict() if found else None})
         return entries
+
+
+def _together(origins: Sequence[Origin]) -> list[list[Origin]]:
+    """Those that one command can validate: the same options, and standard input once."""
+    groups: dict[tuple[str, int], list[Origin]] = {}
+    texts = Counter[str]()
+    for origin in origins:
+        is_text = origin.again == "-"
+        groups.setdefault((origin.options, texts[origin.options] if is_text else 0), []).append(origin)
+        texts[origin.options] += is_text
+    return list(groups.values())
+
+
+def _named(origins: Sequence[Origin]) -> str:
+    if tuple(origin.source for origin in origins) == examples():
+        return "--all"
+    return shlex.join(origin.again for origin in origins)
 
 
 def versions() -> dict[str, str]:

@@ -129,8 +129,8 @@ class Certificate:
 
     @property
     def verified(self) -> bool:
-        """Whether at least one result was handed out and none of them unchecked."""
-        return bool(self.lines) and not any(line.unchecked for line in self.lines)
+        """Whether results were handed out and every one of them was checked."""
+        return any(line.checked for line in self.lines) and not any(line.unchecked for line in self.lines)
 
     def __str__(self) -> str:
         head = f"{self.robot}, checked by Pinocchio {self.pinocchio}"

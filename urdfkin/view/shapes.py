@@ -14,7 +14,6 @@ import numpy as np
 from urdfkin.catalogue import catalogue
 from urdfkin.robot import Robot
 from urdfkin.rotation import rotation_from_rpy
-from urdfkin.sources import source_alone
 from urdfkin.tree import FloatArray
 from urdfkin.urdf.packages import find_package, split_uri
 
@@ -67,9 +66,8 @@ def shapes(robot: Robot) -> list[Shape]:
 
 def _file_of(robot: Robot) -> Path | None:
     """The file a robot came from, beside which meshes are looked for."""
-    source = source_alone(robot.source)
-    entry = catalogue().get(source)
-    path = entry.path if entry is not None else Path(source)
+    entry = catalogue().get(robot.source)
+    path = entry.path if entry is not None else Path(robot.source)
     try:
         return path if path.is_file() else None
     except OSError:

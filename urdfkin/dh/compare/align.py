@@ -9,13 +9,15 @@ the reference's; the continuous rest is `urdfkin.dh.compare.fit`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from urdfkin.chain import FrameChain
 from urdfkin.dh.elements import along_axis
-from urdfkin.dh.normals import FAR_FEET, NearParallel, Step, step_between
+from urdfkin.dh.normals import FAR_FEET, NEARLY_PARALLEL, NearParallel, Step, step_between
+from urdfkin.dh.row import DHRow
 from urdfkin.dh.table import DHTable
 from urdfkin.tree import FloatArray
 
@@ -48,7 +50,11 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True)
 class _Partial:
-    """The chain up to one joint: its sense, and the way from its DH frame to its URDF frame."""
+    """The chain up to one joint: its sense, and the way from its DH frame to its URDF frame.
+
+    Where the axes before the joint coincide, only the sum of their angles shows; `absorber` is the row whose
+    offset may still change (row 0's stands in the base), and the sign with which it turns the joint's x.
+    """
 
     cost: float
     senses: tuple[int, ...]
@@ -56,6 +62,7 @@ class _Partial:
     phi_in: float
     carry: float
     base: FloatArray
+    absorber: tuple[int, float] | None = None
 
 
 def align(chain: FrameChain, reference: DHTable, count: int = 12) -> list[Alignment]:
@@ -74,7 +81,12 @@ def align(chain: FrameChain, reference: DHTable, count: int = 12) -> list[Alignm
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = sorted(longer, key=lambda partial: partial.cost)[:BEAM]
-    return [_closed(partial, chain, reference) for partial in partials[:count]]
+    # Where axes nearly coincide, many patterns of x are nearly the same: the fit finds from one to another.
+    by_senses: dict[tuple[int, ...], _Partial] = {}
+    for partial in partials:
+        by_senses.setdefault(partial.senses, partial)
+    best = list(by_senses.values())[:count]
+    return [_closed(partial, chain, reference) for partial in best]
 
 
 def _first(sense: int) -> _Partial:
@@ -92,63 +104,88 @@ def _extend(
     partial: _Partial, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_Partial]:
     """Go on from joint i to joint i + 1 (from 0), with both directions of x."""
-    row = reference.rows[i]
+    row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     A = _pose(chain, i + 1, partial.senses[-1], sense)
-    turning = row.kind.turns
-    delta = row.d - partial.carry if turning and i > 0 else 0.0
-    step = _step(A, row.alpha, delta, reach, row.theta - partial.phi_in)
+    delta = row.d - partial.carry if turns[i] and i > 0 else 0.0
     found = []
-    for candidate in (step, step.turned()):
-        theta = partial.phi_in + candidate.phi
-        d = partial.carry + candidate.delta
-        cost = partial.cost + REVERSAL * (sense < 0)
-        cost += reach * (_apart(candidate.alpha, row.alpha) + abs(candidate.beta - row.beta))
+    for step in _steps(A, row, delta, reach, row.theta - partial.phi_in, turns[i] and turns[i + 1]):
+        candidate = _absorbed(partial, step, row.theta) if i > 0 and not turns[i] else partial
+        theta, d = candidate.phi_in + step.phi, candidate.carry + step.delta
+        cost = candidate.cost + REVERSAL * (sense < 0)
+        cost += reach * (_apart(step.alpha, row.alpha) + abs(step.beta - row.beta))
         # A sliding axis has no place of its own: where it is drawn counts only between equals.
-        cost += abs(candidate.a - row.a) * (1.0 if turning and reference.rows[i + 1].kind.turns else 1e-3)
-        if i > 0 and turning and reference.rows[i - 1].kind.turns and reference.rows[i + 1].kind.turns:
-            cost += abs(d - row.d)
-        if not turning and i > 0:
+        cost += abs(step.a - row.a) * (1.0 if turns[i] and turns[i + 1] else 1e-3)
+        if i > 0 and turns[i]:
+            cost += abs(d - row.d) * (1.0 if turns[i - 1] and turns[i + 1] else 1e-3)
+        if not turns[i] and i > 0:
             cost += reach * _apart(theta, row.theta)
-        offset = math.remainder(theta - row.theta, 2.0 * math.pi) if turning else d - row.d
-        base = partial.base
+        offset = math.remainder(theta - row.theta, 2.0 * math.pi) if turns[i] else d - row.d
+        base = candidate.base
         if i == 0:  # the first row's offset goes into the base
-            base = along_axis(candidate.phi - row.theta, candidate.delta - row.d)
-            offset = 0.0
+            base, offset = along_axis(step.phi - row.theta, step.delta - row.d), 0.0
         found.append(
             _Partial(
                 cost,
-                (*partial.senses, sense),
-                (*partial.offsets, offset),
-                candidate.phi_next,
-                candidate.delta_next,
+                (*candidate.senses, sense),
+                (*candidate.offsets, offset),
+                step.phi_next,
+                step.delta_next,
                 base,
+                _absorber(candidate, step, i, turns[i]),
             )
         )
     return found
 
 
-def _step(A: FloatArray, alpha: float, delta: float, reach: float, phi_free: float) -> Step:
-    """A pair taken apart the way the reference's is: by the normal plane where that one is parallel."""
+def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, float] | None:
+    """The row before joint i + 1 whose offset turns its x and shows nowhere else, after a step."""
+    if not step.free:
+        return None
+    sign = math.copysign(1.0, math.cos(step.alpha))
+    if turns or i == 0:
+        return i, sign
+    return None if partial.absorber is None else (partial.absorber[0], sign * partial.absorber[1])
+
+
+def _absorbed(partial: _Partial, step: Step, theta: float) -> _Partial:
+    """The chain with a sliding joint's theta as it is in the table, if an offset before it can do that."""
+    if partial.absorber is None:
+        return partial
+    excess = partial.phi_in + step.phi - theta
+    index, sign = partial.absorber
+    offsets, base = list(partial.offsets), partial.base
+    if index == 0:
+        base = base @ along_axis(sign * excess, 0.0)
+    else:
+        offsets[index] += sign * excess
+    return replace(partial, phi_in=partial.phi_in - excess, offsets=tuple(offsets), base=base)
+
+
+def _steps(
+    A: FloatArray, row: DHRow, delta: float, reach: float, phi_free: float, placed: bool
+) -> Iterator[Step]:
+    """A pair taken apart in the ways the reference's may be, with both directions of x.
+
+    Axes that are nearly parallel in both are cut by the normal plane too, at the reference's own d. An offset
+    below a hundredth of a millimetre, or of an axis that slides and has no place (not `placed`), counts as
+    none: x is free there.
+    """
+    steps = []
     sine = math.hypot(A[0, 2], A[1, 2])
-    if abs(math.sin(alpha)) < FAR_FEET and sine < FAR_FEET:
+    near = abs(math.sin(row.alpha)) < FAR_FEET and sine < FAR_FEET
+    if not near or (placed and row.beta == 0.0):
+        steps.append(step_between(A, reach, NearParallel.STRICT, phi_free))
+    if near:
         lifted = A.copy()
         lifted[2, 3] -= delta
-        # Any lateral offset below a hundredth of a millimetre counts as none: x is free there.
-        if math.hypot(lifted[0, 3], lifted[1, 3]) < 1e-5:
+        if math.hypot(lifted[0, 3], lifted[1, 3]) < 1e-5 or not placed:
             lifted[:2, 3] = 0.0
-        # Feet count as far, so that a pair that is not exactly parallel is cut by the normal plane.
-        step = step_between(lifted, reach if sine < 1e-2 else 0.0, NearParallel.HAYATI, phi_free)
-        return Step(
-            step.phi,
-            step.delta + delta,
-            step.a,
-            step.alpha,
-            step.beta,
-            step.phi_next,
-            step.delta_next,
-            step.free,
-        )
-    return step_between(A, reach, NearParallel.STRICT, phi_free)
+        # Without a reach every foot is far, and a pair that is not exactly parallel is cut by the plane.
+        cut = step_between(lifted, reach if sine < NEARLY_PARALLEL else 0.0, NearParallel.HAYATI, phi_free)
+        steps.append(replace(cut, delta=cut.delta + delta))
+    for step in steps:
+        yield step
+        yield replace(step.turned(), free=step.free)
 
 
 def _closed(best: _Partial, chain: FrameChain, reference: DHTable) -> Alignment:

@@ -9,7 +9,8 @@ import numpy as np
 
 from urdfkin.chain import FrameChain
 from urdfkin.dh.compare.align import Alignment, align
-from urdfkin.dh.compare.fit import CELLS, Model, columns, fit_cells, fit_freedoms
+from urdfkin.dh.compare.fit import CELLS, Model, columns, fit_cells
+from urdfkin.dh.compare.freedoms import fit_freedoms
 from urdfkin.dh.convert import to_standard
 from urdfkin.dh.elements import EPS
 from urdfkin.dh.row import Convention
@@ -144,27 +145,37 @@ def _best_fit(
     chain: FrameChain, standard: DHTable, values: FloatArray, wanted: FloatArray, scale: float
 ) -> tuple[Alignment, Model]:
     """Of the likely sign patterns, the one whose freedoms fit best."""
+
+    def size(model: Model) -> float:
+        metres, radians = _apart(model, values, wanted)
+        return metres + scale * radians
+
     best: tuple[float, Alignment, Model] | None = None
     for aligned in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4))):
-        start = Model(
-            np.array([(row.theta, row.d, row.a, row.alpha, row.beta) for row in standard.rows]),
-            np.array([float(row.kind.turns) for row in standard.rows]),
-            np.array(aligned.senses, dtype=np.float64),
-            aligned.base,
-            aligned.tool,
-        )
-        for i, offset in enumerate(aligned.offsets):
-            start.cells[i, 0 if start.turns[i] else 1] += offset
-        fitted = fit_freedoms(start, values, wanted, scale)
-        metres, radians = _apart(fitted, values, wanted)
-        size = metres + scale * radians
-        if best is None or size < 0.5 * best[0]:
-            best = (size, aligned, fitted)
-        if size <= 1e-3 * scale:  # another pattern of signs would be off by far more
+        start = _start(standard, aligned)
+        # Least squares make the sum small. The worst sample is what counts: there the start may be better.
+        model = min(fit_freedoms(start, values, wanted, scale), start, key=size)
+        if best is None or size(model) < 0.5 * best[0]:
+            best = (size(model), aligned, model)
+        if best[0] <= 1e-12 * scale:
             break
     if best is None:
         raise InputError("nothing to compare", where=chain.robot)
     return best[1], best[2]
+
+
+def _start(standard: DHTable, aligned: Alignment) -> Model:
+    """The reference with the freedoms that the alignment found."""
+    start = Model(
+        np.array([(row.theta, row.d, row.a, row.alpha, row.beta) for row in standard.rows]),
+        np.array([float(row.kind.turns) for row in standard.rows]),
+        np.array(aligned.senses, dtype=np.float64),
+        aligned.base,
+        aligned.tool,
+    )
+    for i, offset in enumerate(aligned.offsets):
+        start.cells[i, 0 if start.turns[i] else 1] += offset
+    return start
 
 
 def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:

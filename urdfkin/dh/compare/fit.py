@@ -40,6 +40,27 @@ class Model:
     base: FloatArray
     tool: FloatArray
 
+    @property
+    def first(self) -> FloatArray:
+        """(4, 4) pose in the base of the frame about whose z the first turning joint turns, others at 0."""
+        turning = np.flatnonzero(self.turns)
+        return self._rows(0, int(turning[0]) if turning.size else 0)
+
+    @property
+    def last(self) -> FloatArray:
+        """(4, 4) pose of the tip in the frame about whose z the last turning joint turned, others at 0."""
+        turning, n = np.flatnonzero(self.turns), len(self.cells)
+        k = int(turning[-1]) if turning.size else n - 1
+        _, _, a, alpha, beta = self.cells[k]
+        step = between_axes(a, alpha) @ between_axes(0.0, 0.0, beta)
+        return np.asarray(step @ self._rows(k + 1, n) @ self.tool)
+
+    def _rows(self, begin: int, end: int) -> FloatArray:
+        T = np.eye(4)
+        for theta, d, a, alpha, beta in self.cells[begin:end]:
+            T = T @ along_axis(theta, d) @ between_axes(a, alpha) @ between_axes(0.0, 0.0, beta)
+        return T
+
     def walk(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Tip poses (s, 4, 4), then the lines and kinds of motion of every cell.
 
@@ -78,7 +99,8 @@ def columns(model: Model, values: FloatArray, scale: float) -> tuple[FloatArray,
     n = len(model.cells)
     cells = np.moveaxis(cells.reshape(len(values), 5 * n, 6), 1, 2).reshape(-1, 5 * n)
     own = [5 * i + (0 if model.turns[i] else 1) for i in range(n)]
-    ends = [_end(poses, np.broadcast_to(model.base, poses.shape), scale), _end(poses, poses, scale)]
+    first = np.broadcast_to(model.base @ model.first, poses.shape)
+    ends = [_end(poses, first, scale), _end(poses, poses @ np.linalg.inv(model.last), scale)]
     return poses, np.hstack([*ends, cells[:, own]]), cells
 
 
@@ -100,17 +122,8 @@ def errors(poses: FloatArray, wanted: FloatArray, scale: float) -> FloatArray:
     return np.concatenate([wanted[:, :3, 3] - poses[:, :3, 3], scale * turn], axis=-1).ravel()
 
 
-def fit_freedoms(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> Model:
-    """The base, tool and offsets with which the table, its cells untouched, comes closest."""
-    return _descend(model, values, wanted, scale, with_cells=False)
-
-
 def fit_cells(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> Model:
     """The smallest and fewest changes of cells with which the table is the URDF."""
-    return _descend(model, values, wanted, scale, with_cells=True)
-
-
-def _descend(model: Model, values: FloatArray, wanted: FloatArray, scale: float, with_cells: bool) -> Model:
     start, best, best_size = model, model, np.inf
     for _ in range(_ROUNDS):
         poses, freedoms, cells = columns(model, values, scale)
@@ -120,13 +133,11 @@ def _descend(model: Model, values: FloatArray, wanted: FloatArray, scale: float,
             best, best_size = model, size
         elif size > 2.0 * best_size or size <= 1e-14 * scale * len(error):
             break
-        change = np.zeros(cells.shape[1])
-        if with_cells:
-            change = _sparse(model, start, freedoms, cells, error, scale)
+        change = _sparse(model, start, freedoms, cells, error, scale)
         # Axes that nearly coincide let two offsets grow against each other for nothing: cut those off.
         free = np.linalg.lstsq(freedoms, error - cells @ change, rcond=1e-8)[0]
         shorten = min(1.0, 0.5 * scale / max(float(np.abs(free).max()), 1e-300))
-        model = _moved(model, np.asarray(free * shorten, np.float64), change * shorten, scale)
+        model = moved(model, np.asarray(free * shorten, np.float64), scale, change * shorten)
     return best
 
 
@@ -150,15 +161,18 @@ def _sparse(
     return np.asarray(total - so_far, np.float64)
 
 
-def _moved(model: Model, free: FloatArray, change: FloatArray, scale: float) -> Model:
-    """The model after small changes, all counted in metres."""
+def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | None = None) -> Model:
+    """The model after small changes of its freedoms and cells, all counted in metres."""
     per_cell = np.array([1.0 / scale, 1.0, 1.0, 1.0 / scale, 1.0 / scale])
-    cells = model.cells + change.reshape(-1, 5) * per_cell
+    cells = model.cells.copy() if change is None else model.cells + change.reshape(-1, 5) * per_cell
     for i, own in enumerate(free[12:]):
         k = 0 if model.turns[i] else 1
         cells[i, k] += own * per_cell[k]
-    base = _pushed(model.base, free[:6], scale)
-    return replace(model, cells=cells, base=base, tool=_pushed(model.tool, free[6:12], scale))
+    # Base and tool are pushed in the axes about which the joints next to them turn: a turn that they share
+    # with these joints goes round in a circle then, and not off at a tangent.
+    base = _pushed(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
+    tool = np.linalg.inv(model.last) @ _pushed(np.eye(4), free[6:12], scale) @ model.last
+    return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
 
 
 def _pushed(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:

@@ -1,0 +1,141 @@
+"""Pinocchio takes an axis within 1e-12 of x, y or z for that one: the boundary, and what follows."""
+
+import itertools
+import warnings
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import urdfkin
+from urdfkin.checking import check
+from urdfkin.robot import Robot
+from urdfkin.tree import FloatArray
+from urdfkin.verification.bounds import EPS
+
+KINDS = {"revolute": "R", "continuous": "RUB", "prismatic": "P"}
+AXES = np.eye(3)
+
+
+def text(kind: str, *axes: FloatArray) -> str:
+    """A chain whose joints have the axes; every number is written so that it reads back exactly."""
+    limit = "" if kind == "continuous" else '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
+    joints = "".join(
+        f'<link name="l{i + 1}"/><joint name="j{i}" type="{kind}"><parent link="l{i}"/>'
+        f'<child link="l{i + 1}"/><origin xyz="0.3 0.2 0.1" rpy="0.1 0.2 0.3"/>'
+        f'<axis xyz="{" ".join(repr(float(x)) for x in axis)}"/>{limit}</joint>'
+        for i, axis in enumerate(axes)
+    )
+    return f'<robot name="r"><link name="l0"/>{joints}</robot>'
+
+
+def snaps(kind: str, axis: FloatArray) -> bool:
+    """Whether Pinocchio's model has a joint for x, y or z."""
+    name = pin.buildModelFromXML(text(kind, axis)).joints[1].shortname().removeprefix("JointModel")
+    return name in [KINDS[kind] + letter for letter in "XYZ"]
+
+
+def found(kind: str, axis: FloatArray) -> bool:
+    return "URDF514" in [finding.code for finding in check(text(kind, axis).encode())]
+
+
+def loaded(document: str) -> Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(document)
+
+
+def near(size: float, seed: int) -> FloatArray:
+    """A unit vector's coordinates, tilted off x, y or z by `size` in a random direction."""
+    rng = np.random.default_rng(seed)
+    axis: FloatArray = AXES[seed % 3].copy()
+    off = rng.normal(size=3)
+    off[seed % 3] = 0.0
+    axis += size * off / np.linalg.norm(off)
+    return axis
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_finding_is_there_where_pinocchio_snaps_and_the_tilt_is_more_than_rounding(kind: str) -> None:
+    sizes = [0.0, 5e-324, 1e-200, 6e-17, 0.99 * EPS, 1.01 * EPS, 1e-15, 1e-13, 2e-12, 1e-9]
+    sizes += [1e-12 * (1.0 + side * distance) for side in (-1, 1) for distance in (1e-3, 1e-6, 1e-9)]
+    for size, seed in itertools.product(sizes, range(3)):
+        axis = near(size, seed)
+        tilt = np.linalg.norm(np.delete(axis, seed % 3))
+        assert snaps(kind, axis) == (tilt <= 1e-12), (axis, tilt)
+        assert found(kind, axis) == (snaps(kind, axis) and tilt > EPS), (axis, tilt)
+
+
+def test_on_the_boundary_itself_the_last_bit_decides_and_is_the_same_one() -> None:
+    for seed in range(60):
+        axis = near(1e-12, seed)
+        axis[seed % 3] += (seed % 5 - 2) * EPS
+        assert found("revolute", axis) == snaps("revolute", axis), axis
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pinocchio_compares_the_vector_as_it_is_written_and_so_does_the_finding(kind: str) -> None:
+    for length in (
+        1.0 - 2e-12,
+        1.0 - 0.9e-12,
+        1.0 - 5e-13,
+        1.0 + 5e-13,
+        1.0 + 0.9e-12,
+        1.0 + 2e-12,
+        0.5,
+        2.0,
+    ):
+        straight, tilted = length * AXES[1], length * AXES[1] + [0.0, 0.0, 4e-13]
+        assert snaps(kind, straight) == (abs(length - 1.0) < 1e-12)
+        assert not found(kind, straight)
+        assert found(kind, tilted) == snaps(kind, tilted) == (np.hypot(length - 1.0, 4e-13) < 1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_directions_against_an_axis_are_taken_as_they_are(kind: str) -> None:
+    for axis in -AXES:
+        tilted = axis + 1e-13 * np.roll(axis, 1)
+        assert not snaps(kind, axis)
+        assert not snaps(kind, tilted)
+        assert not found(kind, tilted)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(3))
+def test_without_the_finding_the_two_would_disagree_and_urdfkin_is_the_one_that_read_the_file(
+    kind: str, seed: int
+) -> None:
+    tilt = 1e-12
+    robot = loaded(text(kind, near(0.99 * tilt, seed)))
+    robot.unverifiable = None
+    with pytest.raises(urdfkin.VerificationError) as caught:
+        robot.placement([2.0], "l1")
+    ours, theirs = caught.value.ours, caught.value.theirs
+    assert 0.1 * tilt < np.abs(ours - theirs).max() < 3.0 * tilt
+    # Twice as long, the same direction is no longer taken for a coordinate axis: the two agree with ours.
+    doubled = loaded(text(kind, 2.0 * near(0.99 * tilt, seed)))
+    assert np.abs(doubled.placement([2.0], "l1") - ours).max() < 4.0 * EPS
+    assert doubled.certificate().verified
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_results_are_handed_out_and_said_not_to_be_verified(kind: str) -> None:
+    with pytest.warns(urdfkin.UrdfWarning, match="URDF514"):
+        robot = urdfkin.load(text(kind, near(1e-13, 1)))
+    with pytest.warns(urdfkin.NotVerifiedWarning, match="reads another robot"):
+        robot.jacobian([0.4], "l1")
+    assert not robot.certificate().verified
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_tilt_of_one_eps_stays_within_the_bound_in_every_joint(kind: str) -> None:
+    # All tilts to one side, all joints far from zero: what is not seen adds up as well as it can.
+    tilted = [AXES[2] + [EPS, 0.0, 0.0]] * 30
+    robot = loaded(text(kind, *tilted))
+    q, v = robot.sample(50, 1), robot.sample(50, 2)
+    robot.placement(q, "l30")
+    robot.jacobian(q, "l30", "local")
+    robot.acceleration(q, v, v, "l30", "world")
+    certificate = robot.certificate()
+    assert certificate.verified
+    assert all(line.share < 0.1 for line in certificate.lines)

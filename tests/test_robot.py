@@ -1,0 +1,369 @@
+"""A robot hands out what was checked, refuses clearly, and says how to compute it again."""
+
+import io
+import pickle
+import shlex
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as command
+from tests.robots.odd_urdfs import urdf_of
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.oracle import Oracle
+from urdfkin.recursion.base import BaseMotion
+from urdfkin.reference import Reference
+from urdfkin.robot import Robot
+from urdfkin.rotation import exp_rotation
+from urdfkin.verification import bounds
+from urdfkin.verification.bounds import Quantity
+
+
+@pytest.fixture
+def panda() -> Robot:
+    return urdfkin.load("panda")
+
+
+@pytest.fixture
+def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bound so tight that rounding breaks it: the way to a VerificationError without a wrong result."""
+    monkeypatch.setattr(bounds, "ROUNDINGS", 1e-9)
+
+
+def disagreement(robot: Robot, quantity: str, **base: BaseMotion) -> urdfkin.VerificationError:
+    """The error of one call on a batch (2, 3), in the local reference where there is one."""
+    q = robot.sample(6, 1).reshape(2, 3, robot.nq)
+    v, a = np.random.default_rng(2).normal(size=(2, 2, 3, robot.nv))
+    inputs = {"velocity": (q, v), "jacobian_rate": (q, v), "acceleration": (q, v, a)}.get(quantity, (q,))
+    reference = () if quantity == "placement" else ("local",)
+    with pytest.raises(urdfkin.VerificationError) as caught:
+        getattr(robot, quantity)(*inputs, robot.tip_frame, *reference, **base)
+    return caught.value
+
+
+@pytest.mark.usefixtures("no_room")
+def test_a_verification_error_says_what_where_by_how_much_and_what_was_allowed(panda: Robot) -> None:
+    error = disagreement(panda, "acceleration")
+    assert error.is_disagreement
+    assert (error.quantity, error.frame, error.reference) == (
+        Quantity.ACCELERATION,
+        "panda_hand_tcp",
+        "LOCAL",
+    )
+    assert len(error.index) == 2
+    assert error.ours.shape == error.theirs.shape == error.bound.shape == (6,)
+    assert (np.abs(error.ours - error.theirs) > error.bound).any()
+    assert "the acceleration of panda_hand_tcp (LOCAL) disagrees with Pinocchio's" in str(error)
+    assert f"sample {list(error.index)}" in str(error)
+    copy = pickle.loads(pickle.dumps(error))
+    assert str(copy) == str(error)
+    assert (copy.ours == error.ours).all()
+    assert copy.reproduce == error.reproduce
+
+
+@pytest.mark.parametrize("quantity", ["placement", "velocity", "jacobian", "jacobian_rate", "acceleration"])
+@pytest.mark.parametrize("root_joint", [None, "floating"])
+@pytest.mark.usefixtures("no_room")
+def test_its_line_computes_the_case_again(
+    quantity: str, root_joint: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    error = disagreement(urdfkin.load("panda", root_joint=root_joint, mimic=False), quantity)
+    words = shlex.split(error.reproduce)
+    assert words[:3] == ["urdfkin", quantity.replace("_", "-"), "panda"]
+    again = command(*words[1:])
+    assert again.code == 1
+    assert f"the {error.quantity} of panda_hand_tcp" in again.err
+    monkeypatch.undo()
+    result = command(*words[1:], "--format", "json")
+    assert result.code == 0
+    # In lanes and alone the last digits may differ; the case is the same one.
+    assert np.abs(np.array(result.data["result"][0]) - error.ours).max() < 1e-12
+
+
+@pytest.mark.usefixtures("no_room")
+def test_the_line_of_a_text_takes_it_from_standard_input_and_that_of_a_file_quotes_its_name(
+    tmp_path: Path,
+) -> None:
+    text = urdf_of("odd_names")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        words = shlex.split(disagreement(urdfkin.load(text), "jacobian").reproduce)
+        assert command(*words[1:], stdin=text).code == 1
+        path = tmp_path / "my robot's.urdf"
+        path.write_text(text, encoding="utf-8")
+        words = shlex.split(disagreement(urdfkin.load(path), "jacobian").reproduce)
+        assert words[2] == str(path)
+        assert command(*words[1:]).code == 1
+
+
+@pytest.mark.parametrize("quantity", ["placement", "velocity", "jacobian", "jacobian_rate", "acceleration"])
+@pytest.mark.parametrize("batch", [(), (2, 3)])
+@pytest.mark.usefixtures("no_room")
+def test_on_a_moving_base_the_line_is_python(panda: Robot, quantity: str, batch: tuple[int, ...]) -> None:
+    generator = np.random.default_rng(3)
+    T = np.tile(np.eye(4), (*batch, 1, 1))
+    T[..., :3, :3] = exp_rotation(generator.normal(size=(*batch, 3)))
+    error = disagreement(panda, quantity, base=BaseMotion(T, *generator.normal(size=(2, *batch, 6))))
+    with pytest.raises(urdfkin.VerificationError) as again:
+        eval(error.reproduce, {"urdfkin": urdfkin})
+    assert again.value.quantity == error.quantity
+    assert np.abs(again.value.ours - error.ours).max() < 1e-12
+
+
+def test_the_certificate_counts_what_was_checked_and_says_what_was_not(panda: Robot) -> None:
+    assert not panda.certificate().verified
+    q = panda.sample(5, 1)
+    panda.jacobian(q, "panda_hand")
+    panda.placements(q[:2], ["panda_hand", "panda_link3", "panda_link4"])
+    certificate = panda.certificate()
+    assert certificate.verified
+    assert {line.quantity: line.checked for line in certificate.lines} == {
+        Quantity.JACOBIAN: 5,
+        Quantity.PLACEMENT: 6,
+    }
+    assert all(0.0 < line.worst < 100.0 and 0.0 < line.share < 1.0 for line in certificate.lines)
+    assert certificate.pinocchio.startswith("4.")
+    panda.velocity(q, q, "panda_hand", verify=False)
+    certificate = panda.certificate()
+    assert not certificate.verified
+    assert certificate.not_verified == ("verify=False was asked for",)
+    assert "velocity: 0 checked" in str(certificate)
+    assert "5 not checked" in str(certificate)
+
+
+def test_an_empty_batch_certifies_nothing(panda: Robot) -> None:
+    panda.jacobian(np.zeros((0, 8)), "panda_hand")
+    assert not panda.certificate().verified
+
+
+def test_a_call_may_ask_for_the_check_that_the_robot_leaves_out() -> None:
+    robot = urdfkin.load("ur5", verify=False)
+    robot.jacobian(robot.neutral(), "tool0", verify=True)
+    assert robot.certificate().verified
+    robot.jacobian(robot.neutral(), "tool0")
+    assert not robot.certificate().verified
+
+
+@pytest.mark.parametrize(
+    ("inside", "reason"),
+    [
+        ('<axis/><limit lower="-1" upper="1" effort="1" velocity="1"/>', "reads another robot"),
+        ('<limit lower="-1" upper="1" effort="1" velocity="-1"/>', "refuses the file"),
+    ],
+)
+def test_what_pinocchio_cannot_check_is_handed_out_with_a_warning_and_never_as_verified(
+    inside: str, reason: str
+) -> None:
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute">'
+        f'<parent link="a"/><child link="b"/>{inside}</joint></robot>'
+    )
+    with pytest.warns(urdfkin.UrdfWarning):
+        robot = urdfkin.load(text)
+    with pytest.warns(urdfkin.NotVerifiedWarning, match=f"not verified: Pinocchio {reason}"):
+        assert robot.jacobian([0.3], "b")[3:, 0].tolist() == [1.0, 0.0, 0.0]
+    certificate = robot.certificate()
+    assert not certificate.verified
+    assert reason in certificate.not_verified[0]
+
+
+def test_a_result_that_is_no_number_is_a_disagreement(monkeypatch: pytest.MonkeyPatch, panda: Robot) -> None:
+    from urdfkin.recursion import evaluate  # noqa: PLC0415
+
+    monkeypatch.setattr(evaluate, "jacobians", lambda plan, q, *_, **__: np.full((len(q), 1, 6, 8), np.nan))
+    with pytest.raises(urdfkin.VerificationError, match="disagrees"):
+        panda.jacobian(panda.neutral(), "panda_hand")
+
+
+INPUTS = {
+    "text": "abc",
+    "complex numbers": np.ones(8) * 1j,
+    "a ragged list": [[1.0], [1.0, 2.0]],
+    "none": None,
+    "dates": np.zeros(8, dtype="datetime64[s]"),
+    "strings of numbers": ["0"] * 8,
+}
+
+
+@pytest.mark.parametrize("kind", INPUTS)
+def test_what_is_no_numbers_is_refused(panda: Robot, kind: str) -> None:
+    value = INPUTS[kind]
+    with pytest.raises(InputError, match=r"q must be real numbers|q needs 8 numbers"):
+        panda.placement(value, "panda_hand")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"v must be real numbers|v needs 8 numbers"):
+        panda.velocity(np.zeros(8), value, "panda_hand")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"q must be real numbers|q must be finite|wrong length"):
+        panda.from_pinocchio(value)  # type: ignore[arg-type]
+
+
+def test_a_wrong_length_names_the_joints(panda: Robot) -> None:
+    with pytest.raises(InputError, match=r"q needs 8 numbers for panda: panda_joint1, .*found shape \(7,\)"):
+        panda.placement(np.zeros(7), "panda_hand")
+    with pytest.raises(InputError, match=r"a needs 8 numbers for panda: panda_joint1"):
+        panda.acceleration(np.zeros(8), np.zeros(8), np.zeros((3, 9)), "panda_hand")
+    with pytest.raises(InputError, match="none, nothing moves"):
+        urdfkin.load(urdf_of("single_link")).placement([1.0], "base")
+    with pytest.raises(InputError, match="wrong length"):
+        panda.from_pinocchio(np.zeros(8))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_number_that_is_not_finite_is_found_and_its_joint_named(panda: Robot, bad: float) -> None:
+    q = panda.sample(4, 1)
+    q[2, 5] = bad
+    with pytest.raises(InputError, match=f"panda_joint6: q must be finite: found {bad}"):
+        panda.jacobian(q, "panda_hand")
+    with pytest.raises(InputError, match="finite"):
+        panda.from_pinocchio(np.full(9, bad))
+
+
+def test_batches_that_do_not_fit_are_refused_with_their_shapes(panda: Robot) -> None:
+    with pytest.raises(InputError, match=r"do not fit: found \(2,\), \(3,\)"):
+        panda.velocity(np.zeros((2, 8)), np.zeros((3, 8)), "panda_hand")
+    base = BaseMotion(velocity=np.zeros((4, 6)))
+    with pytest.raises(InputError, match=r"do not fit: found \(2,\), \(4,\)"):
+        panda.placement(np.zeros((2, 8)), "panda_hand", base=base)
+
+
+def test_a_frame_that_does_not_exist_offers_the_nearest_and_one_that_is_no_name_is_refused(
+    panda: Robot,
+) -> None:
+    with pytest.raises(UnknownNameError, match="unknown frame 'hand'; did you mean panda_hand") as caught:
+        panda.jacobian(panda.neutral(), "hand")
+    assert caught.value.nearest[0] == "panda_hand"
+    for frame in (3, None, b"panda_hand", ["panda_hand"]):
+        with pytest.raises(InputError, match="a frame is the name of a link or joint"):
+            panda.jacobian(panda.neutral(), frame)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"frames are a list of names: found 'panda_hand'"):
+        panda.jacobians(panda.neutral(), "panda_hand")
+
+
+def test_a_reference_is_a_member_or_its_name_in_either_case(panda: Robot) -> None:
+    q, v = panda.sample(2, 1)
+    expected = panda.velocity(q, v, "panda_hand", Reference.LOCAL)
+    for name in ("local", "LOCAL", "Local"):
+        assert (panda.velocity(q, v, "panda_hand", name) == expected).all()
+    for wrong in ("global", 0, None, True):
+        with pytest.raises(UnknownNameError, match="unknown reference"):
+            panda.velocity(q, v, "panda_hand", wrong)  # type: ignore[arg-type]
+
+
+def test_a_quaternion_must_have_norm_one_to_a_millionth_and_is_then_made_exact() -> None:
+    robot = urdfkin.load("ur5", root_joint="floating")
+    q = robot.sample(1, 1)[0]
+    exact = robot.placement(q, "tool0")
+    q[3:7] *= 1.0 + 5e-7
+    assert np.abs(robot.placement(q, "tool0") - exact).max() < 1e-14
+    for factor in (0.0, 1.0 + 1e-5, -2.0):
+        wrong = q.copy()
+        wrong[3:7] *= factor
+        with pytest.raises(InputError, match="the quaternion of joint root_joint must be a unit quaternion"):
+            robot.placement(wrong, "tool0")
+
+
+def test_a_base_that_is_none_is_refused() -> None:
+    reflection = np.diag([1.0, 1.0, -1.0, 1.0])
+    for words, message in (
+        ({"placement": 2.0 * np.eye(4)}, "last row"),
+        ({"placement": reflection}, "rotation"),
+        ({"placement": np.eye(3)}, r"\(\.\.\., 4, 4\)"),
+        ({"velocity": [1.0, 2.0]}, r"\(\.\.\., 6\)"),
+        ({"velocity": "fast"}, "real numbers"),
+        ({"acceleration": [0, 0, 0, 0, 0, np.nan]}, "finite"),
+        ({"velocity": np.zeros((2, 6)), "acceleration": np.zeros((3, 6))}, "do not fit"),
+    ):
+        with pytest.raises(InputError, match=message):
+            BaseMotion(**words)
+    with pytest.raises(InputError, match="base is a BaseMotion or None: found dict"):
+        urdfkin.load("ur5").placement(np.zeros(6), "tool0", base={})  # type: ignore[arg-type]
+
+
+def test_a_base_is_read_only_and_comes_back_from_a_pickle() -> None:
+    base = BaseMotion(velocity=np.arange(6.0))
+    for motion in (base, pickle.loads(pickle.dumps(base))):
+        assert (motion.velocity == np.arange(6.0)).all()
+        with pytest.raises(ValueError, match="read-only"):
+            motion.velocity[0] = 1.0
+
+
+def test_errors_come_back_from_a_pickle_as_they_were() -> None:
+    errors = []
+    for call in (
+        lambda: urdfkin.load("pnda"),
+        lambda: urdfkin.load("/nowhere/x.urdf"),
+        lambda: urdfkin.load("<robot/>"),
+        lambda: urdfkin.load("ur5").placement(np.zeros(5), "tool0"),
+    ):
+        with pytest.raises(urdfkin.UrdfkinError) as caught:
+            call()
+        errors.append(caught.value)
+    for error in errors:
+        copy = pickle.loads(pickle.dumps(error))
+        assert type(copy) is type(error)
+        assert str(copy) == str(error)
+        assert copy.__dict__.keys() == error.__dict__.keys()
+
+
+def test_sources_of_every_kind_give_the_same_robot(panda: Robot, tmp_path: Path) -> None:
+    path = tmp_path / "panda.urdf"
+    path.write_text(panda.urdf, encoding="utf-8")
+    q, expected = panda.sample(2, 1), None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        for source in (
+            path, str(path), panda.urdf, panda.urdf.encode(), io.StringIO(panda.urdf),
+            io.BytesIO(panda.urdf.encode()), panda.urdf.encode("utf-8-sig"),
+            "\n  " + panda.urdf.partition("?>")[2],
+        ):  # fmt: skip
+            result = urdfkin.load(source).jacobian(q, "panda_hand")
+            expected = result if expected is None else expected
+            assert (result == expected).all()
+    with pytest.raises(InputError, match="found int"):
+        urdfkin.load(3)  # type: ignore[arg-type]
+
+
+def test_a_sample_lies_within_limits_and_repeats_itself(panda: Robot) -> None:
+    q = panda.sample(500, 4)
+    assert panda.limit_violations(q) == []
+    assert (q == panda.sample(500, 4)).all()
+    assert (q != panda.sample(500, 5)).all()
+    assert panda.limit_violations(panda.neutral()) == ["joint panda_joint4: 0 is outside [-3.0718, -0.0698]"]
+    with pytest.raises(InputError, match="sample needs n >= 0"):
+        panda.sample(-1)
+
+
+def test_the_oracle_keeps_out_of_what_would_end_the_process() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        robot = urdfkin.load(snake(4000, fixed=True))
+        assert robot.placement([0.1], robot.tip_frame).shape == (4, 4)
+        assert robot.certificate().verified
+        robot = urdfkin.load(snake(330, fixed=False))
+    with pytest.warns(urdfkin.NotVerifiedWarning, match="memory grows with the cube of the rates"):
+        robot.placement(robot.neutral(), robot.tip_frame)
+
+
+def snake(links: int, *, fixed: bool) -> str:
+    """A chain whose first joint moves, and whose others do unless they are fixed."""
+    kinds = ["continuous"] + ["fixed" if fixed else "continuous"] * (links - 1)
+    joints = "".join(
+        f'<link name="l{i + 1}"/><joint name="j{i}" type="{kind}"><parent link="l{i}"/>'
+        f'<child link="l{i + 1}"/><origin xyz="0.01 0 0"/><axis xyz="0 0 1"/></joint>'
+        for i, kind in enumerate(kinds)
+    )
+    return f'<robot name="snake"><link name="l0"/>{joints}</robot>'
+
+
+def test_the_oracle_reads_names_and_layout_from_the_tree_and_nothing_else(panda: Robot) -> None:
+    # Whatever the tree says of places, axes and limits, the answer is the text's.
+    other = urdfkin.load("panda")
+    for joint in other.tree.joints:
+        object.__setattr__(joint, "T_parent_joint", np.eye(4))
+        object.__setattr__(joint, "axis", np.array([1.0, 0.0, 0.0]))
+    q = panda.sample(3, 2)
+    frames = ["panda_hand", "panda_rightfinger"]
+    one, two = (Oracle(panda.urdf, robot.tree).placements(q, frames) for robot in (panda, other))
+    assert (one == two).all()

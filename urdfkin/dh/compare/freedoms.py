@@ -1,0 +1,86 @@
+"""Base, tool and offsets with which a reference table comes closest to a URDF, its cells untouched.
+
+Damped least squares (Levenberg, 1944; Marquardt, 1963) on the tip's twists. Two joints whose axes nearly
+coincide do nearly the same: their offsets may grow against each other along a valley that bends round, and
+whose floor falls by no more than the distance of the axes. So the damping is taken away as long as steps
+succeed, and where the descent ends, turns of such pairs against each other are tried from there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from urdfkin.dh.compare.fit import Model, columns, errors, moved
+from urdfkin.tree import FloatArray
+
+_ROUNDS = 60
+#: Of the largest singular value: where damping starts, what a success leaves of it, and where it ends.
+_DAMPING, _EASING, _LEAST, _MOST = 1e-3, 0.03, 1e-14, 1e2
+#: Radians, and metres for each metre of reach, that one step goes at most.
+_LONGEST = 0.5
+#: Fit up to which nothing better is looked for, metres for each metre of reach.
+_ROUNDING = 1e-13
+#: Turns that are tried of one offset against the next.
+_TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
+
+
+def fit_freedoms(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> Model:
+    """The table's best fit.
+
+    Args:
+        model: Where to begin.
+        values: (s, n) the URDF's joint values.
+        wanted: (s, 4, 4) its tip there.
+        scale: Metres that a radian counts as much as.
+    """
+    for _ in range(2 * len(model.cells)):
+        model, size = _descended(model, values, wanted, scale)
+        if size <= _ROUNDING * scale * math.sqrt(6 * len(values)):
+            break
+        turned = min(_turned(model), key=lambda one: _size(one, values, wanted, scale), default=model)
+        if _size(turned, values, wanted, scale) >= size:
+            break
+        model = turned
+    return model
+
+
+def _size(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> float:
+    return float(np.linalg.norm(errors(model.walk(values)[0], wanted, scale)))
+
+
+def _descended(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> tuple[Model, float]:
+    size, damping, slow = _size(model, values, wanted, scale), _DAMPING, 0
+    for _ in range(_ROUNDS):
+        poses, freedoms, _ = columns(model, values, scale)
+        U, S, Vt = np.linalg.svd(freedoms, full_matrices=False)
+        along = U.T @ errors(poses, wanted, scale)
+        before = size
+        while damping <= _MOST:
+            free = Vt.T @ (S / (S**2 + (damping * S[0]) ** 2) * along)
+            if np.abs(free).max() <= _LONGEST * scale:
+                trial = moved(model, free, scale)
+                if (trial_size := _size(trial, values, wanted, scale)) < size:
+                    model, size = trial, trial_size
+                    break
+            damping *= 10.0
+        slow = slow + 1 if size > 0.99 * before else 0
+        if size == before or slow == 4:
+            break
+        damping = max(_EASING * damping, _LEAST)
+    return model, size
+
+
+def _turned(model: Model) -> list[Model]:
+    """The model with one offset turned and the next one turned back: little moves if the axes coincide."""
+    found = []
+    for i in range(len(model.cells) - 1):
+        sense = math.copysign(1.0, math.cos(float(model.cells[i, 3])))
+        for turn in _TURNS if model.turns[i] and model.turns[i + 1] else ():
+            cells = model.cells.copy()
+            cells[i, 0] += turn
+            cells[i + 1, 0] -= sense * turn
+            found.append(replace(model, cells=cells))
+    return found
