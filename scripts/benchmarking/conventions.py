@@ -1,0 +1,25 @@
+"""From a library's order of rows and coordinates to urdfkin's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from urdfkin.tree import FloatArray
+
+#: Takes [angular; linear] to [linear; angular].
+LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
+
+
+def positions(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
+    """For each of a library's coordinates, by name, which of urdfkin's it is."""
+    index = {name: i for i, name in enumerate(ours)}
+    return [index[name] for name in theirs]
+
+
+def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
+    """(n, 6, nv) with the columns of `J` (n, 6, m) at `columns`, zeros elsewhere."""
+    full = np.zeros((*J.shape[:-1], nv))
+    full[..., list(columns)] = J
+    return full
