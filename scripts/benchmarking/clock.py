@@ -1,11 +1,14 @@
 """The clock: every contender once a round, so that what slows the machine slows everyone.
 
-Ratios of one run hold on a noisy machine, absolute times do not.
+Ratios of one run hold on a noisy machine, absolute times do not. In each round the order is another, and each
+contender computes once untimed before it is timed: its data are as near as they can be, and the threads of
+the one before have gone to sleep.
 """
 
 from __future__ import annotations
 
 import gc
+import random
 import statistics
 import time
 from collections.abc import Sequence
@@ -62,7 +65,7 @@ class Table:
 
 
 def measure(table: Table, works: Sequence[Work], rounds: int, baseline: Work | None = None) -> list[Row]:
-    """Time `works`, each once a round, another one first in each round.
+    """Time `works`, each once a round, in another order in each round.
 
     Args:
         table: What the rows share.
@@ -71,12 +74,14 @@ def measure(table: Table, works: Sequence[Work], rounds: int, baseline: Work | N
         baseline: The one of `works` that the others are held against.
     """
     times: dict[str, list[float]] = {work.who: [] for work in works}
+    shuffled, order = list(works), random.Random(0)
     collecting = gc.isenabled()
     gc.disable()
     try:
-        for k in range(rounds):
-            first = k % len(works)
-            for work in (*works[first:], *works[:first]):
+        for _ in range(rounds):
+            order.shuffle(shuffled)
+            for work in shuffled:
+                work.compute()
                 begin = time.perf_counter()
                 work.compute()
                 times[work.who].append((time.perf_counter() - begin) / work.n * 1e9)
