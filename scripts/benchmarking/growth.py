@@ -12,6 +12,7 @@ from scripts.benchmarking.contenders.pinocchio_loop import pinocchio_calls
 from scripts.benchmarking.contenders.urdfkin_batch import FLOOR, ONE, batches
 from scripts.benchmarking.subject import QUANTITIES, Subject
 from scripts.benchmarking.work import Work, agree
+from urdfkin.tree import FloatArray
 
 ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other"
 
@@ -36,28 +37,27 @@ def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row
 
 def frame_rows(subject: Subject, counts: Sequence[int], rounds: int) -> Iterator[Row]:
     """Placements of several links, spread over the robot: in one pass, and one call for each."""
-    robot, n = subject.robot, subject.n
-    for count in sorted({min(count, len(robot.link_names)) for count in counts}):
-        picked = np.linspace(0, len(robot.link_names) - 1, count).astype(int)
-        frames = [f"link:{robot.link_names[i]}" for i in picked]
-        out = np.empty((count, n, 4, 4))
-
-        def together(frames: Sequence[str] = frames) -> object:
-            return robot.placements(subject.q, frames, verify=False)
-
-        def apart(frames: Sequence[str] = frames, out: np.ndarray = out) -> None:
-            for k, frame in enumerate(frames):
-                robot.placement(subject.q, frame, out=out[k], threads=1, verify=False)
-
-        works = [
-            Work(
-                ONE_PASS, n, together, lambda frames=frames: robot.placements(subject.q, frames, verify=False)
-            ),
-            Work(ONE_BY_ONE, n, apart, lambda out=out: out.swapaxes(0, 1)),
-        ]
+    links = subject.robot.link_names
+    for count in sorted({min(count, len(links)) for count in counts}):
+        frames = [f"link:{links[i]}" for i in np.linspace(0, len(links) - 1, count).astype(int)]
+        works = _frame_works(subject, frames)
         agree(works, works[1], f"{subject.name}, {count} placements")
         table = Table("frames", subject.name, "placement", 16 * count, count)
         yield from measure(table, works, rounds, works[1])
+
+
+def _frame_works(subject: Subject, frames: Sequence[str]) -> list[Work]:
+    robot, q, n = subject.robot, subject.q, subject.n
+    out = np.empty((len(frames), n, 4, 4))
+
+    def together() -> FloatArray:
+        return robot.placements(q, frames, verify=False)
+
+    def apart() -> None:
+        for k, frame in enumerate(frames):
+            robot.placement(q, frame, out=out[k], threads=1, verify=False)
+
+    return [Work(ONE_PASS, n, together, together), Work(ONE_BY_ONE, n, apart, lambda: out.swapaxes(0, 1))]
 
 
 def size_rows(source: tuple[str, str], sizes: Sequence[int], rounds: int) -> Iterator[Row]:

@@ -3,23 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-#: A row of the figures, as data.
-Entry = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Words:
-    """One table: its section, what it is of, the columns' heads, the rows; the first column is words."""
-
-    section: str
-    title: str
-    head: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-    remarks: tuple[str, ...] = ()
+from scripts.benchmarking.growth_tables import growth_tables
+from scripts.benchmarking.words import Entry, Words, number
 
 
 def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
@@ -30,17 +18,10 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
         key=lambda row: (row["section"], row["robot"], row["quantity"]),
     ):
         yield _contest(section, f"{robot}, {quantity}", list(group))
-    for section, make in (("joints", _joints), ("frames", _frames), ("sizes", _sizes)):
-        if chosen := [row for row in entries if row["section"] == section]:
-            yield make(chosen)
-    if figures["memory"]:
-        yield _memory(figures["memory"])
-
-
-def number(x: float) -> str:
-    """Three digits, and no power of ten."""
-    digits = 2 if x < 10 else 1 if x < 100 else 0
-    return f"{x:,.{digits}f}"
+    if batch := [row for row in entries if row["section"] == "batch"]:
+        yield _summary(batch)
+        yield _floor(batch)
+    yield from growth_tables(figures)
 
 
 def _contest(section: str, title: str, rows: list[Entry]) -> Words:
@@ -72,76 +53,55 @@ def _contest(section: str, title: str, rows: list[Entry]) -> Words:
     )
 
 
-def _joints(rows: list[Entry]) -> Words:
-    return Words(
-        "joints",
-        "chains: the tip's result, one thread",
-        ("", "joints", "ns for one configuration", "for one joint", "for one number written"),
-        [
+def _summary(rows: list[Entry]) -> Words:
+    """One thread and all, against Pinocchio's loop and against the fastest other, whoever that is."""
+    found = []
+    for title, group in _tables_of(rows):
+        who = {row["who"]: row for row in group}
+        ours = [row for name, row in who.items() if name.startswith("urdfkin") and "no out" not in name]
+        others = [row for name, row in who.items() if not name.startswith(("urdfkin", "output"))]
+        best = min(others, key=lambda row: float(row["median_ns"]))
+        found.append(
             (
-                f"{row['quantity']}, {row['who']}",
-                str(row["size"]),
-                number(row["median_ns"]),
-                number(row["median_ns"] / row["size"]),
-                number(row["median_ns"] / row["numbers"]),
+                title,
+                number(ours[0]["median_ns"]),
+                number(ours[0]["ratio"]),
+                number(ours[-1]["ratio"]),
+                f"{best['who']}, {number(best['median_ns'])}",
+                number(best["median_ns"] / ours[0]["median_ns"]),
             )
-            for row in _together(rows)
-        ],
+        )
+    heads = (
+        "1 thread, ns",
+        "times Pinocchio's loop",
+        "all threads",
+        "fastest other, ns",
+        "times that, 1 thread",
     )
+    return Words("summary", "urdfkin against the others, medians", ("", *heads), found)
 
 
-def _frames(rows: list[Entry]) -> Words:
-    return Words(
-        "frames",
-        f"{rows[0]['robot']}: placements of several links, one thread",
-        ("", "links", "ns for one configuration", "for one link"),
-        [
-            (row["who"], str(row["size"]), number(row["median_ns"]), number(row["median_ns"] / row["size"]))
-            for row in _together(rows)
-        ],
-    )
-
-
-def _sizes(rows: list[Entry]) -> Words:
-    return Words(
-        "sizes",
-        f"{rows[0]['robot']}: batches of several sizes, one thread, out= given",
-        ("", "configurations", "ns for one, median", "minimum"),
-        [
+def _floor(rows: list[Entry]) -> Words:
+    """What it takes to write the output once, and what urdfkin takes in those units."""
+    found = []
+    for title, group in _tables_of(rows):
+        who = {row["who"].partition(",")[0]: row for row in reversed(group)}
+        fill, ours = who["output written once (fill)"], who["urdfkin"]
+        size = 8 * fill["numbers"]
+        found.append(
             (
-                f"{row['quantity']}, {row['who']}",
-                f"{row['size']:,}",
-                number(row["median_ns"]),
-                number(row["minimum_ns"]),
+                title,
+                f"{size:,}",
+                number(fill["median_ns"]),
+                number(size / fill["median_ns"]),
+                number(ours["median_ns"]),
+                number(ours["median_ns"] / fill["median_ns"]),
             )
-            for row in _together(rows)
-        ],
-    )
+        )
+    heads = ("bytes written", "fill, ns", "GB/s", "urdfkin, 1 thread, ns", "times the floor")
+    return Words("floor", "the floor: the output written once", ("", *heads), found)
 
 
-def _together(rows: list[Entry]) -> list[Entry]:
-    """Rows of one contender and quantity beside each other, in the order in which they first come."""
-    seen = list(dict.fromkeys((row["quantity"], row["who"]) for row in rows))
-    quantities = list(dict.fromkeys(row["quantity"] for row in rows))
-    return sorted(
-        rows,
-        key=lambda row: (quantities.index(row["quantity"]), seen.index((row["quantity"], row["who"]))),
-    )
-
-
-def _memory(entries: list[Entry]) -> Words:
-    return Words(
-        "memory",
-        f"{entries[0]['robot']}: memory of a batch, output included",
-        ("", "configurations", "output, MB", "at the most, MB", "beyond the output"),
-        [
-            (
-                f"{entry['quantity']}, {'out= given' if entry['out'] else 'no out='}",
-                f"{entry['n']:,}",
-                number(entry["output_bytes"] / 1e6),
-                number(entry["peak_bytes"] / 1e6),
-                f"{100 * (entry['peak_bytes'] / entry['output_bytes'] - 1):.1f} %",
-            )
-            for entry in entries
-        ],
-    )
+def _tables_of(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
+    for (robot, quantity), group in groupby(rows, key=lambda row: (row["robot"], row["quantity"])):
+        yield f"{robot}, {quantity}", list(group)

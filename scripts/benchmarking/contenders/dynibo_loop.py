@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from xml.etree import ElementTree as ET
 
 import dynibo
 import numpy as np
 
 from scripts.benchmarking.calls import Calls
-from scripts.benchmarking.conventions import LINEAR_FIRST, positions
+from scripts.benchmarking.conventions import LINEAR_FIRST, breadth_first, positions
 from scripts.benchmarking.subject import Subject
 from scripts.benchmarking.work import Work
 from urdfkin.tree import FloatArray
@@ -28,9 +27,9 @@ def calls(subject: Subject, quantity: str) -> Iterator[Calls]:
 
     names = {"robot": robot, "frame": robot.link_id(subject.frame), "buffer": np.empty(6 * nv)}
     if quantity == "jacobian":
-        store = ("robot.jacobian(q, frame, out=out[k])",)
-        line = "robot.jacobian(q, frame, out=buffer)"
-        yield Calls("dynibo, loop", names, (line,), store, order, (6 * nv,), read, np.array)
+        lines = ("robot.jacobian(q, frame, out=buffer)",)
+        into = ("robot.jacobian(q, frame, out=out[k])",)
+        yield Calls("dynibo, loop", names, lines, into, order, (6 * nv,), read, np.array)
         return
     line = "robot.forward_acceleration_kinematics(q, v, a, frame)"
     store = (f"x = {line}", "out[k, :3] = x.linear", "out[k, 3:] = x.angular")
@@ -48,21 +47,3 @@ def batches(subject: Subject, quantity: str) -> Iterator[Work]:
     """One configuration after the other."""
     for one in calls(subject, quantity):
         yield one.batch(subject, quantity)
-
-
-def breadth_first(urdf: str) -> list[str]:
-    """The moving joints as dynibo numbers them: link after link from the root, in the file's order."""
-    joints = ET.fromstring(urdf).findall("joint")
-    ends = [(_link(joint, "parent"), _link(joint, "child")) for joint in joints]
-    links = sorted({parent for parent, _ in ends} - {child for _, child in ends})
-    names = []
-    for link in links:  # grows while it is walked
-        for joint, (parent, child) in zip(joints, ends, strict=True):
-            if parent == link:
-                links.append(child)
-                names += [joint.attrib["name"]] * (joint.get("type") != "fixed")
-    return names
-
-
-def _link(joint: ET.Element, tag: str) -> str:
-    return next(joint.iter(tag)).attrib["link"]

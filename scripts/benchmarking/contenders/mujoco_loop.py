@@ -24,26 +24,40 @@ def calls(subject: Subject, quantity: str) -> Iterator[Calls]:
     data = mujoco.MjData(model)
     theirs = [model.joint(i).name for i in range(model.njnt)]
     order = positions(subject.robot.joint_names, theirs)
-    back = np.argsort(order)
+    x = np.empty(subject.width(quantity))
     names = {
         **{name: getattr(mujoco, f"mj_{name}") for name in ("kinematics", "comPos", "comVel", "jacBody")},
         **{"rne": mujoco.mj_rnePostConstraint, "get": mujoco.mj_objectAcceleration},
         **{"m": model, "d": data, "qpos": data.qpos, "qvel": data.qvel, "qacc": data.qacc},
         **{"body": model.body(subject.frame).id, "kind": mujoco.mjtObj.mjOBJ_XBODY},
-        "x": np.empty(subject.width(quantity)),
+        **{"x": x, "linear": x[:3], "angular": x[3:]},
     }
+    back = np.argsort(order)
+    yield Calls(
+        "MuJoCo, loop",
+        names,
+        _lines(quantity, "linear, angular", "x"),
+        _lines(quantity, "out[k, :3], out[k, 3:]", "out[k]")[:-1],
+        order,
+        read=lambda x: x[..., back] if quantity == "jacobian" else x[..., LINEAR_FIRST],
+        read_one=np.array,
+    )
+
+
+def _lines(quantity: str, rows: str, result: str) -> tuple[str, ...]:
+    """The calls for one configuration, which write into arrays; the last line is the result."""
     place = ("qpos[:] = q", "kinematics(m, d)", "comPos(m, d)")
     if quantity == "jacobian":
-        names |= {"linear": names["x"][:3], "angular": names["x"][3:]}
-        lines = (*place, "jacBody(m, d, linear, angular, body)", "x")
-        store = (*place, "jacBody(m, d, out[k, :3], out[k, 3:], body)")
-        read = {"read": lambda J: J[..., back]}
-    else:
-        move = (*place, "qvel[:] = v", "qacc[:] = a", "comVel(m, d)", "rne(m, d)")
-        lines = (*move, "get(m, d, kind, body, x, 0)", "x")
-        store = (*move, "get(m, d, kind, body, out[k], 0)")
-        read = {"read": lambda x: x[..., LINEAR_FIRST]}
-    yield Calls("MuJoCo, loop", names, lines, store, order, read_one=np.array, **read)
+        return (*place, f"jacBody(m, d, {rows}, body)", result)
+    return (
+        *place,
+        "qvel[:] = v",
+        "qacc[:] = a",
+        "comVel(m, d)",
+        "rne(m, d)",
+        f"get(m, d, kind, body, {result}, 0)",
+        result,
+    )
 
 
 def batches(subject: Subject, quantity: str) -> Iterator[Work]:
