@@ -41,7 +41,7 @@ class Calls:
     order: list[int] | None = None
     shape: tuple[int, ...] | None = None
     read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)
-    read_one: Callable[[Any], FloatArray] = field(default=np.asarray)
+    read_one: Callable[[Any], FloatArray] = field(default=np.array)
     remark: str = ""
 
     def batch(self, subject: Subject, quantity: str) -> Work:

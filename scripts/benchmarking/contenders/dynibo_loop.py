@@ -29,7 +29,7 @@ def calls(subject: Subject, quantity: str) -> Iterator[Calls]:
     if quantity == "jacobian":
         lines = ("robot.jacobian(q, frame, out=buffer)",)
         into = ("robot.jacobian(q, frame, out=out[k])",)
-        yield Calls("dynibo, loop", names, lines, into, order, (6 * nv,), read, np.array)
+        yield Calls("dynibo, loop", names, lines, into, order, (6 * nv,), read)
         return
     line = "robot.forward_acceleration_kinematics(q, v, a, frame)"
     store = (f"x = {line}", "out[k, :3] = x.linear", "out[k, 3:] = x.angular")

@@ -40,7 +40,6 @@ def calls(subject: Subject, quantity: str) -> Iterator[Calls]:
         _lines(quantity, "out[k, :3], out[k, 3:]", "out[k]")[:-1],
         order,
         read=lambda x: x[..., back] if quantity == "jacobian" else x[..., LINEAR_FIRST],
-        read_one=np.array,
     )
 
 

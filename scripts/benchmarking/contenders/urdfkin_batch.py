@@ -57,5 +57,4 @@ def calls(subject: Subject, quantity: str) -> Iterator[Calls]:
             f"urdfkin, prepared.{quantity}(out=)",
             names,
             (f"fast.{quantity}({arguments}, out=out)",),
-            read_one=np.array,
         )
