@@ -1,152 +1,143 @@
-"""Time urdfkin against Pinocchio called in a Python loop, interleaved in one process.
+"""Time urdfkin against Pinocchio and other libraries at the same work, interleaved in one process.
 
-Ratios hold on a noisy machine, absolute times do not: each round times every contender once, and medians,
-minima and the ratio of medians are printed. Results are compared first; a difference fails the run, a slow
-time never does. Run: python scripts/benchmark.py [--quick] [--json FILE]
+    python scripts/benchmark.py [--quick] [--json FILE] [--plot FILE] [--only batch single ...] [--no-peers]
+
+Ratios hold on a noisy machine, absolute times do not: each round times every contender once; medians, minima
+and the ratio of medians are printed. Results are compared first; a difference fails the run, a slow time
+never does. Libraries that are not installed are listed and left out.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import statistics
+import os
 import sys
-import time
-from collections.abc import Callable
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-import pinocchio as pin
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # PyTorch's threads do not spin into the next contender
 
-import urdfkin
-from urdfkin.tree import FloatArray
+from scripts.benchmarking.batches import batch_rows
+from scripts.benchmarking.clock import Row
+from scripts.benchmarking.contenders import Contender, find
+from scripts.benchmarking.growth import frame_rows, joint_rows, size_rows
+from scripts.benchmarking.machine import machine
+from scripts.benchmarking.memory import peak_over_output
+from scripts.benchmarking.show import show
+from scripts.benchmarking.single import single_rows
+from scripts.benchmarking.subject import SUBJECTS, Subject
+from scripts.benchmarking.verified import verified_rows
+from scripts.benchmarking.work import DifferenceError
 from urdfkin.validation.report import versions
 
-#: Robot and frame of each table: an arm, and a humanoid of which a path is a small part.
-SUBJECTS = (("panda", "panda_hand"), ("talos", "gripper_left_base_link"))
-#: How many configurations Pinocchio's loop takes; its time for one does not depend on it.
-LOOP = 2000
+SECTIONS = ("batch", "single", "verified", "joints", "frames", "sizes", "memory")
 
 
-class Subject:
-    """One robot, one frame, the same work for everyone."""
+@dataclass(frozen=True)
+class Plan:
+    """How much is measured.
 
-    def __init__(self, name: str, frame: str, n: int) -> None:
-        self.name, self.frame, self.n = name, frame, n
-        # Without mimic both sides have the same coordinates.
-        self.robot = urdfkin.load(name, verify=False, mimic=False)
-        self.q = self.robot.sample(n, seed=0)
-        self.v, self.a = np.random.default_rng(0).standard_normal((2, n, self.robot.nv))
-        self.J = np.empty((n, 6, self.robot.nv))
-        self.acceleration = np.empty((n, 6))
-        self.model = pin.buildModelFromXML(self.robot.urdf)
-        self.data = self.model.createData()
-        self.id = self.model.getFrameId(frame)
-        self.loop = min(n, LOOP)
-        self.q_loop = self.robot.to_pinocchio(self.q[: self.loop])
-        self.J_loop = np.empty((self.loop, 6, self.robot.nv))
-        self.acceleration_loop = np.empty((self.loop, 6))
+    Attributes:
+        configurations: Of a batch.
+        rounds: Of each table.
+        joints: Of the chains.
+        numbers: Written by a chain's batch of Jacobians.
+        frames: How many placements at once.
+        frame_configurations: Of their batches.
+        sizes: Of batches.
+        memory: Configurations whose memory is measured.
+    """
 
-    def contenders(self) -> dict[str, dict[str, tuple[int, Callable[[], object]]]]:
-        """For each quantity: who computes it, how many at a time, and how."""
-
-        def jacobian(threads: int) -> Callable[[], object]:
-            return lambda: self.robot.jacobian(self.q, self.frame, out=self.J, threads=threads)
-
-        def acceleration(threads: int) -> Callable[[], object]:
-            return lambda: self.robot.acceleration(
-                self.q, self.v, self.a, self.frame, out=self.acceleration, threads=threads
-            )
-
-        return {
-            "jacobian": {
-                "urdfkin, 1 thread": (self.n, jacobian(1)),
-                "urdfkin, 2 threads": (self.n, jacobian(2)),
-                "Pinocchio, Python loop": (self.loop, self.loop_jacobian),
-            },
-            "acceleration": {
-                "urdfkin, 1 thread": (self.n, acceleration(1)),
-                "urdfkin, 2 threads": (self.n, acceleration(2)),
-                "Pinocchio, Python loop": (self.loop, self.loop_acceleration),
-            },
-        }
-
-    def loop_jacobian(self) -> None:
-        """`computeFrameJacobian` for one configuration after the other."""
-        for k in range(self.loop):
-            self.J_loop[k] = pin.computeFrameJacobian(
-                self.model, self.data, self.q_loop[k], self.id, pin.LOCAL_WORLD_ALIGNED
-            )
-
-    def loop_acceleration(self) -> None:
-        """`forwardKinematics`, then `getFrameClassicalAcceleration`."""
-        for k in range(self.loop):
-            pin.forwardKinematics(self.model, self.data, self.q_loop[k], self.v[k], self.a[k])
-            self.acceleration_loop[k] = pin.getFrameClassicalAcceleration(
-                self.model, self.data, self.id, pin.LOCAL_WORLD_ALIGNED
-            ).vector
-
-    def differs(self) -> list[str]:
-        """Which quantities are not the same on both sides: to 1e-9 here, exactly is `validate`'s business."""
-        for _, compute in (work for table in self.contenders().values() for work in table.values()):
-            compute()
-        pairs: dict[str, tuple[FloatArray, FloatArray]] = {
-            "jacobian": (self.J[: self.loop], self.J_loop),
-            "acceleration": (self.acceleration[: self.loop], self.acceleration_loop),
-        }
-        return [what for what, (ours, theirs) in pairs.items() if not np.allclose(ours, theirs, atol=1e-9)]
+    configurations: int = 100_000
+    rounds: int = 21
+    joints: tuple[int, ...] = (6, 12, 25, 50, 100)
+    numbers: int = 4_000_000
+    frames: tuple[int, ...] = (1, 4, 16, 1000)
+    frame_configurations: int = 4_000
+    sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)
+    memory: int = 1_000_000
 
 
-def measure(subject: Subject, rounds: int) -> list[dict[str, object]]:
-    """Median and minimum, in ns for one configuration, and how many times faster than Pinocchio's loop."""
-    rows: list[dict[str, object]] = []
-    for quantity, contenders in subject.contenders().items():
-        times: dict[str, list[float]] = {who: [] for who in contenders}
-        for _ in range(rounds):
-            for who, (n, compute) in contenders.items():
-                begin = time.perf_counter()
-                compute()
-                times[who].append((time.perf_counter() - begin) / n * 1e9)
-        loop = statistics.median(times["Pinocchio, Python loop"])
-        for who, values in times.items():
-            median = statistics.median(values)
-            rows.append(
-                {
-                    "robot": subject.name,
-                    "quantity": quantity,
-                    "who": who,
-                    "median_ns": round(median, 1),
-                    "minimum_ns": round(min(values), 1),
-                    "times_pinocchio": round(loop / median, 1),
-                }
-            )
-    return rows
+QUICK = Plan(1_000, 3, (6, 12), 20_000, (1, 1000), 100, (100, 1_000), 20_000)
 
 
-def main() -> int:
+def rows_of(section: str, plan: Plan, contenders: Sequence[Contender]) -> Iterator[Row]:
+    """One section's rows."""
+    if section == "joints":
+        yield from joint_rows(plan.joints, plan.numbers, plan.rounds)
+    elif section == "sizes":
+        yield from size_rows(SUBJECTS[0], plan.sizes, plan.rounds)
+    elif section == "frames":
+        with Subject(*SUBJECTS[1], plan.frame_configurations) as subject:
+            yield from frame_rows(subject, plan.frames, plan.rounds)
+    else:
+        for source in SUBJECTS:
+            with Subject(*source, plan.configurations) as subject:
+                if section == "batch":
+                    yield from batch_rows(subject, contenders, plan.rounds)
+                elif section == "single":
+                    yield from single_rows(subject, contenders, plan.rounds)
+                elif section == "verified":
+                    yield from verified_rows(subject, plan.rounds)
+
+
+def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> dict[str, Any]:
+    """Everything measured, as data.
+
+    Raises:
+        DifferenceError: contenders disagree.
+    """
+    name, frame = SUBJECTS[0]
+    return {
+        "machine": machine(),
+        "versions": versions(),
+        "libraries": {contender.library: contender.state for contender in contenders},
+        "rounds": plan.rounds,
+        "rows": [row.as_data() for section in sections for row in rows_of(section, plan, contenders)],
+        "memory": [
+            peak_over_output(name, frame, quantity, plan.memory, out=out)
+            for quantity in ("jacobian", "acceleration")
+            for out in (True, False)
+            if "memory" in sections
+        ],
+    }
+
+
+def main(words: Sequence[str] | None = None) -> int:
     """Exit 1 when results differ."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--quick", action="store_true", help="few configurations, few rounds")
     parser.add_argument("--json", type=Path, help="write the figures as data")
-    arguments = parser.parse_args()
-    n, rounds = (2_000, 3) if arguments.quick else (100_000, 21)
-    rows: list[dict[str, object]] = []
-    for name, frame in SUBJECTS:
-        subject = Subject(name, frame, n)
-        if different := subject.differs():
-            print(f"{name}: results differ: {', '.join(different)}", file=sys.stderr)
-            return 1
-        rows += measure(subject, rounds)
-    print(f"{n:,} configurations, {rounds} rounds, float64, ns for one configuration")
-    for row in rows:
-        print(
-            f"{row['robot']:6} {row['quantity']:13} {row['who']:24} median {row['median_ns']:8}"
-            f"  minimum {row['minimum_ns']:8}  x{row['times_pinocchio']}"
-        )
+    parser.add_argument("--plot", type=Path, help="draw them: svg, png or pdf")
+    parser.add_argument("--only", nargs="+", choices=SECTIONS, default=SECTIONS, help="some sections")
+    parser.add_argument("--no-peers", action="store_true", help="urdfkin and Pinocchio alone")
+    parser.add_argument("--rounds", type=int, help="how often each is timed")
+    arguments = parser.parse_args(words)
+    plan = QUICK if arguments.quick else Plan()
+    if arguments.rounds:
+        plan = Plan(**{**vars(plan), "rounds": arguments.rounds})
+    try:
+        figures = document(plan, arguments.only, find(peers=not arguments.no_peers))
+    except DifferenceError as difference:
+        print(f"results differ: {difference}", file=sys.stderr)
+        return 1
+    show(figures)
     if arguments.json:
-        arguments.json.write_text(json.dumps({"versions": versions(), "rows": rows}, indent=2) + "\n")
+        arguments.json.write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
+    if arguments.plot:
+        from scripts.benchmarking.picture import draw  # noqa: PLC0415  needs matplotlib
+
+        arguments.plot.write_bytes(draw(figures, arguments.plot))
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    status = main()
+    if "roboticstoolbox" in sys.modules:  # its bindings list a hundred lines of leaks when Python ends
+        sys.stdout.flush()
+        os._exit(status)
+    sys.exit(status)

@@ -60,7 +60,7 @@ def test_the_pages_have_commands_to_understand() -> None:
     assert len(commands()) >= 12
 
 
-@pytest.mark.parametrize("page", ["docs/reports.md", "docs/ci.md"])
+@pytest.mark.parametrize("page", ["docs/reports.md", "docs/ci.md", "docs/performance.md"])
 def test_links_lead_to_files_and_headings(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")
     for target in re.findall(r"\]\(([^)]+)\)", text):

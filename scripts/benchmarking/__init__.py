@@ -1,0 +1,1 @@
+"""The parts of `scripts/benchmark.py`: subjects, contenders, the clock, the tables, the page and the plot."""

@@ -1,0 +1,80 @@
+"""Write the figures of docs/performance.md, and its picture, from docs/performance.json.
+
+    python scripts/benchmark.py --json docs/performance.json
+    python scripts/make_performance.py
+
+The text stands in the page; what stands between `<!-- figures: ... -->` and `<!-- end -->` is written here.
+A test holds the page against what this script would write.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+
+from scripts.benchmarking.picture import draw
+from scripts.benchmarking.tables import tables
+from scripts.benchmarking.words import Words
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGE, FIGURES, PICTURE = (
+    DOCS / name for name in ("performance.md", "performance.json", "images/performance.svg")
+)
+_PLACE = re.compile(r"(<!-- figures: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def page(text: str, figures: Mapping[str, Any]) -> str:
+    """`text` with the figures at their places.
+
+    Raises:
+        ValueError: the page has a place for what was not measured, or none for what was.
+    """
+    parts: dict[str, list[str]] = {"machine": [_machine(figures)]}
+    for words in tables(figures):
+        parts.setdefault(words.section, []).append(_table(words))
+    places = [place[1] for place in _PLACE.findall(text)]
+    if sorted(places) != sorted(parts):
+        raise ValueError(f"the page has places for {places}, the figures are {list(parts)}")
+    return _PLACE.sub(lambda place: place[1] + "\n\n".join(parts[place[2]]) + "\n" + place[3], text)
+
+
+def _machine(figures: Mapping[str, Any]) -> str:
+    machine, versions = figures["machine"], figures["versions"]
+    libraries = figures["libraries"] | {name: versions[name] for name in ("numpy", "numba")}
+    return (
+        f"{machine['processor']}, {machine['processors']} processors, {machine['vectors']}, "
+        f"{machine['memory_gib']} GiB, {machine['system']}, Python {machine['python']}; "
+        f"{', '.join(f'{name} {state}' for name, state in libraries.items())}. "
+        f"{figures['rounds']} rounds, float64."
+    )
+
+
+def _table(words: Words) -> str:
+    lines = [
+        f"**{words.title}**",
+        "",
+        "| " + " | ".join(words.head) + " |",
+        "|---" + "|---:" * (len(words.head) - 1) + "|",
+        *("| " + " | ".join(row) + " |" for row in words.rows),
+    ]
+    if words.remarks:
+        lines += ["", *(f"[{i + 1}] {remark}. " for i, remark in enumerate(words.remarks))]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def main() -> None:
+    """Write the page and the picture."""
+    figures = json.loads(FIGURES.read_text("utf-8"))
+    PAGE.write_text(page(PAGE.read_text("utf-8"), figures), "utf-8")
+    PICTURE.write_bytes(draw(figures, PICTURE))
+    print(PAGE, PICTURE, sep="\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,36 @@
+"""The page about speed shows the figures that were measured, each at its place, and nothing typed by hand."""
+
+import json
+import re
+
+import pytest
+
+from scripts import make_performance as maker
+
+TEXT = maker.PAGE.read_text("utf-8")
+FIGURES = json.loads(maker.FIGURES.read_text("utf-8"))
+
+
+def test_the_page_shows_the_figures_of_its_file() -> None:
+    assert maker.page(TEXT, FIGURES) == TEXT, "run python scripts/make_performance.py"
+
+
+def test_another_figure_gives_another_page() -> None:
+    first, *others = FIGURES["rows"]
+    changed = {**FIGURES, "rows": [{**first, "median_ns": 12_345.0}, *others]}
+    assert "| 12,345 |" in maker.page(TEXT, changed)
+
+
+def test_figures_without_a_place_are_refused() -> None:
+    with pytest.raises(ValueError, match="places for"):
+        maker.page(TEXT.replace("<!-- figures: floor -->", ""), FIGURES)
+
+
+def test_no_figure_is_typed() -> None:
+    text = re.sub(r"<!-- figures: \w+ -->.*?<!-- end -->", "", TEXT, flags=re.DOTALL)
+    assert re.findall(r"\d (?:ns|us|times|GB/s|MB)\b", text) == []
+
+
+def test_the_picture_is_light() -> None:
+    assert maker.PICTURE.is_file()
+    assert maker.PICTURE.stat().st_size < 60_000
