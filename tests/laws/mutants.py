@@ -44,7 +44,7 @@ def whole_numbers_at(address):
     return ctypes.cast(int(address), ctypes.POINTER(ctypes.c_int64))
 
 
-def copy_rows(s, source, target, count):
+def copy_rows(m, s, source, target, count):
     s[target * LANES : (target + count) * LANES] = s[source * LANES : (source + count) * LANES]
 """,
     "transposing": """

@@ -23,11 +23,11 @@ def put_column(m, s, plan, f, c):
             for k in range(m):
                 s[(LINEAR + row) * LANES + k] *= multiplier
     if leader != c:
-        copy_rows(s, at, LEADER, COLUMN_ROWS)
+        copy_rows(m, s, at, LEADER, COLUMN_ROWS)
         for row in range(COLUMN_ROWS):
             for k in range(m):
                 s[(LINEAR + row) * LANES + k] += s[(LEADER + row) * LANES + k]
-    copy_rows(s, LINEAR, at, COLUMN_ROWS)
+    copy_rows(m, s, LINEAR, at, COLUMN_ROWS)
 
 
 @lane_function

@@ -13,8 +13,8 @@ import numpy as np
 from urdfkin.errors import NotFiniteError
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.recursion.batch import in_blocks
-from urdfkin.recursion.lanes import LANES
 from urdfkin.recursion.plan import Plan
+from urdfkin.recursion.scratch import scratch
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
 
@@ -82,12 +82,12 @@ def _motion(
         from urdfkin.recursion.local_kernel import local_motions  # noqa: PLC0415
 
         def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
-            return local_motions(order, packed, *x, part, _scratch(plan))
+            return local_motions(order, packed, *x, part, scratch(plan))
     else:
         from urdfkin.recursion.motion_kernel import motions  # noqa: PLC0415
 
         def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
-            return motions(order, int(reference), packed, *x, part, _scratch(plan))
+            return motions(order, int(reference), packed, *x, part, scratch(plan))
 
     _demand(in_blocks(compute, [base, *qva], out, threads))
 
@@ -108,7 +108,7 @@ def jacobians(
     packed = plan.packed
 
     def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
-        return kernel(int(reference), packed, *x, part, _scratch(plan))
+        return kernel(int(reference), packed, *x, part, scratch(plan))
 
     _demand(in_blocks(compute, [base, q], out, threads))
     return out
@@ -131,7 +131,7 @@ def jacobian_rates(
     packed = plan.packed
 
     def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
-        return kernel(int(reference), packed, *x, part, _scratch(plan))
+        return kernel(int(reference), packed, *x, part, scratch(plan))
 
     _demand(in_blocks(compute, [base, q, v], out, threads))
     return out
@@ -140,10 +140,3 @@ def jacobian_rates(
 def _demand(finite: bool) -> None:
     if not finite:
         raise NotFiniteError("q, v and a must be finite")
-
-
-def _scratch(plan: Plan) -> FloatArray:
-    """Rows for the lanes, at an address where a vector does not reach over two cache lines."""
-    numbers = np.empty(plan.areas.rows * LANES + 8)
-    first = -(numbers.ctypes.data // 8) % 8
-    return numbers[first : first + plan.areas.rows * LANES]

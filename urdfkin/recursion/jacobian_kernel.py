@@ -19,7 +19,19 @@ from urdfkin.recursion.plan import COLUMN_WIDTH
 from urdfkin.recursion.rows import ANGULAR, AXIS, FRAME, KEPT_ROWS, LINEAR, ORIGIN, P, R
 from urdfkin.recursion.steps import step
 from urdfkin.recursion.transposing import fetch_output
-from urdfkin.recursion.walk import finite, frame_state, read_input, resume, rows_of, save, start, walk_of
+from urdfkin.recursion.walk import (
+    finite,
+    frame_state,
+    read_input,
+    resume,
+    rows_of,
+    save,
+    scratch_of,
+    start,
+    still_base,
+    stride_of,
+    walk_of,
+)
 
 _LOCAL, _WORLD = 0, 1
 
@@ -28,8 +40,8 @@ _LOCAL, _WORLD = 0, 1
 def _keep_column(m, s, at, axis):
     """Keep the axis z_{i-1} and the origin O_{i-1} of a rate: what 7.85 needs."""
     for r in range(3):
-        copy_rows(s, R + 3 * r + axis, at + r, 1)
-    copy_rows(s, P, at + 3, 3)
+        copy_rows(m, s, R + 3 * r + axis, at + r, 1)
+    copy_rows(m, s, P, at + 3, 3)
 
 
 @lane_function
@@ -54,26 +66,26 @@ def _jacobian_column(m, s, turns, reference):
 def _frame_jacobian(m, s, plan, f, b, reference, to):
     for c in range(plan.column_count):
         if plan.leaders[f * plan.column_count + c] >= 0:
-            copy_rows(s, plan.kept + KEPT_ROWS * c, AXIS, 6)
+            copy_rows(m, s, plan.kept + KEPT_ROWS * c, AXIS, 6)
             _jacobian_column(m, s, plan.columns[COLUMN_WIDTH * c + TURNS] == 1, reference)
             put_column(m, s, plan, f, c)
     write_matrix(m, s, plan, f, b, to)
 
 
 @lane_function
-def _jacobian_block(m, s, plan, b, reference, base, q, to):
+def _jacobian_block(m, s, plan, b, reference, base, stride, q, to):
     order = 0 * b
     read_input(m, s, q, b, plan.nq, plan.blocks_q, plan.block_count_q, plan.q)
-    start(m, s, plan, b, base, order)
+    start(m, s, plan, b, base, stride, order)
     rows = rows_of(order)
     f = c = order
     size = plan.frame_count * 6 * plan.nv
     for i in range(-1, plan.step_count):
         if i >= 0:
             fetch_output(m, i, plan.step_count, to, b * size, m * size)
-            resume(s, plan, i, rows)
+            resume(m, s, plan, i, rows)
             step(m, s, plan, i, order)
-            save(s, plan, i, rows)
+            save(m, s, plan, i, rows)
             while c < plan.column_count and plan.columns[COLUMN_WIDTH * c + STEP] == i:
                 _keep_column(m, s, plan.kept + KEPT_ROWS * c, plan.columns[COLUMN_WIDTH * c + AXIS_OF])
                 c += 1
@@ -85,26 +97,34 @@ def _jacobian_block(m, s, plan, b, reference, base, q, to):
 
 
 @kernel(INT, PLAN, ROWS, ROWS, output(4), SCRATCH)
-def jacobians(reference, packed, base, q, out, s):
+def jacobians(reference, packed, base, q, out, scratch):
     """Velocity Jacobians (7.85) of frames: 1, or 0 where a coordinate is not finite.
 
-    Shapes: base (1 or n, 24), q (n, nq), out (n, frames, 6, nv), s (rows * LANES,).
+    Shapes: base (1 or n, 24), q (n, nq), out (n, frames, 6, nv), scratch (rows * LANES,).
     """
     n, plan, good = q.shape[0], walk_of(packed), 1
-    lanes = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    m = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    s, state, x, to, stride = (
+        pointer_to(scratch),
+        pointer_to(base),
+        pointer_to(q),
+        pointer_to(out),
+        stride_of(base),
+    )
     for b in range(0, n, LANES):
-        good &= _jacobian_block(lanes, s, plan, b, reference, base, pointer_to(q), pointer_to(out))
+        good &= _jacobian_block(m, s, plan, b, reference, state, stride, x, to)
     return good
 
 
-@kernel(INT, PLAN, ROWS, NUMBERS, output(2), SCRATCH, nogil=False)
-def jacobian(reference, packed, base, q, out, s):
+@kernel(INT, PLAN, NUMBERS, output(2), nogil=False)
+def jacobian(reference, packed, q, out):
     """The velocity Jacobian (7.85) of one frame in one configuration; -1 where the shapes are others.
 
-    Shapes: base (1, 24), q (nq,), out (6, nv), s (rows * LANES,).
+    Shapes: q (nq,), out (6, nv).
     """
     plan = walk_of(packed)
     if q.shape[0] != plan.nq or out.shape[0] != 6 or out.shape[1] != plan.nv:
         return -1
     one = 1 + 0 * plan.nq
-    return _jacobian_block(one, s, plan, 0 * one, reference, base, pointer_to(q), pointer_to(out))
+    x, to = pointer_to(q), pointer_to(out)
+    return _jacobian_block(one, scratch_of(packed), plan, 0 * one, reference, still_base(), 0 * one, x, to)

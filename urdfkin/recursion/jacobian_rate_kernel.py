@@ -46,7 +46,17 @@ from urdfkin.recursion.rows import (
 )
 from urdfkin.recursion.steps import step
 from urdfkin.recursion.transposing import fetch_output
-from urdfkin.recursion.walk import finite, frame_state, read_inputs, resume, rows_of, save, start, walk_of
+from urdfkin.recursion.walk import (
+    finite,
+    frame_state,
+    read_inputs,
+    resume,
+    rows_of,
+    save,
+    start,
+    stride_of,
+    walk_of,
+)
 
 _LOCAL, _WORLD = 0, 1
 
@@ -55,10 +65,10 @@ _LOCAL, _WORLD = 0, 1
 def _keep_column(m, s, at, axis):
     """Keep z, O, and w and vel of link i; `w_i x z` and `w_{i-1} x z` are the same."""
     for r in range(3):
-        copy_rows(s, R + 3 * r + axis, at + r, 1)
-    copy_rows(s, P, at + 3, 3)
-    copy_rows(s, W, at + 6, 3)
-    copy_rows(s, V, at + 9, 3)
+        copy_rows(m, s, R + 3 * r + axis, at + r, 1)
+    copy_rows(m, s, P, at + 3, 3)
+    copy_rows(m, s, W, at + 6, 3)
+    copy_rows(m, s, V, at + 9, 3)
 
 
 @lane_function
@@ -87,26 +97,26 @@ def _column_rate(m, s, turns, reference):
 def _frame_rates(m, s, plan, f, b, reference, to):
     for c in range(plan.column_count):
         if plan.leaders[f * plan.column_count + c] >= 0:
-            copy_rows(s, plan.kept + KEPT_ROWS * c, AXIS, KEPT_ROWS)
+            copy_rows(m, s, plan.kept + KEPT_ROWS * c, AXIS, KEPT_ROWS)
             _column_rate(m, s, plan.columns[COLUMN_WIDTH * c + TURNS] == 1, reference)
             put_column(m, s, plan, f, c)
     write_matrix(m, s, plan, f, b, to)
 
 
 @lane_function
-def _rate_block(m, s, plan, b, reference, base, q, v, to):
+def _rate_block(m, s, plan, b, reference, base, stride, q, v, to):
     order = 1 + 0 * b
     read_inputs(m, s, plan, b, q, v, v, order)
-    start(m, s, plan, b, base, order)
+    start(m, s, plan, b, base, stride, order)
     rows = rows_of(order)
     f = c = 0 * b
     size = plan.frame_count * 6 * plan.nv
     for i in range(-1, plan.step_count):
         if i >= 0:
             fetch_output(m, i, plan.step_count, to, b * size, m * size)
-            resume(s, plan, i, rows)
+            resume(m, s, plan, i, rows)
             step(m, s, plan, i, order)
-            save(s, plan, i, rows)
+            save(m, s, plan, i, rows)
             while c < plan.column_count and plan.columns[COLUMN_WIDTH * c + STEP] == i:
                 _keep_column(m, s, plan.kept + KEPT_ROWS * c, plan.columns[COLUMN_WIDTH * c + AXIS_OF])
                 c += 1
@@ -118,14 +128,15 @@ def _rate_block(m, s, plan, b, reference, base, q, v, to):
 
 
 @kernel(INT, PLAN, ROWS, ROWS, ROWS, output(4), SCRATCH)
-def jacobian_rates(reference, packed, base, q, v, out, s):
+def jacobian_rates(reference, packed, base, q, v, out, scratch):
     """Rates of the velocity Jacobians (7.126) of frames: 1, or 0 for an input that is not finite.
 
-    Shapes: base (1 or n, 24), q (n, nq), v (n, nv), out (n, frames, 6, nv), s (rows * LANES,).
+    Shapes: base (1 or n, 24), q (n, nq), v (n, nv), out (n, frames, 6, nv), scratch (rows * LANES,).
     """
     n, plan, good = q.shape[0], walk_of(packed), 1
-    lanes = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    m = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    s, state, stride = pointer_to(scratch), pointer_to(base), stride_of(base)
     x, y, to = pointer_to(q), pointer_to(v), pointer_to(out)
     for b in range(0, n, LANES):
-        good &= _rate_block(lanes, s, plan, b, reference, base, x, y, to)
+        good &= _rate_block(m, s, plan, b, reference, state, stride, x, y, to)
     return good

@@ -124,25 +124,30 @@ def rotate_back(s, row, x, k):
 
 
 @intrinsic
-def copy_rows(context: Any, s: Any, source: Any, target: Any, count: Any) -> Any:
-    """Copy `count` whole rows, each at once.
+def copy_rows(context: Any, m: Any, s: Any, source: Any, target: Any, count: Any) -> Any:
+    """Copy `count` whole rows, each at once; with one lane, only that.
 
     Rows whose number is not a constant are met here and nowhere else: the compiler cannot see that two of
     them are apart, and would copy number by number.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        numbers = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        source, target, count = arguments[1:]
-        row = ir.VectorType(ir.DoubleType(), LANES).as_pointer()
+        m, numbers, source, target, count = arguments
         with cgutils.for_range(builder, count) as loop:
             places = (builder.add(first, loop.index) for first in (source, target))
             begin = (builder.mul(place, place.type(LANES)) for place in places)
-            at, to = (builder.bitcast(builder.gep(numbers, [number]), row) for number in begin)
-            builder.store(builder.load(at, align=8), to, align=8)
+            at, to = (builder.gep(numbers, [number]) for number in begin)
+            with builder.if_else(builder.icmp_signed("==", m, m.type(1))) as (one, all_lanes):
+                with one:
+                    builder.store(builder.load(at), to)
+                with all_lanes:
+                    row = ir.VectorType(ir.DoubleType(), LANES).as_pointer()
+                    whole = builder.load(builder.bitcast(at, row), align=8)
+                    builder.store(whole, builder.bitcast(to, row), align=8)
         return context.get_dummy_value()
 
-    return types.void(s, types.intp, types.intp, types.intp), generate
+    numbers = types.CPointer(types.float64)
+    return types.void(types.intp, numbers, types.intp, types.intp, types.intp), generate
 
 
 # Sine and cosine of a whole block: Cody and Waite's reduction to [-pi/4, pi/4] with pi/2 in three parts,

@@ -22,7 +22,7 @@ from urdfkin.recursion.lanes import (
     sine_cosine,
     store,
 )
-from urdfkin.recursion.motion_kernel import inputs_finite, write_motion
+from urdfkin.recursion.motion_kernel import inputs_finite, shapes_fit, write_motion
 from urdfkin.recursion.plan import GEOMETRY_WIDTH, OFFSET_WIDTH, STEP_WIDTH, Geometry, Motion, Step
 from urdfkin.recursion.rows import (
     ALPHA,
@@ -46,7 +46,7 @@ from urdfkin.recursion.rows import (
     W,
 )
 from urdfkin.recursion.steps import carry, gather_joint, gather_place, gather_rates
-from urdfkin.recursion.walk import read_inputs, resume, save, walk_of
+from urdfkin.recursion.walk import read_inputs, resume, save, scratch_of, still_base, stride_of, walk_of
 
 _KIND = int(Step.KIND)
 _OFFSET = int(Geometry.OFFSET)
@@ -66,19 +66,18 @@ def _rows_of(order):
 
 
 @lane_function
-def _start(m, s, plan, b, base, order):
+def _start(m, s, plan, b, base, stride, order):
     """The state of the base in its own axes; places are not followed."""
-    fixed = base.shape[0] == 1
     for k in range(m):
-        row = 0 if fixed else b + k
+        row = (b + k) * stride
         store(s, P, k, (0.0, 0.0, 0.0))
         for at in range(W, W + 3 * _vectors(order), 3):
-            x = (base[row, at], base[row, at + 1], base[row, at + 2])
-            first = (base[row, R], base[row, R + 3], base[row, R + 6])
-            second = (base[row, R + 1], base[row, R + 4], base[row, R + 7])
-            third = (base[row, R + 2], base[row, R + 5], base[row, R + 8])
+            x = (base[row + at], base[row + at + 1], base[row + at + 2])
+            first = (base[row + R], base[row + R + 3], base[row + R + 6])
+            second = (base[row + R + 1], base[row + R + 4], base[row + R + 7])
+            third = (base[row + R + 2], base[row + R + 5], base[row + R + 8])
             store(s, at, k, (dot(first, x), dot(second, x), dot(third, x)))
-    copy_rows(s, 0, plan.slots, _rows_of(order))
+    copy_rows(m, s, 0, plan.slots, _rows_of(order))
 
 
 @lane_function
@@ -202,18 +201,18 @@ def _step(m, s, plan, i, order):
 
 
 @lane_function
-def _local_block(m, s, plan, b, order, base, q, v, a, to):
+def _local_block(m, s, plan, b, order, base, stride, q, v, a, to):
     read_inputs(m, s, plan, b, q, v, a, order)
-    _start(m, s, plan, b, base, order)
+    _start(m, s, plan, b, base, stride, order)
     rows = _rows_of(order)
     f = 0 * b
     for i in range(-1, plan.step_count):
         if i >= 0:
-            resume(s, plan, i, rows)
+            resume(m, s, plan, i, rows)
             _step(m, s, plan, i, order)
-            save(s, plan, i, rows)
+            save(m, s, plan, i, rows)
         while f < plan.frame_count and plan.frames[2 * f] == i:
-            copy_rows(s, 0, FRAME, rows)
+            copy_rows(m, s, 0, FRAME, rows)
             _place(m, s, plan.offsets, OFFSET_WIDTH * f)  # in the link's axes, as in `walk.frame_state`
             carry(m, s, FRAME, order)
             _turn_back_by_constant(m, s, FRAME, plan.offsets, OFFSET_WIDTH * f, order)
@@ -223,30 +222,29 @@ def _local_block(m, s, plan, b, order, base, q, v, a, to):
 
 
 @kernel(INT, PLAN, ROWS, ROWS, ROWS, ROWS, output(3), SCRATCH)
-def local_motions(order, packed, base, q, v, a, out, s):
+def local_motions(order, packed, base, q, v, a, out, scratch):
     """Velocities (order 1) or accelerations (2) of frames, in their own axes; 0 for an input not finite.
 
-    Shapes: base (1 or n, 24), q (n, nq), v and a (n, nv), out (n, frames, 6), s (rows * LANES,).
+    Shapes: base (1 or n, 24), q (n, nq), v and a (n, nv), out (n, frames, 6), scratch (rows * LANES,).
     """
     n, plan, good = q.shape[0], walk_of(packed), 1
-    lanes = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    m = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    s, state, stride = pointer_to(scratch), pointer_to(base), stride_of(base)
     x, y, z, to = pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
     for b in range(0, n, LANES):
-        good &= _local_block(lanes, s, plan, b, order, base, x, y, z, to)
+        good &= _local_block(m, s, plan, b, order, state, stride, x, y, z, to)
     return good
 
 
-@kernel(INT, PLAN, ROWS, NUMBERS, NUMBERS, NUMBERS, output(1), SCRATCH, nogil=False)
-def local_motion(order, packed, base, q, v, a, out, s):
+@kernel(INT, PLAN, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
+def local_motion(order, packed, q, v, a, out):
     """The same of one frame in one configuration; -1 where the shapes are others.
 
-    Shapes: base (1, 24), q (nq,), v and a (nv,), out (6,), s (rows * LANES,).
+    Shapes: q (nq,), v and a (nv,) where the order needs them, out (6,).
     """
     plan = walk_of(packed)
-    if q.shape[0] != plan.nq or v.shape[0] != plan.nv or out.shape[0] != 6:
-        return -1
-    if order >= 2 and a.shape[0] != plan.nv:
+    if not shapes_fit(plan, order, q, v, a, out):
         return -1
     one = 1 + 0 * plan.nq
-    x, y, z, to = pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
-    return _local_block(one, s, plan, 0 * one, order, base, x, y, z, to)
+    s, x, y, z, to = scratch_of(packed), pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
+    return _local_block(one, s, plan, 0 * one, order, still_base(), 0 * one, x, y, z, to)

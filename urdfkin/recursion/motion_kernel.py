@@ -19,7 +19,19 @@ from urdfkin.recursion.lanes import (
 from urdfkin.recursion.rows import ALPHA, FRAME, ONE, ZERO, A, P, R, V, W
 from urdfkin.recursion.steps import step
 from urdfkin.recursion.transposing import write_rows
-from urdfkin.recursion.walk import finite, frame_state, read_inputs, resume, rows_of, save, start, walk_of
+from urdfkin.recursion.walk import (
+    finite,
+    frame_state,
+    read_inputs,
+    resume,
+    rows_of,
+    save,
+    scratch_of,
+    start,
+    still_base,
+    stride_of,
+    walk_of,
+)
 
 _LOCAL, _WORLD = 0, 1
 
@@ -74,16 +86,23 @@ def inputs_finite(m, plan, b, order, q, v, a):
 
 
 @lane_function
-def _motion_block(m, s, plan, b, order, reference, base, q, v, a, to):
+def shapes_fit(plan, order, q, v, a, out):
+    """Whether arrays for one configuration are as long as they must be."""
+    good = q.shape[0] == plan.nq and out.shape[0] == (16 if order == 0 else 6)
+    return good and (order < 1 or v.shape[0] == plan.nv) and (order < 2 or a.shape[0] == plan.nv)
+
+
+@lane_function
+def _motion_block(m, s, plan, b, order, reference, base, stride, q, v, a, to):
     read_inputs(m, s, plan, b, q, v, a, order)
-    start(m, s, plan, b, base, order)
+    start(m, s, plan, b, base, stride, order)
     rows = rows_of(order)
     f = 0 * b
     for i in range(-1, plan.step_count):
         if i >= 0:
-            resume(s, plan, i, rows)
+            resume(m, s, plan, i, rows)
             step(m, s, plan, i, order)
-            save(s, plan, i, rows)
+            save(m, s, plan, i, rows)
         while f < plan.frame_count and plan.frames[2 * f] == i:
             frame_state(m, s, plan, f, order, order == 0 or reference == _LOCAL)
             if order > 0:
@@ -94,30 +113,29 @@ def _motion_block(m, s, plan, b, order, reference, base, q, v, a, to):
 
 
 @kernel(INT, INT, PLAN, ROWS, ROWS, ROWS, ROWS, output(3), SCRATCH)
-def motions(order, reference, packed, base, q, v, a, out, s):
+def motions(order, reference, packed, base, q, v, a, out, scratch):
     """Placements (order 0), velocities (1) or accelerations (2) of frames: 1, or 0 for an input not finite.
 
-    Shapes: base (1 or n, 24), q (n, nq), v and a (n, nv), out (n, frames, 16 or 6), s (rows * LANES,).
+    Shapes: base (1 or n, 24), q (n, nq), v and a (n, nv), out (n, frames, 16 or 6), scratch (rows * LANES,).
     """
     n, plan, good = q.shape[0], walk_of(packed), 1
-    lanes = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    m = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
+    s, state, stride = pointer_to(scratch), pointer_to(base), stride_of(base)
     x, y, z, to = pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
     for b in range(0, n, LANES):
-        good &= _motion_block(lanes, s, plan, b, order, reference, base, x, y, z, to)
+        good &= _motion_block(m, s, plan, b, order, reference, state, stride, x, y, z, to)
     return good
 
 
-@kernel(INT, INT, PLAN, ROWS, NUMBERS, NUMBERS, NUMBERS, output(1), SCRATCH, nogil=False)
-def motion(order, reference, packed, base, q, v, a, out, s):
+@kernel(INT, INT, PLAN, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
+def motion(order, reference, packed, q, v, a, out):
     """The same of one frame in one configuration; -1 where the shapes are others.
 
-    Shapes: base (1, 24), q (nq,), v and a (nv,), out (16 or 6,), s (rows * LANES,).
+    Shapes: q (nq,), v and a (nv,) where the order needs them, out (16 or 6,).
     """
     plan = walk_of(packed)
-    if q.shape[0] != plan.nq or out.shape[0] != (16 if order == 0 else 6):
-        return -1
-    if (order >= 1 and v.shape[0] != plan.nv) or (order >= 2 and a.shape[0] != plan.nv):
+    if not shapes_fit(plan, order, q, v, a, out):
         return -1
     one = 1 + 0 * plan.nq
-    x, y, z, to = pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
-    return _motion_block(one, s, plan, 0 * one, order, reference, base, x, y, z, to)
+    s, x, y, z, to = scratch_of(packed), pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
+    return _motion_block(one, s, plan, 0 * one, order, reference, still_base(), 0 * one, x, y, z, to)

@@ -35,7 +35,10 @@ class Step(IntEnum):
 
 
 class Packed(IntEnum):
-    """Entries of `Plan.packed`: addresses of the plan's arrays, then their sizes, then rows of scratch."""
+    """Entries of `Plan.packed`: addresses of the plan's arrays, then their sizes, then rows of scratch.
+
+    Kernels for one configuration find the address of their scratch array behind them.
+    """
 
     STEPS = 0
     GEOMETRY = 1
@@ -55,6 +58,7 @@ class Packed(IntEnum):
     NQ = 15
     NV = 16
     AREAS = 17
+    SCRATCH = 24
 
 
 class Motion(IntEnum):

@@ -195,15 +195,15 @@ def gather_joint(m, s, plan, i, order):
     at, rate_at = plan.steps[STEP_WIDTH * i + _Q], plan.steps[STEP_WIDTH * i + _V]
     rule = GEOMETRY_WIDTH * i
     multiplier, constant = plan.geometry[rule + _MULTIPLIER], plan.geometry[rule + _CONSTANT]
-    copy_rows(s, plan.q + at, ANGLE, 1)
+    copy_rows(m, s, plan.q + at, ANGLE, 1)
     for k in range(m):
         s[ANGLE * LANES + k] = multiplier * s[ANGLE * LANES + k] + constant
     if order >= 1:
-        copy_rows(s, plan.v + rate_at, RATE, 1)
+        copy_rows(m, s, plan.v + rate_at, RATE, 1)
         for k in range(m):
             s[RATE * LANES + k] = multiplier * s[RATE * LANES + k]
     if order >= 2:
-        copy_rows(s, plan.a + rate_at, RATE_2, 1)
+        copy_rows(m, s, plan.a + rate_at, RATE_2, 1)
         for k in range(m):
             s[RATE_2 * LANES + k] = multiplier * s[RATE_2 * LANES + k]
 
@@ -213,28 +213,28 @@ def gather_place(m, s, plan, i):
     """Place of a planar joint (x, y and the angle) or of a floating one (x, y, z and the quaternion)."""
     at = plan.q + plan.steps[STEP_WIDTH * i + _Q]
     if plan.steps[STEP_WIDTH * i + _KIND] == _PLANAR:
-        copy_rows(s, at, SLIDE, 2)
+        copy_rows(m, s, at, SLIDE, 2)
         for k in range(m):
             s[(SLIDE + 2) * LANES + k] = 0.0
-        copy_rows(s, at + 2, ANGLE, 1)
+        copy_rows(m, s, at + 2, ANGLE, 1)
     else:
-        copy_rows(s, at, SLIDE, 3)
-        copy_rows(s, at + 3, QUATERNION, 4)
+        copy_rows(m, s, at, SLIDE, 3)
+        copy_rows(m, s, at + 3, QUATERNION, 4)
 
 
 @lane_function
 def _gather_rates(m, s, planar, at, slide, turn):
     """Rates of a planar (x, y, about z) or floating (three and three) joint into two vectors."""
     if planar:
-        copy_rows(s, at, slide, 2)
-        copy_rows(s, at + 2, turn + 2, 1)
+        copy_rows(m, s, at, slide, 2)
+        copy_rows(m, s, at + 2, turn + 2, 1)
         for k in range(m):
             s[(slide + 2) * LANES + k] = 0.0
             s[turn * LANES + k] = 0.0
             s[(turn + 1) * LANES + k] = 0.0
     else:
-        copy_rows(s, at, slide, 3)
-        copy_rows(s, at + 3, turn, 3)
+        copy_rows(m, s, at, slide, 3)
+        copy_rows(m, s, at + 3, turn, 3)
 
 
 @lane_function

@@ -15,7 +15,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from urdfkin.recursion.lanes import LANES, lane_function, pointer_to
+from urdfkin.recursion.lanes import LANES, lane_function
 
 #: Lanes and numbers of a full block.
 _EIGHT = 8
@@ -124,20 +124,19 @@ def read_rows(m, x, at, stride, count, s, row):
         for i in range(count):
             s[(row + i) * LANES] = x[at + i]
         return
-    lanes = pointer_to(s)
     for half in range(0, LANES, _EIGHT):
         here, i = at + half * stride, 0
         while i + 8 <= count:
-            _read_8(x, here + i, stride, lanes, row + i, half)
+            _read_8(x, here + i, stride, s, row + i, half)
             i += 8
         if count & 4:
-            _read_4(x, here + i, stride, lanes, row + i, half)
+            _read_4(x, here + i, stride, s, row + i, half)
             i += 4
         if count & 2:
-            _read_2(x, here + i, stride, lanes, row + i, half)
+            _read_2(x, here + i, stride, s, row + i, half)
             i += 2
         if count & 1:
-            _read_1(x, here + i, stride, lanes, row + i, half)
+            _read_1(x, here + i, stride, s, row + i, half)
 
 
 @lane_function
@@ -147,20 +146,19 @@ def write_rows(m, s, rows, first, count, to, at, stride):
         for i in range(count):
             to[at + i] = s[rows[first + i] * LANES]
         return
-    lanes = pointer_to(s)
     for half in range(0, LANES, _EIGHT):
         here, i = at + half * stride, 0
         while i + 8 <= count:
-            _write_8(lanes, rows, first + i, half, to, here + i, stride)
+            _write_8(s, rows, first + i, half, to, here + i, stride)
             i += 8
         if count & 4:
-            _write_4(lanes, rows, first + i, half, to, here + i, stride)
+            _write_4(s, rows, first + i, half, to, here + i, stride)
             i += 4
         if count & 2:
-            _write_2(lanes, rows, first + i, half, to, here + i, stride)
+            _write_2(s, rows, first + i, half, to, here + i, stride)
             i += 2
         if count & 1:
-            _write_1(lanes, rows, first + i, half, to, here + i, stride)
+            _write_1(s, rows, first + i, half, to, here + i, stride)
 
 
 def _fetching(to_write: int) -> Any:

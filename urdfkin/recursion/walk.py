@@ -12,7 +12,16 @@ from typing import Any, NamedTuple
 
 import numba
 
-from urdfkin.recursion.lanes import COMPILED, LANES, copy_rows, lane_function, numbers_at, whole_numbers_at
+from urdfkin.recursion.base import STILL_STATE
+from urdfkin.recursion.lanes import (
+    COMPILED,
+    LANES,
+    copy_rows,
+    lane_function,
+    numbers_at,
+    pointer_to,
+    whole_numbers_at,
+)
 from urdfkin.recursion.plan import OFFSET_WIDTH, STEP_WIDTH, Packed, Step
 from urdfkin.recursion.rows import FRAME, ONE, STATE_ROWS, ZERO
 from urdfkin.recursion.steps import carry, interorigin, turn_by_constant
@@ -24,7 +33,10 @@ _OFFSETS, _COLUMNS, _MULTIPLIERS = int(Packed.OFFSETS), int(Packed.COLUMNS), int
 _LEADERS, _SOURCES = int(Packed.LEADERS), int(Packed.SOURCES)
 _BLOCKS_Q, _BLOCKS_V = int(Packed.BLOCKS_Q), int(Packed.BLOCKS_V)
 _COUNTS, _AREAS = int(Packed.STEP_COUNT), int(Packed.AREAS)
+_SCRATCH = int(Packed.SCRATCH)
 _RESUME, _SAVE = int(Step.RESUME), int(Step.SAVE)
+
+_STILL = STILL_STATE[0].copy()
 
 
 class Walk(NamedTuple):
@@ -112,37 +124,54 @@ def rows_of(order):
 
 
 @lane_function
-def start(m, s, plan, b, base, order):
-    """The initial conditions: the state of the base (the text's frame -1 to frame 0)."""
+def start(m, s, plan, b, base, stride, order):
+    """The initial conditions: the state of the base (the text's frame -1 to frame 0), rows `stride` apart."""
     rows = rows_of(order)
-    fixed = base.shape[0] == 1
     for r in range(rows):
         for k in range(m):
-            s[r * LANES + k] = base[0 if fixed else b + k, r]
+            s[r * LANES + k] = base[(b + k) * stride + r]
     for k in range(m):
         s[ZERO * LANES + k] = 0.0
         s[ONE * LANES + k] = 1.0
-    copy_rows(s, 0, plan.slots, rows)
+    copy_rows(m, s, 0, plan.slots, rows)
 
 
 @lane_function
-def resume(s, plan, i, rows):
+def scratch_of(packed):
+    """The scratch array of a kernel for one configuration."""
+    return numbers_at(packed[_SCRATCH])
+
+
+@lane_function
+def still_base():
+    """The state of a base that stands still at the world's origin."""
+    return pointer_to(_STILL)
+
+
+@lane_function
+def stride_of(base):
+    """From the base's state in one configuration to that in the next; 0 where it is the same for all."""
+    return 0 if base.shape[0] == 1 else base.shape[1]
+
+
+@lane_function
+def resume(m, s, plan, i, rows):
     """Go on from saved state where the plan says so."""
     if plan.steps[STEP_WIDTH * i + _RESUME] >= 0:
-        copy_rows(s, plan.slots + STATE_ROWS * plan.steps[STEP_WIDTH * i + _RESUME], 0, rows)
+        copy_rows(m, s, plan.slots + STATE_ROWS * plan.steps[STEP_WIDTH * i + _RESUME], 0, rows)
 
 
 @lane_function
-def save(s, plan, i, rows):
+def save(m, s, plan, i, rows):
     """Save the state where a later step goes on from it."""
     if plan.steps[STEP_WIDTH * i + _SAVE] >= 0:
-        copy_rows(s, 0, plan.slots + STATE_ROWS * plan.steps[STEP_WIDTH * i + _SAVE], rows)
+        copy_rows(m, s, 0, plan.slots + STATE_ROWS * plan.steps[STEP_WIDTH * i + _SAVE], rows)
 
 
 @lane_function
 def frame_state(m, s, plan, f, order, turned):
     """The state of a frame that is fixed to the present link; its rotation only where it is `turned`."""
-    copy_rows(s, 0, FRAME, rows_of(order))
+    copy_rows(m, s, 0, FRAME, rows_of(order))
     at = OFFSET_WIDTH * f
     interorigin(m, s, plan.offsets, at)
     carry(m, s, FRAME, order)
