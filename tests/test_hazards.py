@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.robot import NotVerifiedWarning
+from urdfkin.call import NotVerifiedWarning
 from urdfkin.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.writer import to_urdf

@@ -22,7 +22,7 @@ LAYERS = (
     ("dh",),
     ("catalogue", "sources", "origin", "deep_stack"),
     ("oracle", "verification"),
-    ("call", "manipulator", "tables", "robot"),
+    ("checks", "call", "prepared", "manipulator", "tables", "robot"),
     ("loading", "from_table", "checking", "description", "trajectory", "frame_motion"),
     ("judge", "validation"),
     ("plot", "report", "view"),

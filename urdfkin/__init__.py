@@ -13,6 +13,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from urdfkin.call import NotVerifiedWarning
     from urdfkin.chain import FrameChain
     from urdfkin.checking import check
     from urdfkin.dh import DHRow, DHTable, read_table, table_from_rows
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from urdfkin.loading import load
     from urdfkin.recursion.base import BaseMotion
     from urdfkin.reference import Reference
-    from urdfkin.robot import NotVerifiedWarning, Robot
+    from urdfkin.robot import Robot
     from urdfkin.validation.campaign import validate
     from urdfkin.verification.certificate import Certificate, VerificationError
     from urdfkin.verification.tables import TableError
@@ -35,7 +36,7 @@ _HOMES = {
     "Finding": "urdfkin.diagnostics",
     "FrameChain": "urdfkin.chain",
     "InputError": "urdfkin.errors",
-    "NotVerifiedWarning": "urdfkin.robot",
+    "NotVerifiedWarning": "urdfkin.call",
     "Reference": "urdfkin.reference",
     "Robot": "urdfkin.robot",
     "SourceError": "urdfkin.errors",

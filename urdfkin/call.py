@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+import warnings
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError, RangeError
+from urdfkin.checks import Part, bound_of, pinocchios
+from urdfkin.errors import InputError, NotFiniteError, RangeError
 from urdfkin.recursion.base import STILL_STATE, BaseMotion
+from urdfkin.recursion.plan import IntArray
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
 from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Bound, Quantity
-from urdfkin.verification.certificate import VerificationError, compare
-from urdfkin.verification.magnitudes import magnitudes
+from urdfkin.verification.certificate import Comparison, VerificationError, compare
+from urdfkin.verification.choosing import SAMPLE, Verify, checked_choice, parts
 from urdfkin.verification.replay import replay_line
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
+
+T = TypeVar("T")
+
+
+class NotVerifiedWarning(UserWarning):
+    """Results are handed out that Pinocchio could not check; the message says why."""
 
 
 class Call:
@@ -39,14 +48,13 @@ class Call:
         self.reference = Reference.of(reference)
         self.links = tuple(robot.tree.frame_link(frame) for frame in self.frames)
         self.plan = robot.plan(self.links)
-        given = [robot.checked(x, name) for x, name in zip(inputs, "qva", strict=False)]
+        self.inputs = inputs
+        given = [robot.shaped(x, name) for x, name in zip(inputs, "qva", strict=False)]
         self.shape = self._batch_shape(given)
         self.n = int(np.prod(self.shape))
         flat = [self._flat_input(array) for array in given]
-        still = np.zeros((self.n, robot.nv)) if len(flat) < 3 else flat[-1]
-        self.q, self.v, self.a = (*flat, still, still)[:3]
+        self.q, *self.rates = flat
         self.state = STILL_STATE if base is None else base.state(self.shape)
-        self.given = len(given)
 
     def _batch_shape(self, given: list[FloatArray]) -> tuple[int, ...]:
         shapes = [array.shape[:-1] for array in given]
@@ -90,7 +98,7 @@ class Call:
                 f"out must be a writable C-contiguous float64 array of shape {(*self.shape, *own)}",
                 found=f"{getattr(out, 'dtype', type(out).__name__)} {getattr(out, 'shape', '')}",
             )
-        if any(np.may_share_memory(out, array) for array in (self.q, self.v, self.a)):
+        if any(np.may_share_memory(out, array) for array in (self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a: they are read again for the check")
         return out.reshape(self.n, 1, *own)
 
@@ -102,33 +110,74 @@ class Call:
         """The (n, frames, ...) result of a call for several, in the caller's batch shape."""
         return result.reshape(*self.shape, *result.shape[1:])
 
-    def size(self) -> Any:
-        """How large the terms are that the results are summed from."""
-        return magnitudes(self.plan, self.q, self.v, self.a, self.state)
+    def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
+        """Evaluate the walk, or name the number that is not finite."""
+        try:
+            return evaluate(*arguments, **options)
+        except NotFiniteError:
+            for x, name in zip(self.inputs, "qva", strict=False):
+                self.robot.checked(x, name)
+            raise
 
-    def check(self, quantity: Quantity, ours: FloatArray, theirs: FloatArray, bound: Bound) -> None:
-        """Enter the comparison of (n, frames, ...) results in the ledger, or raise VerificationError."""
+    def verify(self, quantity: Quantity, results: FloatArray, verify: Verify | None) -> None:
+        """Have (n, frames, ...) results checked and entered in the ledger, or raise VerificationError."""
+        robot, ledger = self.robot, self.robot.ledger
+        wanted = checked_choice(robot.verify if verify is None else verify)
+        if wanted is False:
+            ledger.unchecked(quantity, self.results)
+            return
+        if (reason := robot.cannot_verify(self.base)) is not None:
+            warnings.warn(f"not verified: {reason}", NotVerifiedWarning, stacklevel=3)
+            ledger.unchecked(quantity, self.results, reason)
+            return
+        total, worst = Comparison.of_nothing(), None
+        for part in parts(wanted, self.n, results[:1].size):
+            comparison, failure = self._compare(quantity, results[part], part)
+            worst = failure if comparison.share > total.share else worst
+            total += comparison
+        if worst is not None:
+            raise worst
+        ledger.checked(quantity, total)
+        if left := self.results - total.results:
+            ledger.unchecked(quantity, left, f'verify="sample" checks {SAMPLE} configurations of a call')
+
+    def part(self, part: slice | IntArray) -> Part:
+        """Some of its configurations, for the check."""
+        base = self.flat_base
+        if base is not None and base.batch_shape:
+            base = BaseMotion(base.placement[part], base.velocity[part], base.acceleration[part])
+        state = self.state if len(self.state) == 1 else self.state[part]
+        rates = tuple(x[part] for x in self.rates)
+        return Part(self.plan, self.frames, self.reference, self.q[part], rates, base, state)
+
+    def _compare(
+        self, quantity: Quantity, ours: FloatArray, part: slice | IntArray
+    ) -> tuple[Comparison, VerificationError | None]:
+        """Hold some of the results against Pinocchio's; the worst of them, if it disagrees."""
+        x = self.part(part)
+        theirs = pinocchios(quantity, self.robot.oracle(self.base), x)
+        bound = bound_of(quantity, x)
         comparison = compare(ours, theirs, bound, 2)
         if comparison.agrees:
-            self.robot.ledger.checked(quantity, comparison)
-            return
-        k, f = comparison.index
-        bound = Bound(*(np.broadcast_to(x, ours.shape)[k, f] for x in (bound.scale, bound.k)))
-        if not (np.isfinite(bound.scale).all() and np.isfinite(theirs[k, f]).all()):
+            return comparison, None
+        i, f = comparison.index
+        k = part.start + i if isinstance(part, slice) else int(part[i])
+        bound = Bound(*(np.broadcast_to(x, ours.shape)[i, f] for x in (bound.scale, bound.k)))
+        if not (np.isfinite(bound.scale).all() and np.isfinite(theirs[i, f]).all()):
             raise RangeError(
                 f"the {quantity} of {self.frames[f]} leaves the range of double precision",
                 where=f"sample {list(self._index(k))}" if self.shape else None,
                 remedy="give smaller numbers",
             )
-        raise VerificationError(
+        return comparison, VerificationError(
             quantity,
             self.frames[f],
             self.reference.name,
             index=self._index(k),
-            ours=ours[k, f],
-            theirs=theirs[k, f],
+            ours=ours[i, f],
+            theirs=theirs[i, f],
             bound=bounds.EPS * bound.k * bound.scale,
-            units=float(bounds.disagreement(ours[k, f], theirs[k, f], bound).max()),
+            units=float(bounds.disagreement(ours[i, f], theirs[i, f], bound).max()),
             reproduce=self._replay(quantity, k, self.frames[f]),
         )
 
@@ -138,10 +187,7 @@ class Call:
 
     def _replay(self, quantity: Quantity, k: int, frame: str) -> str:
         reference = None if quantity is Quantity.PLACEMENT else self.reference.name.lower()
-        values = {
-            name: array[k].tolist()
-            for name, array in zip("qva", (self.q, self.v, self.a)[: self.given], strict=False)
-        }
+        values = {name: array[k].tolist() for name, array in zip("qva", (self.q, *self.rates), strict=False)}
         if self.base is None:
             command = str(quantity).replace(" ", "-")
             return replay_line(self.robot.origin, command, frame, reference, values)

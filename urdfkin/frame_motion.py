@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from urdfkin.call import Call
+from urdfkin.checks import bound_of, pinocchios
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.breakdown import AccelerationBreakdown, acceleration_breakdown
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
-from urdfkin.verification import bounds
-from urdfkin.verification.bounds import Bound, Quantity, disagreement
+from urdfkin.verification.bounds import Bound, Quantity, result_k
+from urdfkin.verification.worst import worst_of_each
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +107,10 @@ def frame_motion(
     call = Call(robot, (frame,), reference, None, q, v, a)
     plan, reference = call.plan, call.reference
     ours = {
-        Quantity.PLACEMENT: evaluate.placements(plan, call.q),
-        Quantity.VELOCITY: evaluate.velocities(plan, call.q, call.v, reference),
-        Quantity.ACCELERATION: evaluate.accelerations(plan, call.q, call.v, call.a, reference),
-        Quantity.JACOBIAN: evaluate.jacobians(plan, call.q, reference),
+        Quantity.PLACEMENT: call.compute(evaluate.placements, plan, call.q),
+        Quantity.VELOCITY: call.compute(evaluate.velocities, plan, call.q, call.rates[0], reference),
+        Quantity.ACCELERATION: call.compute(evaluate.accelerations, plan, call.q, *call.rates, reference),
+        Quantity.JACOBIAN: call.compute(evaluate.jacobians, plan, call.q, reference),
     }
     reason = robot.cannot_verify()
     return FrameMotion(
@@ -119,33 +120,20 @@ def frame_motion(
         ours[Quantity.VELOCITY][:, 0],
         ours[Quantity.ACCELERATION][:, 0],
         ours[Quantity.JACOBIAN][:, 0],
-        acceleration_breakdown(robot.tree, call.links[0], call.q, call.v, call.a, reference),
+        call.compute(acceleration_breakdown, robot.tree, call.links[0], call.q, *call.rates, reference),
         {} if reason else _checks(call, ours),
         reason,
     )
 
 
 def _checks(call: Call, ours: dict[Quantity, FloatArray]) -> dict[Quantity, Check]:
-    oracle, size, reference, frames = call.robot.oracle(None), call.size(), call.reference, call.frames
-    pairs = {
-        Quantity.PLACEMENT: (oracle.placements(call.q, frames), bounds.placement_bound(size)),
-        Quantity.VELOCITY: (
-            oracle.velocities(call.q, call.v, frames, [reference])[:, :, 0],
-            bounds.velocity_bound(size, reference),
-        ),
-        Quantity.ACCELERATION: (
-            oracle.accelerations(call.q, call.v, call.a, frames, [reference])[:, :, 0],
-            bounds.acceleration_bound(size, reference),
-        ),
-        Quantity.JACOBIAN: (
-            oracle.jacobians(call.q, frames, [reference])[:, :, 0],
-            bounds.jacobian_bound(call.plan, size, reference),
-        ),
+    oracle, x = call.robot.oracle(None), call.part(slice(0, call.n))
+    return {
+        quantity: _check(results, pinocchios(quantity, oracle, x), bound_of(quantity, x))
+        for quantity, results in ours.items()
     }
-    return {quantity: _check(ours[quantity], *pair) for quantity, pair in pairs.items()}
 
 
 def _check(ours: FloatArray, theirs: FloatArray, bound: Bound) -> Check:
-    units = disagreement(ours, theirs, bound)
-    share = units / bound.k
-    return Check(*(x.reshape(len(x), -1).max(axis=1, initial=0.0) for x in (units, share)))
+    units = worst_of_each(ours, theirs, bound.scale, 2)
+    return Check(units[:, 0], (units / result_k(bound, units.shape))[:, 0])

@@ -5,9 +5,10 @@ from __future__ import annotations
 from urdfkin.dh.table import DHTable
 from urdfkin.loading import load
 from urdfkin.robot import Robot
+from urdfkin.verification.choosing import Verify
 
 
-def robot_from_table(table: DHTable, *, verify: bool = True) -> Robot:
+def robot_from_table(table: DHTable, *, verify: Verify = True) -> Robot:
     """The robot of a table, by way of its URDF, which is also what Pinocchio checks it against.
 
     Args:

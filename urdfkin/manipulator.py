@@ -20,8 +20,8 @@ from urdfkin.recursion.breakdown import AccelerationBreakdown, acceleration_brea
 from urdfkin.reference import Reference
 from urdfkin.rotation.euler_rates import NEAREST
 from urdfkin.tree import FloatArray
-from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Quantity
+from urdfkin.verification.choosing import Verify
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
@@ -38,7 +38,7 @@ class Manipulator:
         frames: Sequence[str] | None = None,
         *,
         base: BaseMotion | None = None,
-        verify: bool | None = None,
+        verify: Verify | None = None,
     ) -> FloatArray:
         """(..., frames, 4, 4) T_world_frame of several frames in one pass (7.77).
 
@@ -55,10 +55,8 @@ class Manipulator:
         """
         robot = _robot(self)
         call = Call(robot, _names(robot, frames), _ALIGNED, base, q)
-        result = evaluate.placements(call.plan, call.q, base=call.state)
-        if robot.wants(verify, Quantity.PLACEMENT, call.results, base):
-            theirs = robot.oracle(base).placements(call.q, call.frames, call.flat_base)
-            call.check(Quantity.PLACEMENT, result, theirs, bounds.placement_bound(call.size()))
+        result = call.compute(evaluate.placements, call.plan, call.q, base=call.state)
+        call.verify(Quantity.PLACEMENT, result, verify)
         return call.every(result)
 
     def velocities(
@@ -69,7 +67,7 @@ class Manipulator:
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
-        verify: bool | None = None,
+        verify: Verify | None = None,
     ) -> FloatArray:
         """(..., frames, 6) [linear; angular] of several frames in one pass (7.75 to 7.79 by 7.127, 7.128).
 
@@ -77,12 +75,9 @@ class Manipulator:
         """
         robot = _robot(self)
         call = Call(robot, _names(robot, frames), reference, base, q, v)
-        result = evaluate.velocities(call.plan, call.q, call.v, call.reference, base=call.state)
-        if robot.wants(verify, Quantity.VELOCITY, call.results, base):
-            theirs = robot.oracle(base).velocities(
-                call.q, call.v, call.frames, [call.reference], call.flat_base
-            )[:, :, 0]
-            call.check(Quantity.VELOCITY, result, theirs, bounds.velocity_bound(call.size(), call.reference))
+        walk = call.plan, call.q, *call.rates, call.reference
+        result = call.compute(evaluate.velocities, *walk, base=call.state)
+        call.verify(Quantity.VELOCITY, result, verify)
         return call.every(result)
 
     def jacobians(
@@ -92,7 +87,7 @@ class Manipulator:
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
-        verify: bool | None = None,
+        verify: Verify | None = None,
     ) -> FloatArray:
         """(..., frames, 6, nv) velocity Jacobians of several frames in one pass (7.85).
 
@@ -100,11 +95,8 @@ class Manipulator:
         """
         robot = _robot(self)
         call = Call(robot, _names(robot, frames), reference, base, q)
-        result = evaluate.jacobians(call.plan, call.q, call.reference, base=call.state)
-        if robot.wants(verify, Quantity.JACOBIAN, call.results, base):
-            theirs = robot.oracle(base).jacobians(call.q, call.frames, [call.reference], call.flat_base)
-            bound = bounds.jacobian_bound(call.plan, call.size(), call.reference)
-            call.check(Quantity.JACOBIAN, result, theirs[:, :, 0], bound)
+        result = call.compute(evaluate.jacobians, call.plan, call.q, call.reference, base=call.state)
+        call.verify(Quantity.JACOBIAN, result, verify)
         return call.every(result)
 
     def accelerations(
@@ -116,7 +108,7 @@ class Manipulator:
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
-        verify: bool | None = None,
+        verify: Verify | None = None,
     ) -> FloatArray:
         """(..., frames, 6) classical accelerations of several frames in one pass (7.129, 7.130).
 
@@ -124,13 +116,10 @@ class Manipulator:
         """
         robot = _robot(self)
         call = Call(robot, _names(robot, frames), reference, base, q, v, a)
-        result = evaluate.accelerations(call.plan, call.q, call.v, call.a, call.reference, base=call.state)
-        if robot.wants(verify, Quantity.ACCELERATION, call.results, base):
-            theirs = robot.oracle(base).accelerations(
-                call.q, call.v, call.a, call.frames, [call.reference], call.flat_base
-            )
-            bound = bounds.acceleration_bound(call.size(), call.reference)
-            call.check(Quantity.ACCELERATION, result, theirs[:, :, 0], bound)
+        result = call.compute(
+            evaluate.accelerations, call.plan, call.q, *call.rates, call.reference, base=call.state
+        )
+        call.verify(Quantity.ACCELERATION, result, verify)
         return call.every(result)
 
     def jacobian_rate(
@@ -142,7 +131,7 @@ class Manipulator:
         *,
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
-        verify: bool | None = None,
+        verify: Verify | None = None,
     ) -> FloatArray:
         """(..., 6, nv) J-dot, the time derivative of `jacobian` along the motion (7.126).
 
@@ -166,15 +155,16 @@ class Manipulator:
         """
         robot = _robot(self)
         call = Call(robot, (frame,), reference, base, q, v)
-        result = evaluate.jacobian_rates(
-            call.plan, call.q, call.v, call.reference, base=call.state, out=call.flat(out, 6, robot.nv)
+        result = call.compute(
+            evaluate.jacobian_rates,
+            call.plan,
+            call.q,
+            *call.rates,
+            call.reference,
+            base=call.state,
+            out=call.flat(out, 6, robot.nv),
         )
-        if robot.wants(verify, Quantity.JACOBIAN_RATE, call.n, base):
-            theirs = robot.oracle(base).jacobian_rates(
-                call.q, call.v, call.frames, [call.reference], call.flat_base
-            )
-            bound = bounds.jacobian_rate_bound(call.plan, call.size(), call.reference)
-            call.check(Quantity.JACOBIAN_RATE, result, theirs[:, :, 0], bound)
+        call.verify(Quantity.JACOBIAN_RATE, result, verify)
         return call.one(result, out)
 
     def analytical_jacobian(
@@ -185,7 +175,7 @@ class Manipulator:
         *,
         nearest: float = NEAREST,
         base: BaseMotion | None = None,
-        verify: bool | None = None,
+        verify: Verify | None = None,
     ) -> FloatArray:
         """The manipulator Jacobian J = C^-1 J_v (7.122): derivatives of position and orientation by q.
 
@@ -225,7 +215,7 @@ class Manipulator:
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
-        verify: bool | None = None,
+        verify: Verify | None = None,
     ) -> AccelerationBreakdown:
         """`acceleration`, as a sum over joints and kinds: transverse, centripetal, Coriolis, sliding.
 
@@ -236,15 +226,16 @@ class Manipulator:
         """
         robot = _robot(self)
         call = Call(robot, (frame,), reference, base, q, v, a)
-        parts = acceleration_breakdown(
-            robot.tree, call.links[0], call.q, call.v, call.a, call.reference, call.state
+        parts = call.compute(
+            acceleration_breakdown,
+            robot.tree,
+            call.links[0],
+            call.q,
+            *call.rates,
+            call.reference,
+            call.state,
         )
-        if robot.wants(verify, Quantity.ACCELERATION, call.n, base):
-            theirs = robot.oracle(base).accelerations(
-                call.q, call.v, call.a, call.frames, [call.reference], call.flat_base
-            )
-            bound = bounds.acceleration_bound(call.size(), call.reference)
-            call.check(Quantity.ACCELERATION, parts.total[:, np.newaxis], theirs[:, :, 0], bound)
+        call.verify(Quantity.ACCELERATION, parts.total[:, np.newaxis], verify)
         return AccelerationBreakdown(parts.joints, call.every(parts.base), call.every(parts.terms))
 
 

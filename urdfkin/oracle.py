@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import importlib.metadata
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -177,17 +178,14 @@ class Oracle:
         base: BaseMotion | None = None,
     ) -> FloatArray:
         """(n, frames, references, 6): `getFrameVelocity`."""
-        pin, model, data = self._pin, self._model, self._data
-        ids = [self._frame(frame) for frame in frames]
-        wanted = [self._references[reference] for reference in references]
-        out = np.empty((len(q), len(ids), len(wanted), 6))
-        v_full = self.rates(v, base)
-        for k, q_k in enumerate(self.configurations(q, base)):
-            pin.forwardKinematics(model, data, q_k, v_full[k])
-            for f, frame in enumerate(ids):
-                for r, reference in enumerate(wanted):
-                    out[k, f, r] = pin.getFrameVelocity(model, data, frame, reference).vector
-        return out
+        pin = self._pin
+        return self._collected(
+            (self.configurations(q, base), self.rates(v, base)),
+            pin.forwardKinematics,
+            lambda *which: pin.getFrameVelocity(*which).vector,
+            frames,
+            references,
+        )
 
     def accelerations(
         self,
@@ -199,17 +197,14 @@ class Oracle:
         base: BaseMotion | None = None,
     ) -> FloatArray:
         """(n, frames, references, 6): `getFrameClassicalAcceleration`."""
-        pin, model, data = self._pin, self._model, self._data
-        ids = [self._frame(frame) for frame in frames]
-        wanted = [self._references[reference] for reference in references]
-        out = np.empty((len(q), len(ids), len(wanted), 6))
-        v_full, a_full = self.rates(v, base), self.second_rates(a, base)
-        for k, q_k in enumerate(self.configurations(q, base)):
-            pin.forwardKinematics(model, data, q_k, v_full[k], a_full[k])
-            for f, frame in enumerate(ids):
-                for r, reference in enumerate(wanted):
-                    out[k, f, r] = pin.getFrameClassicalAcceleration(model, data, frame, reference).vector
-        return out
+        pin = self._pin
+        return self._collected(
+            (self.configurations(q, base), self.rates(v, base), self.second_rates(a, base)),
+            pin.forwardKinematics,
+            lambda *which: pin.getFrameClassicalAcceleration(*which).vector,
+            frames,
+            references,
+        )
 
     def jacobians(
         self,
@@ -219,16 +214,10 @@ class Oracle:
         base: BaseMotion | None = None,
     ) -> FloatArray:
         """(n, frames, references, 6, nv): `computeJointJacobians`, then `getFrameJacobian`."""
-        pin, model, data = self._pin, self._model, self._data
-        ids = [self._frame(frame) for frame in frames]
-        wanted = [self._references[reference] for reference in references]
-        full = np.empty((len(q), len(ids), len(wanted), 6, model.nv))
-        for k, q_k in self._moving(q, base):
-            pin.computeJointJacobians(model, data, q_k)
-            for f, frame in enumerate(ids):
-                for r, reference in enumerate(wanted):
-                    full[k, f, r] = _columns(pin.getFrameJacobian(model, data, frame, reference))
-        return self._layout.couple(full)
+        pin, inputs = self._pin, (self.configurations(q, base),)
+        return self._layout.couple(
+            self._collected(inputs, pin.computeJointJacobians, pin.getFrameJacobian, frames, references)
+        )
 
     def jacobian_rates(
         self,
@@ -239,17 +228,9 @@ class Oracle:
         base: BaseMotion | None = None,
     ) -> FloatArray:
         """(n, frames, references, 6, nv): `getFrameJacobianTimeVariation`."""
-        pin, model, data = self._pin, self._model, self._data
-        ids = [self._frame(frame) for frame in frames]
-        wanted = [self._references[reference] for reference in references]
-        full = np.empty((len(q), len(ids), len(wanted), 6, model.nv))
-        v_full = self.rates(v, base)
-        for k, q_k in self._moving(q, base):
-            pin.computeJointJacobiansTimeVariation(model, data, q_k, v_full[k])
-            for f, frame in enumerate(ids):
-                for r, reference in enumerate(wanted):
-                    full[k, f, r] = _columns(pin.getFrameJacobianTimeVariation(model, data, frame, reference))
-        return self._layout.couple(full)
+        pin, inputs = self._pin, (self.configurations(q, base), self.rates(v, base))
+        compute, get = pin.computeJointJacobiansTimeVariation, pin.getFrameJacobianTimeVariation
+        return self._layout.couple(self._collected(inputs, compute, get, frames, references))
 
     def jacobian_rates_of_all(
         self, q: FloatArray, v: FloatArray, frames: Sequence[str], reference: Reference
@@ -294,6 +275,39 @@ class Oracle:
         for k, q_k in self._moving(q, None):
             J = _columns(self._pin.computeJointJacobians(self._model, self._data, q_k))
             out[k] = J[:, self._layout.rate_columns]
+        return out
+
+    def _collected(
+        self,
+        inputs: tuple[FloatArray, ...],
+        compute: Callable[..., object],
+        get: Callable[..., FloatArray],
+        frames: Sequence[str],
+        references: Sequence[Reference],
+    ) -> FloatArray:
+        """(n, frames, references, ...): `compute` for each of the inputs, then `get` for each of the wanted.
+
+        A tight loop for one frame in one reference: what it takes beyond Pinocchio's own time is the price of
+        a check.
+        """
+        model, data, n = self._model, self._data, len(inputs[0])
+        ids = [self._frame(frame) for frame in frames]
+        wanted = list(product(ids, (self._references[reference] for reference in references)))
+        own = (6, model.nv) if compute is not self._pin.forwardKinematics else (6,)
+        out = np.empty((n, len(ids), len(references), *own))
+        if not all(own):  # Pinocchio 4.1 kills the process when asked for a Jacobian without columns
+            return out
+        flat = out.reshape(n, len(wanted), *((6,) if model.nv == 1 else own))
+        if len(wanted) == 1:
+            ((frame, reference),), alone = wanted, flat[:, 0]
+            for k, x in enumerate(zip(*inputs, strict=True)):
+                compute(model, data, *x)
+                alone[k] = get(model, data, frame, reference)
+            return out
+        for to, x in zip(flat, zip(*inputs, strict=True), strict=True):
+            compute(model, data, *x)
+            for place, (frame, reference) in enumerate(wanted):
+                to[place] = get(model, data, frame, reference)
         return out
 
     # -- layout --------------------------------------------------------------------------------------
@@ -347,7 +361,7 @@ def _in_own_axes(base: BaseMotion, six: FloatArray, n: int) -> FloatArray:
 
 def _columns(J: FloatArray) -> FloatArray:
     """(6, nv), also for a robot of one rate, whose single column Pinocchio hands out as a plain vector."""
-    return J.reshape(6, -1)
+    return J if J.ndim > 1 else J.reshape(6, 1)
 
 
 class _Layout:
@@ -371,6 +385,9 @@ class _Layout:
             model.joints[j].idx_v + c for i, j in self._moving for c in range(tree.joints[i].kind.nv)
         ]
         self._rate_index, self._rate_factor = self._rate_rules()
+        #: Whether Pinocchio's rates are the robot's: the same ones, in the same order.
+        self._alike = np.array_equal(self._rate_index, np.arange(tree.nv)) and not v_base
+        self._alike &= bool((self._rate_factor == 1.0).all())
 
     def _rate_rules(self) -> tuple[IntArray, FloatArray]:
         """For each of Pinocchio's rates: whose it is in urdfkin's `v`, and the factor (G)."""
@@ -398,6 +415,8 @@ class _Layout:
 
     def couple(self, full: FloatArray) -> FloatArray:
         """J_full G: columns of followers are added to their leaders'."""
+        if self._alike:
+            return full
         own = full[..., self._v_base :] * self._rate_factor[self._v_base :]
         index = self._rate_index[self._v_base :]
         if len(index) == self._tree.nv and np.array_equal(index, np.arange(len(index))):

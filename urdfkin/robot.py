@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,10 +14,11 @@ from numpy.typing import ArrayLike
 from urdfkin import configuration
 from urdfkin.call import Call
 from urdfkin.diagnostics import Finding
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.manipulator import Manipulator
 from urdfkin.oracle import Oracle, OracleError, version
 from urdfkin.origin import Origin
+from urdfkin.prepared import PreparedFrame
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import Plan, make_plan
@@ -26,16 +26,13 @@ from urdfkin.reference import Reference
 from urdfkin.rotation.arrays import floats, scalars
 from urdfkin.tables import Tables
 from urdfkin.tree import FloatArray, KinematicTree
-from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Quantity
 from urdfkin.verification.certificate import Certificate, Ledger
+from urdfkin.verification.choosing import Verify, checked_choice
 from urdfkin.verification.sampling import sample
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-
-
-class NotVerifiedWarning(UserWarning):
-    """Results are handed out that Pinocchio could not check; the message says why."""
+_ARRAY, _FLOAT64 = np.ndarray, np.dtype(np.float64)
 
 
 class Robot(Manipulator, Tables):
@@ -61,7 +58,7 @@ class Robot(Manipulator, Tables):
         urdf: str,
         *,
         origin: Origin,
-        verify: bool = True,
+        verify: Verify = True,
         mimic: bool | None = None,
         findings: tuple[Finding, ...] = (),
         unverifiable: str | None = None,
@@ -71,7 +68,7 @@ class Robot(Manipulator, Tables):
         self.tree = tree
         self.urdf = urdf
         self.origin = origin
-        self.verify = verify
+        self.verify = checked_choice(verify)
         self.mimic = mimic
         self.findings = findings
         self.base_frame = base_frame or tree.frame_name(0)
@@ -80,10 +77,11 @@ class Robot(Manipulator, Tables):
         self.ledger = Ledger()
         self._plans: dict[tuple[int, ...], Plan] = {}
         self._oracles: dict[bool, Oracle] = {}
+        self._prepared: dict[object, PreparedFrame] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         # Pinocchio's models are rebuilt where they are needed; compiled plans are cheap to rebuild too.
-        return {**self.__dict__, "_plans": {}, "_oracles": {}}
+        return {**self.__dict__, "_plans": {}, "_oracles": {}, "_prepared": {}}
 
     def __repr__(self) -> str:
         return f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>"
@@ -191,7 +189,7 @@ class Robot(Manipulator, Tables):
         *,
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
-        verify: bool | None = None,
+        verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
         """(..., 4, 4) T_world_frame, eq. 7.77 with the rotations alongside.
@@ -200,8 +198,10 @@ class Robot(Manipulator, Tables):
             q: (..., nq) rad, m.
             frame: A link's or joint's name.
             base: How the root link moves; None if it stands at the world's origin.
-            out: C-contiguous float64 array of the result's shape to write into.
-            verify: Whether Pinocchio checks this call; None leaves it to the robot.
+            out: C-contiguous float64 array of the result's shape to write into; after an error it may hold
+                anything.
+            verify: Whether Pinocchio checks this call; "sample" has 100 of its configurations checked; None
+                leaves it to the robot.
             threads: How many compute a batch; None: every processor from 4,096 configurations on. The
                 results do not depend on it.
 
@@ -210,14 +210,13 @@ class Robot(Manipulator, Tables):
             UnknownNameError: no such frame.
             VerificationError: Pinocchio computes something else.
         """
+        if base is None and threads is None and (fast := self._fast(frame, _ALIGNED, q, verify)) is not None:
+            return fast.placement(q, out)
         call = Call(self, (frame,), _ALIGNED, base, q)
-        result = evaluate.placements(
-            call.plan, call.q, base=call.state, out=call.flat(out, 4, 4), threads=threads
-        )
-        if self.wants(verify, Quantity.PLACEMENT, call.n, base):
-            theirs = self.oracle(base).placements(call.q, call.frames, call.flat_base)
-            call.check(Quantity.PLACEMENT, result, theirs, bounds.placement_bound(call.size()))
-        return call.one(result, out)
+        to = call.flat(out, 4, 4)
+        poses = call.compute(evaluate.placements, call.plan, call.q, base=call.state, out=to, threads=threads)
+        call.verify(Quantity.PLACEMENT, poses, verify)
+        return call.one(poses, out)
 
     def velocity(
         self,
@@ -228,20 +227,17 @@ class Robot(Manipulator, Tables):
         *,
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
-        verify: bool | None = None,
+        verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
         """(..., 6) [linear; angular] m/s, rad/s: eq. 7.127, 7.128. Arguments and errors as `placement`."""
+        if base is None and threads is None and (fast := self._fast(frame, reference, q, verify)) is not None:
+            return fast.velocity(q, v, out)
         call = Call(self, (frame,), reference, base, q, v)
-        result = evaluate.velocities(
-            call.plan, call.q, call.v, call.reference, base=call.state, out=call.flat(out, 6), threads=threads
-        )
-        if self.wants(verify, Quantity.VELOCITY, call.n, base):
-            theirs = self.oracle(base).velocities(
-                call.q, call.v, call.frames, [call.reference], call.flat_base
-            )[:, :, 0]
-            call.check(Quantity.VELOCITY, result, theirs, bounds.velocity_bound(call.size(), call.reference))
-        return call.one(result, out)
+        walk, to = (call.plan, call.q, *call.rates, call.reference), call.flat(out, 6)
+        sixes = call.compute(evaluate.velocities, *walk, base=call.state, out=to, threads=threads)
+        call.verify(Quantity.VELOCITY, sixes, verify)
+        return call.one(sixes, out)
 
     def jacobian(
         self,
@@ -251,29 +247,20 @@ class Robot(Manipulator, Tables):
         *,
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
-        verify: bool | None = None,
+        verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
         """(..., 6, nv) velocity Jacobian, eq. 7.85. Arguments and errors as `placement`.
 
         Column i is the frame's velocity [linear; angular] for a unit rate of `rate_names[i]` alone.
         """
+        if base is None and threads is None and (fast := self._fast(frame, reference, q, verify)) is not None:
+            return fast.jacobian(q, out)
         call = Call(self, (frame,), reference, base, q)
-        result = evaluate.jacobians(
-            call.plan,
-            call.q,
-            call.reference,
-            base=call.state,
-            out=call.flat(out, 6, self.nv),
-            threads=threads,
-        )
-        if self.wants(verify, Quantity.JACOBIAN, call.n, base):
-            theirs = self.oracle(base).jacobians(call.q, call.frames, [call.reference], call.flat_base)[
-                :, :, 0
-            ]
-            bound = bounds.jacobian_bound(call.plan, call.size(), call.reference)
-            call.check(Quantity.JACOBIAN, result, theirs, bound)
-        return call.one(result, out)
+        walk, to = (call.plan, call.q, call.reference), call.flat(out, 6, self.nv)
+        Js = call.compute(evaluate.jacobians, *walk, base=call.state, out=to, threads=threads)
+        call.verify(Quantity.JACOBIAN, Js, verify)
+        return call.one(Js, out)
 
     def acceleration(
         self,
@@ -285,31 +272,33 @@ class Robot(Manipulator, Tables):
         *,
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
-        verify: bool | None = None,
+        verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
         """(..., 6) classical acceleration [linear; angular] m/s^2, rad/s^2: eq. 7.129, 7.130.
 
         Gravity is not in it. Arguments and errors as `placement`.
         """
+        if base is None and threads is None and (fast := self._fast(frame, reference, q, verify)) is not None:
+            return fast.acceleration(q, v, a, out)
         call = Call(self, (frame,), reference, base, q, v, a)
-        result = evaluate.accelerations(
-            call.plan,
-            call.q,
-            call.v,
-            call.a,
-            call.reference,
-            base=call.state,
-            out=call.flat(out, 6),
-            threads=threads,
-        )
-        if self.wants(verify, Quantity.ACCELERATION, call.n, base):
-            theirs = self.oracle(base).accelerations(
-                call.q, call.v, call.a, call.frames, [call.reference], call.flat_base
-            )[:, :, 0]
-            bound = bounds.acceleration_bound(call.size(), call.reference)
-            call.check(Quantity.ACCELERATION, result, theirs, bound)
-        return call.one(result, out)
+        walk, to = (call.plan, call.q, *call.rates, call.reference), call.flat(out, 6)
+        sixes = call.compute(evaluate.accelerations, *walk, base=call.state, out=to, threads=threads)
+        call.verify(Quantity.ACCELERATION, sixes, verify)
+        return call.one(sixes, out)
+
+    def prepare(self, frame: str, reference: Reference | str = _ALIGNED) -> PreparedFrame:
+        """One frame in one reference, for one configuration after the other, without a check: see there.
+
+        Raises:
+            UnknownNameError: no such frame or reference.
+        """
+        # The hash of an enumeration's member takes longer than the rest of this.
+        key = frame if reference is _ALIGNED else (frame, reference)
+        if (prepared := self._prepared.get(key)) is None:
+            plan = self.plan([self.tree.frame_link(frame)])
+            prepared = self._prepared[key] = PreparedFrame(self, frame, Reference.of(reference), plan)
+        return prepared
 
     # -- what it is worth ----------------------------------------------------------------------------
 
@@ -335,16 +324,17 @@ class Robot(Manipulator, Tables):
             )
         return self._oracles[moving]
 
-    def wants(self, verify: bool | None, quantity: Quantity, n: int, base: BaseMotion | None) -> bool:
-        """Whether to check `n` results; if not, the ledger is told why."""
-        if not (self.verify if verify is None else verify):
-            self.ledger.unchecked(quantity, n, "verify=False was asked for")
-            return False
-        if (reason := self.cannot_verify(base)) is not None:
-            warnings.warn(f"not verified: {reason}", NotVerifiedWarning, stacklevel=3)
-            self.ledger.unchecked(quantity, n, reason)
-            return False
-        return True
+    def _fast(
+        self, frame: str, reference: Reference | str, q: object, verify: Verify | None
+    ) -> PreparedFrame | None:
+        """The short way for a single configuration that nobody checks; None where it is not for this call."""
+        if verify is not False and (verify is not None or self.verify is not False):
+            return None
+        if type(q) is not _ARRAY or q.ndim != 1 or q.dtype is not _FLOAT64 or type(frame) is not str:
+            return None
+        if reference is _ALIGNED and (prepared := self._prepared.get(frame)) is not None:
+            return prepared
+        return self.prepare(frame, reference)
 
     def cannot_verify(self, base: BaseMotion | None = None) -> str | None:
         """Why Pinocchio cannot check this robot; None if it can."""
@@ -355,8 +345,8 @@ class Robot(Manipulator, Tables):
                 self.unverifiable = str(error)
         return self.unverifiable
 
-    def checked(self, value: ArrayLike, what: str) -> FloatArray:
-        """`value` as float64 with the right last axis and finite numbers."""
+    def shaped(self, value: ArrayLike, what: str) -> FloatArray:
+        """`value` as float64 with the right last axis."""
         array = floats(value, what)
         width, names = (self.nq, self.coordinate_names) if what == "q" else (self.nv, self.rate_names)
         if array.shape[-1:] != (width,):
@@ -364,7 +354,15 @@ class Robot(Manipulator, Tables):
                 f"{what} needs {width} numbers for {self.name}: {', '.join(names) or 'none, nothing moves'}",
                 found=f"shape {array.shape}",
             )
-        if not np.isfinite(array).all():
-            where = np.argwhere(~np.isfinite(array))[0]
-            raise InputError(f"{what} must be finite", where=names[where[-1]], found=str(array[tuple(where)]))
         return configuration.with_unit_quaternions(self.tree, array) if what == "q" else array
+
+    def checked(self, value: ArrayLike, what: str) -> FloatArray:
+        """The same, and every number finite."""
+        array = self.shaped(value, what)
+        if not np.isfinite(array).all():
+            names = self.coordinate_names if what == "q" else self.rate_names
+            where = np.argwhere(~np.isfinite(array))[0]
+            raise NotFiniteError(
+                f"{what} must be finite", where=names[where[-1]], found=str(array[tuple(where)])
+            )
+        return array

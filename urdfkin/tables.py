@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.call import NotVerifiedWarning
 from urdfkin.chain import FrameChain, chain
 from urdfkin.dh.elements import EPS
 from urdfkin.dh.make import dh_table
@@ -181,6 +182,4 @@ def verified_tree(
 
 
 def _warn(reason: str) -> None:
-    from urdfkin.robot import NotVerifiedWarning  # noqa: PLC0415 - the class stands below this file
-
     warnings.warn(f"not verified: {reason}", NotVerifiedWarning, stacklevel=4)

@@ -10,7 +10,8 @@ import pytest
 
 import urdfkin
 from tests.diagnostics.cases.arm import LIMIT, arm, fixed
-from urdfkin.robot import NotVerifiedWarning, Robot
+from urdfkin.call import NotVerifiedWarning
+from urdfkin.robot import Robot
 
 TIP = "link:tool"
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from tests.strategies import rotation, rotations, trees
+from urdfkin.call import NotVerifiedWarning
 from urdfkin.diagnostics import Severity, UrdfWarning, check_text
 from urdfkin.errors import InputError
 from urdfkin.loading import load
-from urdfkin.robot import NotVerifiedWarning
 from urdfkin.rotation import rpy_of
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
 from urdfkin.urdf.reader import read_tree

@@ -64,6 +64,12 @@ class Kernel:
         return int(self.compiled(*arguments))
 
 
+def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Decorator for what kernels call; options are Numba's, beside those of every kernel."""
+    decorate: Callable[[Callable[..., Any]], Any] = numba.njit(forceinline=True, **options, **COMPILED)
+    return decorate
+
+
 def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
     """Decorator: compile for these argument types when first called, keep the result on disk.
 

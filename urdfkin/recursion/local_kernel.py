@@ -236,9 +236,9 @@ def local_motions(order, packed, base, q, v, a, out, scratch):
     return good
 
 
-@kernel(INT, PLAN, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
-def local_motion(order, packed, q, v, a, out):
-    """The same of one frame in one configuration; -1 where the shapes are others.
+@kernel(INT, INT, PLAN, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
+def local_motion(order, reference, packed, q, v, a, out):
+    """The same of one frame in one configuration, always LOCAL; -1 where the shapes are others.
 
     Shapes: q (nq,), v and a (nv,) where the order needs them, out (6,).
     """

@@ -88,8 +88,8 @@ def inputs_finite(m, plan, b, order, q, v, a):
 @lane_function
 def shapes_fit(plan, order, q, v, a, out):
     """Whether arrays for one configuration are as long as they must be."""
-    good = q.shape[0] == plan.nq and out.shape[0] == (16 if order == 0 else 6)
-    return good and (order < 1 or v.shape[0] == plan.nv) and (order < 2 or a.shape[0] == plan.nv)
+    good = q.shape[0] == plan.nq and v.shape[0] == plan.nv and out.shape[0] == 6
+    return good and (order < 2 or a.shape[0] == plan.nv)
 
 
 @lane_function
@@ -127,11 +127,22 @@ def motions(order, reference, packed, base, q, v, a, out, scratch):
     return good
 
 
+@kernel(PLAN, NUMBERS, output(2), nogil=False)
+def placement(packed, q, out):
+    """The placement of one frame in one configuration; -1 where the shapes are others than (nq,), (4, 4)."""
+    plan = walk_of(packed)
+    if q.shape[0] != plan.nq or out.shape[0] != 4 or out.shape[1] != 4:
+        return -1
+    one, order = 1 + 0 * plan.nq, 0 * plan.nq
+    s, x, to = scratch_of(packed), pointer_to(q), pointer_to(out)
+    return _motion_block(one, s, plan, order, order, order, still_base(), order, x, x, x, to)
+
+
 @kernel(INT, INT, PLAN, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
 def motion(order, reference, packed, q, v, a, out):
-    """The same of one frame in one configuration; -1 where the shapes are others.
+    """The velocity (order 1) or acceleration (2) of one frame in one configuration; -1 for other shapes.
 
-    Shapes: q (nq,), v and a (nv,) where the order needs them, out (16 or 6,).
+    Shapes: q (nq,), v and a (nv,), out (6,).
     """
     plan = walk_of(packed)
     if not shapes_fit(plan, order, q, v, a, out):

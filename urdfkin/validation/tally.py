@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import Bound, Quantity, disagreement
+from urdfkin.verification.bounds import Bound, Quantity, result_k
+from urdfkin.verification.worst import worst_of_each
 
 #: Edges of the histogram of disagreements, in eps * scale: ten bins a decade from 0.001 to 100,000.
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
@@ -109,12 +110,11 @@ def tally(
         first_sample: The number of the first of the n samples.
         inputs: q, v and a of each sample, for the worst case.
     """
-    units = disagreement(ours, theirs, bound)
-    share = units / bound.k
-    n, count = units.shape[:2]
-    if not units.size:
+    n, count = ours.shape[:2]
+    if not ours.size:
         return Tally(n * count, 0, 0.0, 0.0, (n * count, *([0] * len(HISTOGRAM_EDGES))), (0.0,) * count, None)
-    units, share = (x.reshape(n, count, -1).max(axis=2) for x in (units, share))
+    units = worst_of_each(ours, theirs, bound.scale, 2)
+    share = units / result_k(bound, units.shape)
     k, f = divmod(int(share.argmax()), count)
     q, v, a = inputs[k]
     case = WorstCase(

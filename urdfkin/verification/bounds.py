@@ -50,7 +50,7 @@ from urdfkin.tree import FloatArray
 from urdfkin.verification.magnitudes import Magnitudes
 
 EPS = float(np.finfo(np.float64).eps)
-_SMALLEST = float(np.finfo(np.float64).tiny)
+SMALLEST = float(np.finfo(np.float64).tiny)
 #: Roundings for each joint and each factor, both computations together; derived above.
 ROUNDINGS = 24.0
 
@@ -98,6 +98,12 @@ class Bound:
     k: FloatArray
 
 
+def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
+    """`k` for each result, the same for all its numbers; `leading` axes count results."""
+    k = bound.k.reshape(bound.k.shape[: len(leading)])
+    return np.broadcast_to(k, leading)
+
+
 def roundings(quantity: Quantity, reference: Reference, joints: FloatArray) -> FloatArray:
     """`k` for paths with so many joints."""
     extra = 0 if reference is Reference.LOCAL_WORLD_ALIGNED or quantity is Quantity.PLACEMENT else 1
@@ -132,7 +138,19 @@ def acceleration_bound(size: Magnitudes, reference: Reference) -> Bound:
 
 
 def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    return np.repeat(np.stack((linear, angular), axis=-1), 3, axis=-1)
+    """(..., 6) from (...): the same for each of the three linear numbers, and for each angular one."""
+    scale = np.empty((*linear.shape, 6))
+    scale[..., :3] = linear[..., None]
+    scale[..., 3:] = angular[..., None]
+    return scale
+
+
+def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
+    """(..., 6, nv) from (..., nv), likewise."""
+    scale = np.empty((*linear.shape[:-1], 6, linear.shape[-1]))
+    scale[..., :3, :] = linear[..., None, :]
+    scale[..., 3:, :] = angular[..., None, :]
+    return scale
 
 
 @_BEYOND
@@ -140,7 +158,7 @@ def jacobian_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
     """For (n, frames, 6, nv): the path's length for turning columns, 1 for sliding ones, 0 for idle ones."""
     turning, sliding = column_weights(plan)
     linear = turning * size.p[..., None] + sliding
-    scale = np.repeat(np.stack((linear, np.broadcast_to(turning, linear.shape)), axis=-2), 3, axis=-2)
+    scale = _six_rows(linear, turning)
     return Bound(scale, roundings(Quantity.JACOBIAN, reference, size.joints)[..., None, None])
 
 
@@ -155,7 +173,7 @@ def jacobian_rate_bound(plan: Plan, size: Magnitudes, reference: Reference) -> B
     again = 2.0 if reference is Reference.LOCAL else 1.0
     linear = turning * (again * size.w * size.p + size.vel)[..., None] + sliding * (again * size.w)[..., None]
     angular = turning * (again * size.w)[..., None]
-    scale = np.repeat(np.stack((linear, angular), axis=-2), 3, axis=-2)
+    scale = _six_rows(linear, angular)
     return Bound(scale, roundings(Quantity.JACOBIAN_RATE, reference, size.joints)[..., None, None])
 
 
@@ -175,7 +193,7 @@ def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArr
     A result that is not finite, or that a scale beyond all numbers would excuse, disagrees by inf.
     """
     # Below the smallest normal number rounding is no longer relative: products simply lose their last bits.
-    unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, _SMALLEST), 0.0)
+    unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, SMALLEST), 0.0)
     with np.errstate(all="ignore"):
         difference = np.abs(ours - theirs)
         units = difference / unit

@@ -9,7 +9,11 @@ import numpy as np
 
 from urdfkin.errors import UrdfkinError
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import Bound, Quantity, disagreement
+from urdfkin.verification.bounds import Bound, Quantity, result_k
+from urdfkin.verification.worst import worst_of_each
+
+#: The reason that certificates give for what nobody wanted checked.
+NOT_ASKED_FOR = "verify=False was asked for"
 
 
 class VerificationError(UrdfkinError):
@@ -23,6 +27,7 @@ class VerificationError(UrdfkinError):
         ours: urdfkin's value of that sample.
         theirs: Pinocchio's.
         bound: What the two may differ by, number for number.
+        units: The disagreement, in eps * scale.
         reproduce: A line that computes the case again.
     """
 
@@ -49,7 +54,8 @@ class VerificationError(UrdfkinError):
             remedy=f"reproduce it with: {reproduce}",
         )
         self.quantity, self.frame, self.reference, self.index = quantity, frame, reference, index
-        self.ours, self.theirs, self.bound, self.reproduce = ours, theirs, bound, reproduce
+        self.ours, self.theirs, self.bound = ours, theirs, bound
+        self.units, self.reproduce = units, reproduce
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +74,21 @@ class Comparison:
     share: float
     index: tuple[int, ...]
 
+    @classmethod
+    def of_nothing(cls) -> Comparison:
+        """No results, which agree."""
+        return cls(0, 0.0, 0.0, ())
+
+    def __add__(self, other: Comparison) -> Comparison:
+        """Both together; the place is that of the larger share."""
+        first, second = (self, other) if self.share >= other.share else (other, self)
+        return Comparison(
+            self.results + other.results,
+            max(self.worst, other.worst),
+            first.share,
+            first.index or second.index,
+        )
+
     @property
     def agrees(self) -> bool:
         """Whether every number lies within its bound."""
@@ -83,13 +104,12 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Co
         bound: Scale and k, broadcastable against them.
         axes: How many leading axes count results.
     """
-    units = disagreement(ours, theirs, bound)
+    units = worst_of_each(ours, theirs, bound.scale, axes)
     if not units.size:
-        return Comparison(int(np.prod(ours.shape[:axes])), 0.0, 0.0, ())
-    share = units / bound.k
-    index = np.unravel_index(int(share.argmax()), share.shape)[:axes]
-    results = int(np.prod(ours.shape[:axes]))
-    return Comparison(results, float(units.max()), float(share.max()), tuple(int(i) for i in index))
+        return Comparison.of_nothing()
+    share = units / result_k(bound, units.shape)
+    index = np.unravel_index(int(share.argmax()), share.shape)
+    return Comparison(units.size, float(units.max()), float(share.max()), tuple(int(i) for i in index))
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,38 +163,69 @@ class Certificate:
         return "\n".join(rows + [f"  not verified: {reason}" for reason in self.not_verified])
 
 
+@dataclass(slots=True)
+class Account:
+    """What a ledger holds of one quantity.
+
+    Attributes:
+        checked: What Pinocchio confirmed.
+        unchecked: How many results it could not check, or was not asked to because of a sample.
+        not_asked_for: How many results nobody wanted checked.
+    """
+
+    checked: Comparison = field(default_factory=Comparison.of_nothing)
+    unchecked: int = 0
+    not_asked_for: int = 0
+
+    def line(self, quantity: Quantity) -> Line:
+        """The same as a certificate has it."""
+        found = self.checked
+        return Line(quantity, found.results, found.worst, found.share, self.unchecked + self.not_asked_for)
+
+
 @dataclass
 class Ledger:
     """Counts what a robot hands out; safe to use from several threads."""
 
-    _lines: dict[Quantity, Line] = field(default_factory=dict)
-    _reasons: dict[str, None] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
+    _accounts: dict[Quantity, Account] = field(default_factory=dict)
+    _reasons: dict[str, None] = field(default_factory=dict)
+
+    def account(self, quantity: Quantity) -> Account:
+        """A quantity's account, for those who count often."""
+        with self._lock:
+            return self._accounts.setdefault(quantity, Account())
 
     def checked(self, quantity: Quantity, comparison: Comparison) -> None:
         """Enter results that Pinocchio confirmed."""
+        account = self.account(quantity)
         with self._lock:
-            old = self._lines.get(quantity, Line(quantity, 0, 0.0, 0.0, 0))
-            self._lines[quantity] = Line(
-                quantity,
-                old.checked + comparison.results,
-                max(old.worst, comparison.worst),
-                max(old.share, comparison.share),
-                old.unchecked,
-            )
+            account.checked += comparison
 
-    def unchecked(self, quantity: Quantity, results: int, reason: str) -> None:
-        """Enter results that were handed out without a check, and why."""
+    def unchecked(self, quantity: Quantity, results: int, reason: str | None = None) -> None:
+        """Enter results that were handed out without a check, and why; None if nobody wanted one."""
+        account = self.account(quantity)
         with self._lock:
-            old = self._lines.get(quantity, Line(quantity, 0, 0.0, 0.0, 0))
-            self._lines[quantity] = Line(quantity, old.checked, old.worst, old.share, old.unchecked + results)
-            self._reasons[reason] = None
+            if reason is None:
+                account.not_asked_for += results
+            else:
+                account.unchecked += results
+                self._reasons[reason] = None
 
     def certificate(self, robot: str, pinocchio: str) -> Certificate:
         """What stands in the ledger now."""
         with self._lock:
-            lines = tuple(self._lines[quantity] for quantity in Quantity if quantity in self._lines)
-            return Certificate(robot, pinocchio, lines, tuple(self._reasons))
+            found = [
+                (quantity, self._accounts[quantity]) for quantity in Quantity if quantity in self._accounts
+            ]
+            reasons = [NOT_ASKED_FOR] if any(account.not_asked_for for _, account in found) else []
+            lines = [account.line(quantity) for quantity, account in found]
+            return Certificate(
+                robot,
+                pinocchio,
+                tuple(line for line in lines if line.checked or line.unchecked),
+                (*reasons, *self._reasons),
+            )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
         # A copy in another process starts its own account.

@@ -42,16 +42,20 @@ class Magnitudes:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def magnitudes(plan: Plan, q: FloatArray, v: FloatArray, a: FloatArray, base: FloatArray) -> Magnitudes:
-    """For flat batches q (n, nq), v and a (n, nv) and a base state (1 or n, 24)."""
+def magnitudes(
+    plan: Plan, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: FloatArray
+) -> Magnitudes:
+    """For flat batches q (n, nq), v and a (n, nv) or None for zero, and a base state (1 or n, 24)."""
     n = len(q)
-    start = [np.broadcast_to(_norm(base[:, at : at + 3]), (n,)) for at in (9, 12, 15, 18, 21)]
-    states = [[*start, np.zeros(n)]]
+    v, a = (np.zeros((1, plan.nv)) if x is None else x for x in (v, a))
+    start = [_norm(base[:, at : at + 3]) for at in (9, 12, 15, 18, 21)]
+    states = [[*start, np.zeros(1)]]
     for i in range(len(plan.steps)):
         states.append(_step(plan, i, states[plan.parents[i] + 1], q, v, a))
     out = np.empty((6, n, len(plan.frames)))
     for f, (step, place) in enumerate(plan.frames):
-        out[:, :, place] = _carry(states[step + 1], plan.lengths[len(plan.steps) + f])
+        for row, values in zip(out, _carry(states[step + 1], plan.lengths[len(plan.steps) + f]), strict=True):
+            row[:, place] = values  # what is the same for all configurations is one number
     out[5] += plan.depth + 1
     return Magnitudes(*out)
 

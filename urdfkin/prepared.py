@@ -1,0 +1,144 @@
+"""One frame in one configuration after the other, as fast as Python can ask: for control loops and solvers.
+
+The walk is that of `Robot`, one lane wide. The kernels are bound to a plan and to scratch memory of their
+own, so that a call hands over nothing but its arrays. They keep the interpreter's lock: for a microsecond
+it is not worth releasing, and so the scratch memory needs no other protection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.recursion.plan import Plan
+from urdfkin.recursion.scratch import scratch
+from urdfkin.reference import Reference
+from urdfkin.tree import FloatArray, JointKind
+from urdfkin.verification.bounds import Quantity
+
+if TYPE_CHECKING:
+    from urdfkin.robot import Robot
+
+_empty = np.empty
+
+
+class PreparedFrame:
+    """One frame of a robot in one reference; make one with `Robot.prepare`.
+
+    Results are those of `Robot` with `verify=False`, to the last bit, and the ledger counts them as not
+    checked. Contiguous float64 arrays are taken as they are; anything else goes the robot's way, with the
+    same result or the same error.
+
+    Attributes:
+        frame: The frame's name.
+        reference: For velocities, Jacobians and accelerations.
+
+    >>> import urdfkin
+    >>> robot = urdfkin.load("panda")
+    >>> fast, q = robot.prepare("panda_hand"), robot.neutral()
+    >>> J = np.empty((6, robot.nv))
+    >>> fast.jacobian(q, out=J) is J
+    True
+    >>> bool((J == robot.jacobian(q, "panda_hand")).all())
+    True
+    """
+
+    __slots__ = (
+        "_accelerations", "_jacobian", "_jacobians", "_motion", "_number", "_packed", "_placement",
+        "_placements", "_plain", "_plan", "_robot", "_scratch", "_shape", "_velocities", "frame", "reference",
+    )  # fmt: skip
+
+    def __init__(self, robot: Robot, frame: str, reference: Reference, plan: Plan) -> None:
+        self.frame, self.reference = frame, reference
+        self._robot, self._plan, account = robot, plan, robot.ledger.account
+        self._scratch = scratch(plan)
+        self._packed = np.array([*plan.packed, self._scratch.ctypes.data])
+        self._number, self._shape = int(reference), (6, plan.nv)
+        # Quaternions are brought to norm 1 first, which is the robot's business.
+        self._plain = all(joint.kind is not JointKind.FLOATING for joint in robot.tree.joints)
+        self._placements, self._velocities = account(Quantity.PLACEMENT), account(Quantity.VELOCITY)
+        self._jacobians, self._accelerations = account(Quantity.JACOBIAN), account(Quantity.ACCELERATION)
+        # Compiled, or read from disk, when they are first called.
+        self._placement: Callable[..., int] = self._first_placement
+        self._jacobian: Callable[..., int] = self._first_jacobian
+        self._motion: Callable[..., int] = self._first_motion
+
+    # Where a kernel does not take what it is given, the robot's way says what is wrong, or does it all the
+    # same. One statement adds to an account: under the interpreter's lock no thread comes in between.
+
+    def placement(self, q: ArrayLike, out: FloatArray | None = None) -> FloatArray:
+        """(4, 4) T_world_frame: eq. 7.77."""
+        pose = _empty((4, 4)) if out is None else out
+        try:
+            done = self._placement(self._packed, q, pose) == 1
+        except TypeError:
+            done = False
+        if done:
+            self._placements.not_asked_for += 1
+            return pose
+        return self._robot.placement(q, self.frame, out=out, verify=False, threads=1)
+
+    def velocity(self, q: ArrayLike, v: ArrayLike, out: FloatArray | None = None) -> FloatArray:
+        """(6,) [linear; angular] m/s, rad/s: eq. 7.127, 7.128."""
+        six = _empty(6) if out is None else out
+        try:
+            done = self._motion(1, self._number, self._packed, q, v, v, six) == 1
+        except TypeError:
+            done = False
+        if done:
+            self._velocities.not_asked_for += 1
+            return six
+        return self._robot.velocity(q, v, self.frame, self.reference, out=out, verify=False, threads=1)
+
+    def jacobian(self, q: ArrayLike, out: FloatArray | None = None) -> FloatArray:
+        """(6, nv): eq. 7.85."""
+        J = _empty(self._shape) if out is None else out
+        try:
+            done = self._jacobian(self._number, self._packed, q, J) == 1
+        except TypeError:
+            done = False
+        if done:
+            self._jacobians.not_asked_for += 1
+            return J
+        return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=False, threads=1)
+
+    def acceleration(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: FloatArray | None = None
+    ) -> FloatArray:
+        """(6,) [linear; angular] m/s^2, rad/s^2, classical: eq. 7.129, 7.130."""
+        six = _empty(6) if out is None else out
+        try:
+            done = self._motion(2, self._number, self._packed, q, v, a, six) == 1
+        except TypeError:
+            done = False
+        if done:
+            self._accelerations.not_asked_for += 1
+            return six
+        return self._robot.acceleration(q, v, a, self.frame, self.reference, out=out, verify=False, threads=1)
+
+    def _first_placement(self, *arguments: object) -> int:
+        from urdfkin.recursion.motion_kernel import placement  # noqa: PLC0415
+
+        self._placement = placement.compiled if self._plain else _refused
+        return self._placement(*arguments)
+
+    def _first_jacobian(self, *arguments: object) -> int:
+        from urdfkin.recursion.jacobian_kernel import jacobian  # noqa: PLC0415
+
+        self._jacobian = jacobian.compiled if self._plain else _refused
+        return self._jacobian(*arguments)
+
+    def _first_motion(self, *arguments: object) -> int:
+        from urdfkin.recursion.local_kernel import local_motion  # noqa: PLC0415
+        from urdfkin.recursion.motion_kernel import motion  # noqa: PLC0415
+
+        kernel = local_motion if self.reference is Reference.LOCAL else motion
+        self._motion = kernel.compiled if self._plain else _refused
+        return self._motion(*arguments)
+
+
+def _refused(*_: object) -> int:
+    return 0
