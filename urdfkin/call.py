@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -51,7 +52,7 @@ class Call:
         self.inputs = inputs
         given = [robot.shaped(x, name) for x, name in zip(inputs, "qva", strict=False)]
         self.shape = self._batch_shape(given)
-        self.n = int(np.prod(self.shape))
+        self.n = math.prod(self.shape)
         flat = [self._flat_input(array) for array in given]
         self.q, *self.rates = flat
         self.state = STILL_STATE if base is None else base.state(self.shape)
@@ -60,6 +61,8 @@ class Call:
         shapes = [array.shape[:-1] for array in given]
         if self.base is not None:
             shapes.append(self.base.batch_shape)
+        if all(shape == shapes[0] for shape in shapes):
+            return shapes[0]
         try:
             return np.broadcast_shapes(*shapes)
         except ValueError:
@@ -68,6 +71,8 @@ class Call:
 
     def _flat_input(self, array: FloatArray) -> FloatArray:
         width = array.shape[-1]
+        if array.shape[:-1] == self.shape:
+            return np.ascontiguousarray(array.reshape(self.n, width))
         return np.ascontiguousarray(np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width))
 
     @property

@@ -56,11 +56,10 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
     Raises:
         InputError: a quaternion whose norm is further than 1e-6 from 1.
     """
-    floating = [i for i, joint in enumerate(tree.joints) if joint.kind is JointKind.FLOATING]
-    if not floating:
+    if not tree.floating_joints:
         return q
     q = q.copy()
-    for i in floating:
+    for i in tree.floating_joints:
         quaternion = q[..., tree.q_index[i] + 3 : tree.q_index[i] + 7]
         quaternion[...] = unit_quaternions(quaternion, f"the quaternion of joint {tree.joints[i].name}")
     return q

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from urdfkin.recursion.plan import Plan
 from urdfkin.recursion.scratch import scratch
 from urdfkin.reference import Reference
-from urdfkin.tree import FloatArray, JointKind
+from urdfkin.tree import FloatArray
 from urdfkin.verification.bounds import Quantity
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class PreparedFrame:
         self._packed = np.array([*plan.packed, self._scratch.ctypes.data])
         self._number, self._shape = int(reference), (6, plan.nv)
         # Quaternions are brought to norm 1 first, which is the robot's business.
-        self._plain = all(joint.kind is not JointKind.FLOATING for joint in robot.tree.joints)
+        self._plain = not robot.tree.floating_joints
         self._placements, self._velocities = account(Quantity.PLACEMENT), account(Quantity.VELOCITY)
         self._jacobians, self._accelerations = account(Quantity.JACOBIAN), account(Quantity.ACCELERATION)
         # Compiled, or read from disk, when they are first called.

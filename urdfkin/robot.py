@@ -348,8 +348,9 @@ class Robot(Manipulator, Tables):
     def shaped(self, value: ArrayLike, what: str) -> FloatArray:
         """`value` as float64 with the right last axis."""
         array = floats(value, what)
-        width, names = (self.nq, self.coordinate_names) if what == "q" else (self.nv, self.rate_names)
+        width = self.nq if what == "q" else self.nv
         if array.shape[-1:] != (width,):
+            names = self.coordinate_names if what == "q" else self.rate_names
             raise InputError(
                 f"{what} needs {width} numbers for {self.name}: {', '.join(names) or 'none, nothing moves'}",
                 found=f"shape {array.shape}",

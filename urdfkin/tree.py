@@ -198,6 +198,11 @@ class KinematicTree:
     # -- coordinates ---------------------------------------------------------------------------------
 
     @cached_property
+    def floating_joints(self) -> tuple[int, ...]:
+        """Indices of the joints whose coordinates hold a quaternion."""
+        return tuple(i for i, joint in enumerate(self.joints) if joint.kind is JointKind.FLOATING)
+
+    @cached_property
     def nq(self) -> int:
         """Length of a configuration `q`."""
         return sum(joint.nq for joint in self.joints)

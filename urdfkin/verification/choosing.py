@@ -16,8 +16,10 @@ Verify = bool | Literal["sample"]
 #: How many configurations of a call `verify="sample"` checks.
 SAMPLE = 100
 
-#: Numbers compared at a time: results, Pinocchio's and their bounds stay in the cache and in memory's reach.
+#: Numbers and configurations compared at a time: few enough for a cache and for memory not to grow with a
+#: batch, many enough for array expressions to be worth their call.
 _AT_A_TIME = 262_144
+_MOST = 4096
 
 
 def checked_choice(verify: object) -> Verify:
@@ -42,7 +44,7 @@ def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
     Yields:
         Indices. A sample is drawn without regard to order, which a batch often has, and always the same.
     """
-    step = max(1, _AT_A_TIME // max(1, numbers))
+    step = min(_MOST, max(1, _AT_A_TIME // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:
         drawn = np.sort(np.random.default_rng(0).choice(n, SAMPLE, replace=False))
         yield from (drawn[i : i + step] for i in range(0, SAMPLE, step))
