@@ -1,8 +1,8 @@
 """A batch in whole blocks of lanes, spread over threads.
 
-Kernels take whole blocks. What is left over is filled up with copies of its last configuration. Parts for
-threads are cut between blocks, so that each configuration has the same place in its block: results are
-equal for any number of threads, to the last bit.
+Kernels take whole blocks; where a part is not a multiple, its last block reaches back into the one before. A
+batch of less than a block is filled up with copies of its last configuration. No lane depends on its
+neighbours: results are equal for any number of threads, to the last bit.
 """
 
 from __future__ import annotations
@@ -46,25 +46,26 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
     if threads is not None and threads < 1:
         raise InputError("threads must be at least 1", found=str(threads))
     n = len(out)
-    whole = n - n % LANES
-    good = 1
-    parts = _parts(whole, default_threads(n) if threads is None else threads)
-    if len(parts) > 1:
-        work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
-        good = min(future.result() for future in work)
-    elif whole:
-        good = compute(_rows(inputs, n, 0, whole), out[:whole])
-    if whole < n:
-        filled = np.empty((LANES, *out.shape[1:]))
-        good &= compute([_filled(x, n - whole) for x in _rows(inputs, n, whole, n)], filled)
-        out[whole:] = filled[: n - whole]
+    if n < LANES:
+        return n == 0 or _in_one_block(compute, inputs, out)
+    parts = _parts(n, default_threads(n) if threads is None else threads)
+    if len(parts) == 1:
+        return bool(compute(inputs, out))
+    work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
+    return min(future.result() for future in work) > 0  # waits for all of them
+
+
+def _in_one_block(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray) -> bool:
+    filled = np.empty((LANES, *out.shape[1:]))
+    good = compute([_filled(x, len(out)) for x in inputs], filled)
+    out[:] = filled[: len(out)]
     return bool(good)
 
 
-def _parts(whole: int, threads: int) -> list[tuple[int, int]]:
-    """Cut `whole` rows into at most `threads` runs of whole blocks."""
-    blocks = whole // LANES
-    edges = [LANES * (blocks * i // threads) for i in range(threads + 1)]
+def _parts(n: int, threads: int) -> list[tuple[int, int]]:
+    """Cut `n` rows between blocks, into at most `threads` runs of a block or more."""
+    blocks = n // LANES
+    edges = [*(LANES * (blocks * i // threads) for i in range(threads)), n]
     return [(a, b) for a, b in pairwise(edges) if a < b]
 
 

@@ -111,7 +111,8 @@ def jacobians(reference, packed, base, q, out, scratch):
         pointer_to(out),
         stride_of(base),
     )
-    for b in range(0, n, LANES):
+    for first in range(0, n, LANES):
+        b = min(first, n - LANES)  # the last block reaches back into the one before
         good &= _jacobian_block(m, s, plan, b, reference, state, stride, x, to)
     return good
 

@@ -137,6 +137,7 @@ def jacobian_rates(reference, packed, base, q, v, out, scratch):
     m = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
     s, state, stride = pointer_to(scratch), pointer_to(base), stride_of(base)
     x, y, to = pointer_to(q), pointer_to(v), pointer_to(out)
-    for b in range(0, n, LANES):
+    for first in range(0, n, LANES):
+        b = min(first, n - LANES)  # the last block reaches back into the one before
         good &= _rate_block(m, s, plan, b, reference, state, stride, x, y, to)
     return good

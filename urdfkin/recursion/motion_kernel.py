@@ -122,7 +122,8 @@ def motions(order, reference, packed, base, q, v, a, out, scratch):
     m = LANES + 0 * n  # a constant to the compiler, a number like any other to Numba
     s, state, stride = pointer_to(scratch), pointer_to(base), stride_of(base)
     x, y, z, to = pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
-    for b in range(0, n, LANES):
+    for first in range(0, n, LANES):
+        b = min(first, n - LANES)  # the last block reaches back into the one before
         good &= _motion_block(m, s, plan, b, order, reference, state, stride, x, y, z, to)
     return good
 
