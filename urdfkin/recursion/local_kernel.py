@@ -66,8 +66,8 @@ def _rows_of(order):
 
 
 @lane_function
-def _start(m, s, plan, b, base, stride, order):
-    """The state of the base in its own axes; places are not followed."""
+def _turned_back(m, s, b, base, stride, order):
+    """The vectors of the base's state, in its own axes."""
     for k in range(m):
         row = (b + k) * stride
         store(s, P, k, (0.0, 0.0, 0.0))
@@ -77,6 +77,15 @@ def _start(m, s, plan, b, base, stride, order):
             second = (base[row + R + 1], base[row + R + 4], base[row + R + 7])
             third = (base[row + R + 2], base[row + R + 5], base[row + R + 8])
             store(s, at, k, (dot(first, x), dot(second, x), dot(third, x)))
+
+
+@lane_function
+def _start(m, s, plan, b, base, stride, order):
+    """The state of the base in its own axes; places are not followed."""
+    if stride == 0:  # the same for all lanes, which the compiler then sees
+        _turned_back(m, s, 0 * b, base, 0 * b, order)
+    else:
+        _turned_back(m, s, b, base, stride, order)
     copy_rows(m, s, 0, plan.slots, _rows_of(order))
 
 

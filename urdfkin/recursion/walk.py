@@ -128,8 +128,13 @@ def start(m, s, plan, b, base, stride, order):
     """The initial conditions: the state of the base (the text's frame -1 to frame 0), rows `stride` apart."""
     rows = rows_of(order)
     for r in range(rows):
-        for k in range(m):
-            s[r * LANES + k] = base[(b + k) * stride + r]
+        if stride == 0:  # one number for all lanes
+            number = base[r]
+            for k in range(m):
+                s[r * LANES + k] = number
+        else:
+            for k in range(m):
+                s[r * LANES + k] = base[(b + k) * stride + r]
     for k in range(m):
         s[ZERO * LANES + k] = 0.0
         s[ONE * LANES + k] = 1.0
