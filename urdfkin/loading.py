@@ -10,6 +10,7 @@ from urdfkin.origin import Origin
 from urdfkin.robot import Robot
 from urdfkin.sources import Source, read_source
 from urdfkin.urdf.reader import read_tree
+from urdfkin.urdf.remembering import remembered_tree
 from urdfkin.verification.choosing import Verify
 
 
@@ -57,8 +58,9 @@ def load(
         for finding in findings:
             if finding.severity is Severity.WARNING:
                 warnings.warn(str(finding), UrdfWarning, stacklevel=2)
+    read = read_tree if text.entry is None else remembered_tree
     return Robot(
-        read_tree(text.data, mimic=mimic, root_joint=root_joint),
+        read(text.data, mimic=mimic, root_joint=root_joint),
         text.data.decode("utf-8-sig"),
         origin=origin,
         verify=verify,

@@ -1,0 +1,86 @@
+"""A tree read back from disk is the tree that was read from the URDF."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from urdfkin.sources import read_source
+from urdfkin.tree import KinematicTree
+from urdfkin.urdf import remembering
+from urdfkin.urdf.reader import read_tree
+from urdfkin.urdf.remembering import remembered_tree
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(remembering, "_folder", lambda: tmp_path / "trees")
+    return tmp_path / "trees"
+
+
+def text(name: str) -> bytes:
+    return read_source(name).data
+
+
+def same(one: KinematicTree, other: KinematicTree) -> bool:
+    """Equal names, kinds and numbers, to the last bit."""
+    plain = [(j.name, j.kind, j.parent, j.limit, j.mimic) for j in one.joints]
+    return (
+        (one.name, one.links) == (other.name, other.links)
+        and plain == [(j.name, j.kind, j.parent, j.limit, j.mimic) for j in other.joints]
+        and all(
+            np.array_equal(a.T_parent_joint, b.T_parent_joint) and np.array_equal(a.axis, b.axis)
+            for a, b in zip(one.joints, other.joints, strict=True)
+        )
+    )
+
+
+@pytest.mark.parametrize("name", ["panda", "talos", "icub", "ur5"])
+def test_the_second_reading_needs_no_parser_and_gives_the_same_tree(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = text(name)
+    first = remembered_tree(data)
+    monkeypatch.setattr(remembering, "read_tree", None)
+    second = remembered_tree(data)
+    assert same(first, second)
+    assert same(second, read_tree(data))
+    with pytest.raises(ValueError, match="read-only"):
+        second.joints[0].axis[0] = 2.0
+
+
+def test_another_text_or_another_way_to_read_it_is_another_tree(folder: Path) -> None:
+    data = text("panda")
+    trees = [
+        remembered_tree(data),
+        remembered_tree(data, mimic=False),
+        remembered_tree(data, root_joint="floating"),
+        remembered_tree(data.replace(b"0.333", b"0.334")),
+    ]
+    assert len(list(folder.iterdir())) == len(trees)
+    assert [tree.nq for tree in trees] == [8, 9, 15, 8]
+    assert not same(trees[0], trees[3])
+
+
+@pytest.mark.parametrize("damage", [b"", b"nothing of the kind", b"\x80\x04N."])
+def test_a_damaged_file_is_read_anew_and_mended(folder: Path, damage: bytes) -> None:
+    data = text("ur5")
+    expected = remembered_tree(data)
+    (kept,) = folder.iterdir()
+    kept.write_bytes(damage)
+    assert same(remembered_tree(data), expected)
+    assert kept.read_bytes() != damage
+
+
+def test_where_nothing_can_be_written_the_tree_is_read_each_time(tmp_path: Path, folder: Path) -> None:
+    folder.write_text("a file where a folder should be")
+    assert same(remembered_tree(text("ur5")), read_tree(text("ur5")))
+
+
+def test_it_is_the_robots_of_the_catalogue_that_are_remembered(folder: Path) -> None:
+    from urdfkin import load  # noqa: PLC0415
+
+    load("ur5")
+    assert len(list(folder.iterdir())) == 1
+    load(text("panda").decode())
+    assert len(list(folder.iterdir())) == 1
