@@ -21,15 +21,17 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # PyTorch's threads do not spin into the next contender
 
+import urdfkin
 from scripts.benchmarking.batches import batch_rows
 from scripts.benchmarking.clock import Row
 from scripts.benchmarking.contenders import Contender, find
 from scripts.benchmarking.growth import frame_rows, joint_rows, size_rows
 from scripts.benchmarking.machine import machine
 from scripts.benchmarking.memory import peak_over_output
+from scripts.benchmarking.operations import operations
 from scripts.benchmarking.show import show
 from scripts.benchmarking.single import single_rows
-from scripts.benchmarking.subject import SUBJECTS, Subject
+from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
 from scripts.benchmarking.verified import verified_rows
 from scripts.benchmarking.work import DifferenceError
 from urdfkin.validation.report import versions
@@ -97,6 +99,7 @@ def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender
         "versions": versions(),
         "libraries": {contender.library: contender.state for contender in contenders},
         "rounds": plan.rounds,
+        "operations": dict(_operations()),
         "rows": [row.as_data() for section in sections for row in rows_of(section, plan, contenders)],
         "memory": [
             peak_over_output(name, frame, quantity, plan.memory, out=out)
@@ -105,6 +108,13 @@ def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender
             if "memory" in sections
         ],
     }
+
+
+def _operations() -> Iterator[tuple[str, int]]:
+    for name, frame in SUBJECTS:
+        robot = urdfkin.load(name, mimic=False, verify=False)
+        for quantity in QUANTITIES:
+            yield f"{name}, {quantity}", operations(robot.plan([robot.tree.frame_link(frame)]), quantity)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -20,7 +20,7 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
         yield _contest(section, f"{robot}, {quantity}", list(group))
     if batch := [row for row in entries if row["section"] == "batch"]:
         yield _summary(batch)
-        yield _floor(batch)
+        yield _floor(batch, figures["operations"])
     yield from growth_tables(figures)
 
 
@@ -81,8 +81,8 @@ def _summary(rows: list[Entry]) -> Words:
     return Words("summary", "urdfkin against the others, medians", ("", *heads), found)
 
 
-def _floor(rows: list[Entry]) -> Words:
-    """What it takes to write the output once, and what urdfkin takes in those units."""
+def _floor(rows: list[Entry], operations: Mapping[str, int]) -> Words:
+    """What it takes to write the output once, how much there is to compute, and what urdfkin takes."""
     found = []
     for title, group in _tables_of(rows):
         who = {row["who"].partition(",")[0]: row for row in reversed(group)}
@@ -93,13 +93,21 @@ def _floor(rows: list[Entry]) -> Words:
                 title,
                 f"{size:,}",
                 number(fill["median_ns"]),
-                number(size / fill["median_ns"]),
+                f"{operations[title]:,}",
                 number(ours["median_ns"]),
-                number(ours["median_ns"] / fill["median_ns"]),
+                number(size / ours["median_ns"]),
+                number(operations[title] / ours["median_ns"]),
             )
         )
-    heads = ("bytes written", "fill, ns", "GB/s", "urdfkin, 1 thread, ns", "times the floor")
-    return Words("floor", "the floor: the output written once", ("", *heads), found)
+    heads = (
+        "bytes written",
+        "fill, ns",
+        "operations",
+        "urdfkin, 1 thread, ns",
+        "bytes a ns",
+        "operations a ns",
+    )
+    return Words("floor", "the floor: bytes and operations of one configuration", ("", *heads), found)
 
 
 def _tables_of(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
