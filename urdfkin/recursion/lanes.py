@@ -152,7 +152,8 @@ def copy_rows(context: Any, m: Any, s: Any, source: Any, target: Any, count: Any
 
 # Sine and cosine of a whole block: Cody and Waite's reduction to [-pi/4, pi/4] with pi/2 in three parts,
 # then the polynomials of fdlibm (Sun Microsystems, k_sin.c and k_cos.c). The first two parts have 33 bits,
-# so that n * part is exact while n < 2^20; beyond that the block takes the library's functions.
+# so that n * part is exact while n < 2^20; beyond that an angle takes the library's functions. It alone: what
+# stands beside it in the block must not change a configuration's result.
 _LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _PI_2_PARTS = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 _S = (
@@ -193,11 +194,6 @@ def sine_cosine(m, s, angle, sine, cosine):
     large = 0
     for k in range(m):
         large |= int(abs(s[angle * LANES + k]) >= _LARGEST_ANGLE)
-    if large:
-        for k in range(m):
-            s[sine * LANES + k] = math.sin(s[angle * LANES + k])
-            s[cosine * LANES + k] = math.cos(s[angle * LANES + k])
-        return
     for k in range(m):
         x = s[angle * LANES + k]
         n = _nearest(x * _2_PI)
@@ -212,3 +208,9 @@ def sine_cosine(m, s, angle, sine, cosine):
         sign = 1.0 - 2.0 * (half - 2.0 * _nearest(0.5 * half - 0.25))
         s[sine * LANES + k] = sign * (cos_r if odd > 0.5 else sin_r)
         s[cosine * LANES + k] = sign * (1.0 - 2.0 * odd) * (sin_r if odd > 0.5 else cos_r)
+    if large:
+        for k in range(m):
+            x = s[angle * LANES + k]
+            if abs(x) >= _LARGEST_ANGLE:
+                s[sine * LANES + k] = math.sin(x)
+                s[cosine * LANES + k] = math.cos(x)
