@@ -43,6 +43,22 @@ def pointer_to(context: Any, array: Any) -> Any:
     return types.CPointer(array.dtype)(array), generate
 
 
+@intrinsic
+def _address_of(context: Any, array: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        return builder.ptrtoint(data, ir.IntType(64))
+
+    return types.int64(array), generate
+
+
+@lane_function
+def apart(x, out):
+    """Whether two contiguous arrays of doubles have no memory in common."""
+    first, to = _address_of(x), _address_of(out)
+    return first + 8 * x.size <= to or to + 8 * out.size <= first
+
+
 def _pointer_from_address(number: Any) -> Any:
     @intrinsic
     def pointer(context: Any, address: Any) -> Any:
