@@ -119,7 +119,7 @@ def jacobians(reference, packed, base, q, out, scratch):
 
 @kernel(INT, PLAN, NUMBERS, output(2), nogil=False)
 def jacobian(reference, packed, q, out):
-    """The velocity Jacobian (7.85) of one frame in one configuration; -1 for arrays it cannot take.
+    """The velocity Jacobian (7.85) of one frame in one configuration; -1 for other arrays.
 
     Shapes: q (nq,), out (6, nv), memory of its own.
     """

@@ -131,7 +131,7 @@ def motions(order, reference, packed, base, q, v, a, out, scratch):
 
 @kernel(PLAN, NUMBERS, output(2), nogil=False)
 def placement(packed, q, out):
-    """The placement of one frame in one configuration; -1 for arrays it cannot take.
+    """The placement of one frame in one configuration; -1 for other arrays.
 
     Shapes: q (nq,), out (4, 4), memory of its own.
     """
@@ -145,7 +145,7 @@ def placement(packed, q, out):
 
 @kernel(INT, INT, PLAN, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
 def motion(order, reference, packed, q, v, a, out):
-    """The velocity (order 1) or acceleration (2) of one frame in one configuration; -1 for arrays it cannot take.
+    """The velocity (order 1) or acceleration (2) of one frame in one configuration; -1 for other arrays.
 
     Shapes: q (nq,), v and a (nv,), out (6,), memory of its own.
     """
