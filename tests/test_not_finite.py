@@ -102,7 +102,7 @@ def test_among_the_coordinates_of_planar_and_floating_joints(verify: bool) -> No
         # A quaternion is looked at before all else, and its joint named.
         joint = name.split(".")[0]
         with pytest.raises(InputError, match=joint):
-            robot.acceleration(*inputs, robot.tip_frame, verify=verify)
+            robot.acceleration(inputs[0], inputs[1], inputs[2], robot.tip_frame, verify=verify)
 
 
 def test_on_a_moving_base(panda: Robot) -> None:
