@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _empty = np.empty
 #: What Numba raises for arguments that are no arrays of the kernel's kind; an empty list has no type at all.
-_NOT_TAKEN = (TypeError, ValueError)
+_NOT_TAKEN = (TypeError, ValueError, OverflowError)
 
 
 class PreparedFrame:
