@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -80,7 +81,7 @@ class Call:
         """How many results the call hands out."""
         return self.n * len(self.links)
 
-    @property
+    @cached_property
     def flat_base(self) -> BaseMotion | None:
         """The base with one flat batch axis, for the oracle."""
         if self.base is None or not self.base.batch_shape:

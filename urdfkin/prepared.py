@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 _empty = np.empty
+#: What Numba raises for arguments that are no arrays of the kernel's kind; an empty list has no type at all.
+_NOT_TAKEN = (TypeError, ValueError, OverflowError)
 
 
 class PreparedFrame:
@@ -66,6 +68,10 @@ class PreparedFrame:
         self._jacobian: Callable[..., int] = self._first_jacobian
         self._motion: Callable[..., int] = self._first_motion
 
+    def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
+        # It holds addresses of this process: a copy prepares itself anew.
+        return self._robot.prepare, (self.frame, self.reference)
+
     # Where a kernel does not take what it is given, the robot's way says what is wrong, or does it all the
     # same. One statement adds to an account: under the interpreter's lock no thread comes in between.
 
@@ -74,7 +80,7 @@ class PreparedFrame:
         pose = _empty((4, 4)) if out is None else out
         try:
             done = self._placement(self._packed, q, pose) == 1
-        except TypeError:
+        except _NOT_TAKEN:
             done = False
         if done:
             self._placements.not_asked_for += 1
@@ -86,7 +92,7 @@ class PreparedFrame:
         six = _empty(6) if out is None else out
         try:
             done = self._motion(1, self._number, self._packed, q, v, v, six) == 1
-        except TypeError:
+        except _NOT_TAKEN:
             done = False
         if done:
             self._velocities.not_asked_for += 1
@@ -98,7 +104,7 @@ class PreparedFrame:
         J = _empty(self._shape) if out is None else out
         try:
             done = self._jacobian(self._number, self._packed, q, J) == 1
-        except TypeError:
+        except _NOT_TAKEN:
             done = False
         if done:
             self._jacobians.not_asked_for += 1
@@ -112,7 +118,7 @@ class PreparedFrame:
         six = _empty(6) if out is None else out
         try:
             done = self._motion(2, self._number, self._packed, q, v, a, six) == 1
-        except TypeError:
+        except _NOT_TAKEN:
             done = False
         if done:
             self._accelerations.not_asked_for += 1

@@ -293,9 +293,15 @@ class Robot(Manipulator, Tables):
         Raises:
             UnknownNameError: no such frame or reference.
         """
-        # The hash of an enumeration's member takes longer than the rest of this.
-        key = frame if reference is _ALIGNED else (frame, reference)
-        if (prepared := self._prepared.get(key)) is None:
+        # The hash of an enumeration's member takes longer than the rest of this. With its type in the key,
+        # 1, which is equal to a member, is not taken for it.
+        key = frame if reference is _ALIGNED else (frame, type(reference), reference)
+        try:
+            prepared = self._prepared.get(key)
+        except TypeError:  # no hash, and so hardly a name
+            self.tree.frame_link(frame)
+            return self.prepare(frame, Reference.of(reference))
+        if prepared is None:
             plan = self.plan([self.tree.frame_link(frame)])
             prepared = self._prepared[key] = PreparedFrame(self, frame, Reference.of(reference), plan)
         return prepared
@@ -330,7 +336,9 @@ class Robot(Manipulator, Tables):
         """The short way for a single configuration that nobody checks; None where it is not for this call."""
         if verify is not False and (verify is not None or self.verify is not False):
             return None
-        if type(q) is not _ARRAY or q.ndim != 1 or q.dtype is not _FLOAT64 or type(frame) is not str:
+        if type(q) is not _ARRAY or q.ndim != 1 or type(frame) is not str:
+            return None
+        if q.dtype is not _FLOAT64 and q.dtype != _FLOAT64:  # from another process it is another object
             return None
         if reference is _ALIGNED and (prepared := self._prepared.get(frame)) is not None:
             return prepared

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from urdfkin.errors import NotFiniteError
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.recursion.evaluate import placements, velocities
 from urdfkin.recursion.plan import make_plan
@@ -94,7 +95,12 @@ def acceleration_breakdown(
 
     Returns:
         Contributions with one leading axis n.
+
+    Raises:
+        NotFiniteError: a number of q, v or a is not finite.
     """
+    if not np.isfinite(a).all():  # the walks below, which look at their inputs themselves, take q and v
+        raise NotFiniteError("q, v and a must be finite")
     path = [i for i in tree.path(link) if tree.joints[i].kind.nv]
     plan = make_plan(tree, [0, link, *(i + 1 for i in path), *(tree.joints[i].parent for i in path)])
     Ts, velocity = placements(plan, q, base=base), velocities(plan, q, v, base=base)

@@ -30,7 +30,8 @@ def placements(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 4, 4) T_world_frame: 7.77 with the rotations alongside."""
-    flat = np.empty((len(q), len(plan.frames), 16)) if out is None else out.reshape(len(q), -1, 16)
+    shape = len(q), len(plan.frames), 16
+    flat = np.empty(shape) if out is None else out.reshape(shape)
     _motion(plan, 0, [q, q, q], _ALIGNED, base, flat, threads)
     return flat.reshape(len(q), len(plan.frames), 4, 4)
 

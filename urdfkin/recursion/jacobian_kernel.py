@@ -6,6 +6,7 @@ from urdfkin.recursion.columns import AXIS_OF, STEP, TURNS, put_column, write_ma
 from urdfkin.recursion.compiling import INT, NUMBERS, PLAN, ROWS, SCRATCH, kernel, output
 from urdfkin.recursion.lanes import (
     LANES,
+    apart,
     copy_rows,
     cross,
     lane_function,
@@ -119,12 +120,12 @@ def jacobians(reference, packed, base, q, out, scratch):
 
 @kernel(INT, PLAN, NUMBERS, output(2), nogil=False)
 def jacobian(reference, packed, q, out):
-    """The velocity Jacobian (7.85) of one frame in one configuration; -1 where the shapes are others.
+    """The velocity Jacobian (7.85) of one frame in one configuration; -1 for other arrays.
 
-    Shapes: q (nq,), out (6, nv).
+    Shapes: q (nq,), out (6, nv), memory of its own.
     """
     plan = walk_of(packed)
-    if q.shape[0] != plan.nq or out.shape[0] != 6 or out.shape[1] != plan.nv:
+    if q.shape[0] != plan.nq or out.shape[0] != 6 or out.shape[1] != plan.nv or not apart(q, out):
         return -1
     one = 1 + 0 * plan.nq
     x, to = pointer_to(q), pointer_to(out)

@@ -43,6 +43,22 @@ def pointer_to(context: Any, array: Any) -> Any:
     return types.CPointer(array.dtype)(array), generate
 
 
+@intrinsic
+def _address_of(context: Any, array: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        return builder.ptrtoint(data, ir.IntType(64))
+
+    return types.int64(array), generate
+
+
+@lane_function
+def apart(x, out):
+    """Whether two contiguous arrays of doubles have no memory in common."""
+    first, to = _address_of(x), _address_of(out)
+    return first + 8 * x.size <= to or to + 8 * out.size <= first
+
+
 def _pointer_from_address(number: Any) -> Any:
     @intrinsic
     def pointer(context: Any, address: Any) -> Any:
@@ -152,7 +168,8 @@ def copy_rows(context: Any, m: Any, s: Any, source: Any, target: Any, count: Any
 
 # Sine and cosine of a whole block: Cody and Waite's reduction to [-pi/4, pi/4] with pi/2 in three parts,
 # then the polynomials of fdlibm (Sun Microsystems, k_sin.c and k_cos.c). The first two parts have 33 bits,
-# so that n * part is exact while n < 2^20; beyond that an angle takes the library's functions.
+# so that n * part is exact while n < 2^20; beyond that an angle takes the library's functions. It alone: what
+# stands beside it in the block must not change a configuration's result.
 _LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _PI_2_PARTS = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 _S = (
@@ -214,4 +231,5 @@ def sine_cosine(m, s, angle, sine, cosine):
         for k in range(m):
             x = s[angle * LANES + k]
             if abs(x) >= _LARGEST_ANGLE:
-                s[sine * LANES + k], s[cosine * LANES + k] = math.sin(x), math.cos(x)
+                s[sine * LANES + k] = math.sin(x)
+                s[cosine * LANES + k] = math.cos(x)

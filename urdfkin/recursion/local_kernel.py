@@ -248,9 +248,9 @@ def local_motions(order, packed, base, q, v, a, out, scratch):
 
 @kernel(INT, INT, PLAN, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
 def local_motion(order, reference, packed, q, v, a, out):
-    """The same of one frame in one configuration, always LOCAL; -1 where the shapes are others.
+    """The same of one frame in one configuration, always LOCAL; -1 where the arrays cannot be taken.
 
-    Shapes: q (nq,), v and a (nv,) where the order needs them, out (6,).
+    Shapes: q (nq,), v and a (nv,), out (6,), memory of its own.
     """
     plan = walk_of(packed)
     if not shapes_fit(plan, order, q, v, a, out):

@@ -7,6 +7,7 @@ import numpy as np
 from urdfkin.recursion.compiling import INT, NUMBERS, PLAN, ROWS, SCRATCH, kernel, output
 from urdfkin.recursion.lanes import (
     LANES,
+    apart,
     cross,
     lane_function,
     load,
@@ -87,9 +88,10 @@ def inputs_finite(m, plan, b, order, q, v, a):
 
 @lane_function
 def shapes_fit(plan, order, q, v, a, out):
-    """Whether arrays for one configuration are as long as they must be."""
+    """Whether arrays for one configuration are as long as they must be, and the output lies apart."""
     good = q.shape[0] == plan.nq and v.shape[0] == plan.nv and out.shape[0] == 6
-    return good and (order < 2 or a.shape[0] == plan.nv)
+    good = good and apart(q, out) and apart(v, out)
+    return good and (order < 2 or (a.shape[0] == plan.nv and apart(a, out)))
 
 
 @lane_function
@@ -130,9 +132,12 @@ def motions(order, reference, packed, base, q, v, a, out, scratch):
 
 @kernel(PLAN, NUMBERS, output(2), nogil=False)
 def placement(packed, q, out):
-    """The placement of one frame in one configuration; -1 where the shapes are others than (nq,), (4, 4)."""
+    """The placement of one frame in one configuration; -1 for other arrays.
+
+    Shapes: q (nq,), out (4, 4), memory of its own.
+    """
     plan = walk_of(packed)
-    if q.shape[0] != plan.nq or out.shape[0] != 4 or out.shape[1] != 4:
+    if q.shape[0] != plan.nq or out.shape[0] != 4 or out.shape[1] != 4 or not apart(q, out):
         return -1
     one, order = 1 + 0 * plan.nq, 0 * plan.nq
     s, x, to = scratch_of(packed), pointer_to(q), pointer_to(out)
@@ -141,9 +146,9 @@ def placement(packed, q, out):
 
 @kernel(INT, INT, PLAN, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
 def motion(order, reference, packed, q, v, a, out):
-    """The velocity (order 1) or acceleration (2) of one frame in one configuration; -1 for other shapes.
+    """The velocity (order 1) or acceleration (2) of one frame in one configuration; -1 for other arrays.
 
-    Shapes: q (nq,), v and a (nv,), out (6,).
+    Shapes: q (nq,), v and a (nv,), out (6,), memory of its own.
     """
     plan = walk_of(packed)
     if not shapes_fit(plan, order, q, v, a, out):

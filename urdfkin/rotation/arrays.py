@@ -26,7 +26,7 @@ def floats(value: ArrayLike, name: str) -> FloatArray:
         if array.dtype.kind in _NOT_NUMBERS:
             raise TypeError(array.dtype)
         return np.asarray(array, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name} must be real numbers", found=repr(value)[:60]) from error
 
 

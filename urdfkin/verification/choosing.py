@@ -28,8 +28,10 @@ def checked_choice(verify: object) -> Verify:
     Raises:
         InputError: it is none of True, False and "sample".
     """
-    if verify is True or verify is False or verify == "sample":
+    if verify is True or verify is False:
         return verify
+    if isinstance(verify, str) and verify == "sample":
+        return "sample"
     raise InputError('verify is True, False or "sample"', found=repr(verify))
 
 

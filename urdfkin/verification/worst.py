@@ -26,9 +26,9 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     Returns:
         An array of the leading axes' shape, in eps * scale.
     """
-    leading = ours.shape[:axes]
+    leading, own = ours.shape[:axes], ours.shape[axes:]
     flat = [
-        np.ascontiguousarray(np.broadcast_to(x, ours.shape)).reshape(math.prod(leading), -1)
+        np.ascontiguousarray(np.broadcast_to(x, ours.shape)).reshape(math.prod(leading), math.prod(own))
         for x in (ours, theirs, scale)
     ]
     worst = np.zeros(len(flat[0]))
