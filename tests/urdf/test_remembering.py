@@ -14,8 +14,10 @@ from urdfkin.urdf.remembering import remembered_tree
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(remembering, "_folder", lambda: tmp_path / "trees")
-    return tmp_path / "trees"
+    folder = tmp_path / "trees"
+    folder.mkdir()
+    monkeypatch.setattr(remembering, "_folder", lambda: folder)
+    return folder
 
 
 def text(name: str) -> bytes:
@@ -72,8 +74,12 @@ def test_a_damaged_file_is_read_anew_and_mended(folder: Path, damage: bytes) -> 
     assert kept.read_bytes() != damage
 
 
-def test_where_nothing_can_be_written_the_tree_is_read_each_time(tmp_path: Path, folder: Path) -> None:
-    folder.write_text("a file where a folder should be")
+def test_where_nothing_can_be_written_the_tree_is_read_each_time(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder.rmdir()
+    assert same(remembered_tree(text("ur5")), read_tree(text("ur5")))
+    monkeypatch.setattr(remembering, "_folder", lambda: None)
     assert same(remembered_tree(text("ur5")), read_tree(text("ur5")))
 
 

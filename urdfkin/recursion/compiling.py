@@ -6,7 +6,6 @@ unnoticed, and an old kernel would be run. Here every source file of `recursion`
 
 from __future__ import annotations
 
-import hashlib
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numba
-import platformdirs
 from numba import types
 
+from urdfkin.keeping import kept_folder
 from urdfkin.recursion.lanes import COMPILED
 
 _config: Any = numba.config  # settings that numba sets at run time
@@ -83,17 +82,8 @@ def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]]
 @cache
 def cache_folder() -> Path | None:
     """Where compiled kernels are kept; None if no folder can be written."""
-    digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
-    root = Path(_config.CACHE_DIR or platformdirs.user_cache_dir("urdfkin"))
-    folder = root / f"kernels-{digest.hexdigest()[:16]}"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / ".writable").touch()
-    except OSError:
-        return None
-    return folder
+    root = Path(_config.CACHE_DIR) if _config.CACHE_DIR else None
+    return kept_folder("kernels", sorted(Path(__file__).parent.glob("*.py")), root=root)
 
 
 @contextmanager

@@ -6,6 +6,7 @@ and the parser's version. What cannot be read back is read anew, what cannot be 
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.metadata
 import pickle
@@ -13,9 +14,8 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-import platformdirs
-
 from urdfkin import tree
+from urdfkin.keeping import kept_folder
 from urdfkin.tree import KinematicTree
 from urdfkin.urdf.reader import read_tree
 
@@ -27,7 +27,10 @@ def remembered_tree(data: bytes, *, mimic: bool = True, root_joint: str | None =
         InputError: as `read_tree`.
         UnknownNameError: as `read_tree`.
     """
-    place = _folder() / hashlib.sha256(repr((data, mimic, root_joint)).encode()).hexdigest()[:32]
+    folder = _folder()
+    if folder is None:
+        return read_tree(data, mimic=mimic, root_joint=root_joint)
+    place = folder / hashlib.sha256(repr((data, mimic, root_joint)).encode()).hexdigest()[:32]
     try:
         kept = pickle.loads(place.read_bytes())
     except Exception:  # a damaged file may fail in any way
@@ -40,18 +43,13 @@ def remembered_tree(data: bytes, *, mimic: bool = True, root_joint: str | None =
 
 
 @cache
-def _folder() -> Path:
-    digest = hashlib.sha256(importlib.metadata.version("yourdfpy").encode())
-    for source in (Path(tree.__file__), *sorted(Path(__file__).parent.glob("*.py"))):
-        digest.update(source.read_bytes())
-    return Path(platformdirs.user_cache_dir("urdfkin")) / f"trees-{digest.hexdigest()[:16]}"
+def _folder() -> Path | None:
+    sources = (Path(tree.__file__), *sorted(Path(__file__).parent.glob("*.py")))
+    return kept_folder("trees", sources, importlib.metadata.version("yourdfpy"))
 
 
 def _keep(read: KinematicTree, place: Path) -> None:
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
+    with contextlib.suppress(OSError):
         with tempfile.NamedTemporaryFile(dir=place.parent, delete=False) as file:
             file.write(pickle.dumps(read))
         Path(file.name).replace(place)
-    except OSError:
-        return
