@@ -52,11 +52,12 @@ def count(robot: urdfkin.Robot, frame: str) -> dict[str, int]:
     jacobian.finite = lambda *_: True
     motion.inputs_finite = lambda *_: 1
     found = {}
-    for name, compute in {
+    quantities: dict[str, Callable[[list[Counted]], object]] = {
         "jacobian": lambda s: jacobian._jacobian_block(1, s, walked, 0, 2, base, 0, q, out),
         "velocity": lambda s: motion._motion_block(1, s, walked, 0, 1, 2, base, 0, q, v, a, out),
         "acceleration": lambda s: motion._motion_block(1, s, walked, 0, 2, 2, base, 0, q, v, a, out),
-    }.items():
+    }
+    for name, compute in quantities.items():
         Counted.done = 0
         compute([Counted(0.0)] * (plan.areas.rows * 16))
         found[name] = Counted.done
