@@ -4,6 +4,7 @@ import ast
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -56,8 +57,13 @@ def modules() -> Iterator[tuple[str, Path]]:
             yield part, path
 
 
-def imported(path: Path) -> Iterator[str]:
-    """Names of the modules a file imports, without those under `if TYPE_CHECKING`."""
+@cache
+def imported(path: Path) -> tuple[str, ...]:
+    """Names of the modules a file imports, without those under `if TYPE_CHECKING`; each file is read once."""
+    return tuple(_imported(path))
+
+
+def _imported(path: Path) -> Iterator[str]:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     for_types = {
         id(inner)

@@ -92,6 +92,7 @@ def test_arrays_are_read_only_before_and_after_pickling(hand: KinematicTree) -> 
             tree.joints[0].T_parent_joint[0, 3] = 1.0
 
 
+@pytest.mark.slow
 def test_a_chain_of_50000_links_needs_no_deep_stack() -> None:
     chain = [(joint(f"j{i}"), f"l{i}", f"l{i + 1}") for i in range(50_000)]
     tree = build_tree("long", "l0", chain)

@@ -131,7 +131,7 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
     import subprocess  # noqa: PLC0415
     import sys  # noqa: PLC0415
 
-    words = [sys.executable, "-m", "urdfkin", "velocity", "ur5", "--q", "random:20000", "--format", "csv"]
+    words = [sys.executable, "-m", "urdfkin", "velocity", "ur5", "--q", "random:5000", "--format", "csv"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
         assert running.stdout is not None
         assert running.stderr is not None

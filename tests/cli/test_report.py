@@ -1,23 +1,27 @@
-"""`validate`, `report` and `compare` through the real command, with every form they write."""
+"""`validate`, `report` and `compare` through the command, with every form they write.
+
+One run of `validate` is a process of its own; the others call the entry point here.
+"""
 
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from tests.cli import running
+from tests.cli.running import Done
 from tests.report.documents import arms, failing
 
-ENVIRONMENT = os.environ | {"COLUMNS": "80", "PYTHONWARNINGS": "error"}
+
+@pytest.fixture(autouse=True)
+def _eighty_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
 
 
-def urdfkin(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "urdfkin", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, check=False)
+def urdfkin(*words: str | Path) -> Done:
+    return running.urdfkin(*map(str, words))
 
 
 @pytest.fixture(scope="module")
@@ -35,16 +39,16 @@ def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_validate_writes_every_form_at_once(tmp_path: Path) -> None:
-    done = urdfkin(
-        "validate", "ur5", "--samples", "2", "--json", tmp_path / "a.json", "--html", tmp_path / "a.html",
-        "--junit", tmp_path / "a.xml", "--markdown", tmp_path / "a.md",
+    done = running.process(
+        "validate", "ur5", "--samples", "2", "--json", "a.json", "--html", "a.html",
+        "--junit", "a.xml", "--markdown", "a.md", cwd=tmp_path, PYTHONWARNINGS="error",
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    assert done.code == 0, done.err
     assert (tmp_path / "a.html").read_text().startswith("<!doctype html>")
     assert (tmp_path / "a.xml").read_bytes().startswith(b"<?xml")
     assert (tmp_path / "a.md").read_text().startswith("## ✅")
     assert json.loads((tmp_path / "a.json").read_text())["passed"]
-    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert max(map(len, done.text.splitlines())) <= 80
 
 
 def test_a_report_rendered_later_is_the_one_rendered_at_once(tmp_path: Path) -> None:
@@ -56,32 +60,32 @@ def test_a_report_rendered_later_is_the_one_rendered_at_once(tmp_path: Path) -> 
     urdfkin("validate", "planar_two_link", "--samples", "3", "--json", data, *words)
     words = [word for pair in zip(forms, later, strict=True) for word in pair]
     done = urdfkin("report", data, *words)
-    assert done.returncode == 0, done.stderr
+    assert done.code == 0, done.err
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in later]
 
 
 def test_report_prints_where_no_form_is_asked_for_and_exits_as_the_run_did(good: Path, bad: Path) -> None:
     done = urdfkin("report", good)
-    assert done.returncode == 0
-    assert "2 robots" in done.stdout
+    assert done.code == 0
+    assert "2 robots" in done.text
     done = urdfkin("report", bad)
-    assert done.returncode == 1
-    assert "urdfkin velocity panda --frame" in done.stdout
+    assert done.code == 1
+    assert "urdfkin velocity panda --frame" in done.text
 
 
 def test_report_hands_out_the_schema() -> None:
     done = urdfkin("report", "--schema")
-    assert json.loads(done.stdout)["$id"] == "urn:urdfkin:validation:1"
+    assert json.loads(done.text)["$id"] == "urn:urdfkin:validation:1"
 
 
 def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Path, tmp_path: Path) -> None:
     done = urdfkin("compare", good, bad, "--markdown", tmp_path / "c.md")
-    assert done.returncode == 1
-    assert "REGRESSION panda: verdict: verified -> disagrees" in done.stdout
+    assert done.code == 1
+    assert "REGRESSION panda: verdict: verified -> disagrees" in done.text
     assert (tmp_path / "c.md").read_text().startswith("## ❌")
-    assert urdfkin("compare", bad, good).returncode == 1  # a robot is gone
-    assert urdfkin("compare", good, good).returncode == 0
-    found = json.loads(urdfkin("compare", good, bad, "--format", "json").stdout)
+    assert urdfkin("compare", bad, good).code == 1  # a robot is gone
+    assert urdfkin("compare", good, good).code == 0
+    found = json.loads(urdfkin("compare", good, bad, "--format", "json").text)
     assert found["schema"] == "urdfkin-comparison/1"
     assert found["regressions"] == sum(change["regression"] for change in found["changes"]) > 0
 
@@ -99,25 +103,21 @@ def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Pa
         (("plot", "ur5", "--to", "random:3", "-o", "a.svg"), "one beginning and one end"),
     ],
 )
-def test_mistakes_are_one_line_and_exit_2(words: tuple[str, ...], message: str, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "urdfkin", *words],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        env=ENVIRONMENT | {"PYTHONPATH": str(Path(__file__).parents[2])},
-        check=False,
-    )
-    assert done.returncode == 2, (done.stdout, done.stderr)
-    assert message in done.stderr
-    assert "Traceback" not in done.stderr
+def test_mistakes_are_one_line_and_exit_2(
+    words: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = urdfkin(*words)
+    assert done.code == 2, (done.text, done.err)
+    assert message in done.err
+    assert "Traceback" not in done.err
 
 
 def test_an_unwritable_report_spoils_no_file_that_is_there(tmp_path: Path) -> None:
     there = tmp_path / "a.json"
     there.write_text("old")
     done = urdfkin("validate", "ur5", "--samples", "0", "--json", there, "--html", "/nowhere/a.html")
-    assert done.returncode == 2
+    assert done.code == 2
     assert there.read_text() == "old"
 
 
@@ -125,6 +125,6 @@ def test_plot_says_what_was_checked(tmp_path: Path) -> None:
     done = urdfkin(
         "plot", "ur5", "--to", "random", "--samples", "11", "--panel", "position", "-o", tmp_path / "a.png"
     )
-    assert done.returncode == 0, done.stderr
-    assert "11 samples, verified by Pinocchio" in done.stdout
+    assert done.code == 0, done.err
+    assert "11 samples, verified by Pinocchio" in done.text
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import urdfkin as library
-from tests.cli.running import urdfkin
+from tests.cli.running import process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
+from urdfkin.catalogue import catalogue
 from urdfkin.tree import FloatArray
 from urdfkin.verification.sampling import sample
 
@@ -108,6 +109,47 @@ def test_a_table_folds_no_name_and_is_no_wider_than_the_terminal(
             *words, "talos", "--frame", "gripper_left_base_link", "--q", "random:1", "--format", "json"
         )
         assert np.allclose(np.array(shown).T, J.data["result"][0], rtol=1e-5, atol=1e-12)
+
+
+@pytest.mark.parametrize("columns", [60, 80, 110, 200])
+@pytest.mark.parametrize("name", ["panda", "tiago_dual"])
+def test_info_folds_no_name_and_puts_each_joints_numbers_in_its_line_or_the_next(
+    name: str, columns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    lines = urdfkin("info", name).text.splitlines()
+    robot = library.load(name)
+    for i, joint in enumerate(robot.tree.joints):
+        if not joint.kind.nv:
+            continue
+        (at,) = [
+            k for k, line in enumerate(lines[2:], 2) if line.split()[:1] in ([joint.name], [joint.name + ":"])
+        ]
+        # Only names that are longer than the terminal run over its edge.
+        found = " ".join(lines[at : at + (1 if joint.kind.value in lines[at].split() else 2)]).split()
+        assert {robot.link_names[joint.parent], robot.link_names[i + 1], joint.kind.value} <= set(found)
+        assert f"q[{robot.tree.q_index[i]}]" in found
+        if joint.limit is not None and np.isfinite(joint.limit.upper):
+            assert found[-2:] == [f"{joint.limit.lower:.6g}", f"{joint.limit.upper:.6g}"]
+
+
+def test_a_terminal_that_knows_no_lines_gets_dashes() -> None:
+    done = process("info", "panda", COLUMNS="80", PYTHONIOENCODING="ascii")
+    assert (done.code, done.err) == (0, "")
+    assert "\n" + "-" * 80 + "\n" in done.text
+
+
+@pytest.mark.parametrize("columns", [60, 80, 200])
+def test_the_catalogue_folds_no_name_and_is_no_wider_than_the_terminal(
+    columns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    lines = urdfkin("robots").text.splitlines()
+    table = lines[: next(k for k, line in enumerate(lines) if line.endswith(" robots"))]
+    assert max(map(len, table)) <= max(columns, 71)  # family, base and tip alone take so much
+    words = {word for line in table for word in line.split()}
+    for entry in catalogue().values():
+        assert {entry.name, *entry.family.split(), *filter(None, (entry.base, entry.tip))} <= words
 
 
 def test_the_json_says_all_that_is_needed_to_use_it() -> None:

@@ -79,6 +79,7 @@ def verdicts() -> dict[str, dict[str, str]]:
     return dict(zip(REGISTRY, ask([code.document(code.bad) for code in codes]), strict=True))
 
 
+@pytest.mark.slow
 @EVERY_CODE
 def test_the_others_do_with_the_bad_example_what_the_page_says(
     code: Code, verdicts: dict[str, dict[str, str]]

@@ -37,10 +37,12 @@ def caught() -> dict[str, list[str]]:
     return answer
 
 
+@pytest.mark.slow
 def test_the_recursion_as_it_is_passes(caught: dict[str, list[str]]) -> None:
     assert caught["nothing"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mutant", MUTANTS)
 def test_a_term_that_is_off_by_1e_10_is_caught(caught: dict[str, list[str]], mutant: str) -> None:
     assert set(MUTANTS[mutant].caught_by) <= set(caught[mutant])

@@ -89,7 +89,8 @@ def test_a_robots_calls_agree_when_pinocchio_is_asked_directly(robot: Robot) -> 
 
 
 def test_joints_rates_and_frames_have_pinocchios_order_and_names(robot: Robot) -> None:
-    free = urdfkin.load(robot.source, mimic=False)
+    follows = any(joint.mimic for joint in robot.tree.joints)
+    free = urdfkin.load(robot.source, mimic=False) if follows else robot
     model = model_of(free)
     assert free.joint_names == tuple(model.names)[1:]
     assert free.nv == model.nv

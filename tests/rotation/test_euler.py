@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -27,6 +27,7 @@ def test_there_are_twelve_turning_and_twelve_fixed_sequences() -> None:
 
 
 @pytest.mark.parametrize("name", SEQUENCES)
+@settings(max_examples=40)  # for each of 24 sequences
 @given(three_angles)
 def test_a_rotation_from_angles_is_scipys(name: str, turns: tuple[float, float, float]) -> None:
     expected = Rotation.from_euler(name, turns).as_matrix()
@@ -34,6 +35,7 @@ def test_a_rotation_from_angles_is_scipys(name: str, turns: tuple[float, float, 
 
 
 @pytest.mark.parametrize("name", SEQUENCES)
+@settings(max_examples=40)  # for each of 24 sequences
 @given(three_angles)
 def test_angles_of_a_rotation_give_it_back_at_the_singularity_too(
     name: str, turns: tuple[float, float, float]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.high_precision import angular_velocity, array, mp, turn
@@ -47,6 +47,7 @@ def test_euler_rates_give_the_angular_velocity_and_back(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SEQUENCES)
+@settings(max_examples=40)  # for each of 24 sequences
 @given(st.tuples(angles, st.floats(0.2, 1.3), angles))
 def test_the_closed_inverse_is_the_inverse(name: str, turns: tuple[float, float, float]) -> None:
     product = euler_rate_inverse(name, turns) @ euler_rate_matrix(name, turns)
@@ -54,6 +55,7 @@ def test_the_closed_inverse_is_the_inverse(name: str, turns: tuple[float, float,
 
 
 @pytest.mark.parametrize("name", SEQUENCES)
+@settings(max_examples=40)  # for each of 24 sequences
 @given(st.floats(-4.0, 4.0))
 def test_the_condition_number_is_that_of_the_matrix(name: str, middle: float) -> None:
     turns = [0.3, middle, -0.8]

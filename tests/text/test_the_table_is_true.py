@@ -62,6 +62,12 @@ def passes(test: str) -> bool:
     return True
 
 
+@cache
+def passes_as_it_is(test: str) -> bool:
+    """The same while nothing is wrong: equations share tests, and each need pass but once."""
+    return passes(test)
+
+
 def test_every_equation_is_there_but_the_four_that_are_lost() -> None:
     assert list(equations()) == [f"7.{i}" for i in range(1, LAST + 1) if f"7.{i}" not in LOST]
     assert len(equations()) == 126
@@ -82,11 +88,12 @@ def test_every_function_exists_and_every_test_is_a_test() -> None:
 @pytest.mark.parametrize("number", list(equations()))
 def test_its_tests_pass_and_fail_when_one_of_its_functions_is_slightly_wrong(number: str) -> None:
     equation = equations()[number]
-    assert all(passes(test) for test in equation.tests)
+    assert all(passes_as_it_is(test) for test in equation.tests)
     for name in equation.functions:
         with slightly_wrong(resolve(name)):
             assert not all(passes(test) for test in equation.tests), f"{name} may be wrong unnoticed"
-        assert all(passes(test) for test in equation.tests)
+    # What failed did so because of that function alone: with all of them right again everything passes.
+    assert all(passes(test) for test in equation.tests)
 
 
 def test_every_misprint_has_a_proof_that_passes() -> None:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 EXAMPLE = "urdfkin info panda"
 
+_COLUMNS = ("joint", "kind", "q", "parent", "child", "lower", "upper")
+
 
 @click.command(epilog=f"Example: {EXAMPLE}")
 @robot_argument
@@ -38,14 +40,15 @@ def command(robot: str, mimic: bool | None, root_joint: str | None, format_: str
 
 def _print(robot: Robot) -> None:
     from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
-    from urdfkin.cli.tables import make_table  # noqa: PLC0415
+    from urdfkin.cli.tables import fits, make_table, print_named  # noqa: PLC0415
 
     tree, out = robot.tree, console()
     out.print(
         f"{robot.name}: nq {robot.nq}, nv {robot.nv}, {len(tree.links)} links, {len(tree.joints)} joints"
     )
     out.print(f"root {tree.links[0]}, default base {robot.base_frame}, default tip {robot.tip_frame}")
-    rows = (
+    moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
+    rows = [
         (
             joint.name,
             joint.kind.value,
@@ -54,10 +57,16 @@ def _print(robot: Robot) -> None:
             tree.links[i + 1],
             *_limits(joint),
         )
-        for i, joint in enumerate(tree.joints)
-        if joint.kind.nv
-    )
-    out.print(make_table(["joint", "kind", "q", "parent", "child", "lower", "upper"], rows, words=5))
+        for i, joint in moving
+    ]
+    if fits(out, _COLUMNS, rows):
+        out.print(make_table(_COLUMNS, rows, words=5))
+    else:
+        short = [
+            (f"{joint}: {parent} -> {child}", kind, q, *limits)
+            for joint, kind, q, parent, child, *limits in rows
+        ]
+        print_named(out, ["joint: parent -> child", "kind", "q", "lower", "upper"], short, words=3)
     fixed = [joint.name for joint in tree.joints if not joint.kind.nv]
     if fixed:
         out.print(f"fixed joints ({len(fixed)}): {', '.join(fixed)}")

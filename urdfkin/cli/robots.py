@@ -30,11 +30,11 @@ def command(family: str | None, format_: str) -> None:
         click.echo()
         return
     from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
-    from urdfkin.cli.tables import make_table  # noqa: PLC0415
+    from urdfkin.cli.tables import print_named  # noqa: PLC0415
 
     rows = ((entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries)
     out = console()
-    out.print(make_table(["name", "family", "base", "tip"], rows, words=4))
+    print_named(out, ["name", "family", "base", "tip"], rows, words=4)
     out.print(f"{len(entries)} robots")
     for entry in entries:
         if entry.reason:

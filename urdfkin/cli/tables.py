@@ -32,34 +32,46 @@ def print_named(
 ) -> None:
     """A table like `make_table`'s whose first column holds names, which are never folded.
 
-    Where the terminal is too narrow, a name stands on a line of its own above what belongs to it.
+    Where the terminal is too narrow, a name that leaves no room for what belongs to it stands on a line of
+    its own above that.
     """
     from rich.cells import cell_len  # noqa: PLC0415
 
     texts = _texts(rows)
-    widths = [max(map(cell_len, column)) for column in zip(columns, *texts, strict=True)]
-    if sum(width + 1 for width in widths) <= out.width:
+    widths = _widths(columns, texts)
+    if fits(out, columns, texts):
         out.print(make_table(columns, texts, words=words))
         return
+    room = max(2, out.width - 1 - sum(width + 1 for width in widths[1:]))
 
-    def line(cells: Sequence[str]) -> str:
-        padded = (
-            cell + gap if i < words else gap + cell
-            for i, (cell, width) in enumerate(zip(cells, widths, strict=True))
-            for gap in [" " * (width - cell_len(cell))]
-            if i
-        )
-        return "  " + " ".join(padded)
+    def show(cells: Sequence[str], style: str | None = None) -> None:
+        first, rest = cells[0], " ".join(map(padded, range(1, len(cells)), cells[1:], widths[1:]))
+        if cell_len(first) > room - 1:
+            out.print(first, soft_wrap=True, style=style)
+            first = ""
+        out.print(padded(0, first, room) + rest.rstrip(), soft_wrap=True, style=style)
 
-    out.print(columns[0], style="bold")
-    out.print(line(columns), style="bold", soft_wrap=True)
-    out.print("\u2500" * min(out.width, len(line(columns))))
+    def padded(i: int, cell: str, width: int) -> str:
+        gap = " " * (width - cell_len(cell))
+        return cell + gap if i < words else gap + cell
+
+    show(columns, "bold")
+    out.print(("-" if out.options.ascii_only else "\u2500") * out.width)
     name = None
     for row in texts:
-        if row[0] != name:
-            name = row[0]
-            out.print(name, soft_wrap=True)
-        out.print(line(row), soft_wrap=True)
+        show([row[0] if row[0] != name else "", *row[1:]])
+        name = row[0]
+
+
+def fits(out: Console, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
+    """Whether a table is no wider than the terminal."""
+    return sum(width + 1 for width in _widths(columns, rows)) <= out.width
+
+
+def _widths(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[int]:
+    from rich.cells import cell_len  # noqa: PLC0415
+
+    return [max(map(cell_len, column)) for column in zip(columns, *rows, strict=True)]
 
 
 def _texts(rows: Iterable[Sequence[str | float]]) -> list[list[str]]:
