@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.recursion.plan import Plan
+from urdfkin.recursion.plan import Packed, Plan
 from urdfkin.recursion.scratch import scratch
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 _empty = np.empty
+#: What the kernels count, in the order of `Packed.COUNTS`.
+_COUNTED = Quantity.PLACEMENT, Quantity.VELOCITY, Quantity.ACCELERATION, Quantity.JACOBIAN
 #: What Numba raises for arguments that are no arrays of the kernel's kind; an empty list has no type at all.
 _NOT_TAKEN = (TypeError, ValueError, OverflowError)
 
@@ -49,20 +51,20 @@ class PreparedFrame:
     """
 
     __slots__ = (
-        "_accelerations", "_jacobian", "_jacobians", "_motion", "_number", "_packed", "_placement",
-        "_placements", "_plain", "_plan", "_robot", "_scratch", "_shape", "_velocities", "frame", "reference",
+        "_jacobian", "_motion", "_packed", "_placement", "_plain", "_plan", "_robot", "_scratch", "_shape",
+        "frame", "reference",
     )  # fmt: skip
 
     def __init__(self, robot: Robot, frame: str, reference: Reference, plan: Plan) -> None:
         self.frame, self.reference = frame, reference
-        self._robot, self._plan, account = robot, plan, robot.ledger.account
+        self._robot, self._plan = robot, plan
         self._scratch = scratch(plan)
-        self._packed = np.array([*plan.packed, self._scratch.ctypes.data])
-        self._number, self._shape = int(reference), (6, plan.nv)
+        self._packed = np.array([*plan.packed, self._scratch.ctypes.data, int(reference), *(4 * [0])])
+        self._shape = (6, plan.nv)
+        for place, quantity in enumerate(_COUNTED, Packed.COUNTS):
+            robot.ledger.account(quantity).counters.append((self._packed, place))
         # Quaternions are brought to norm 1 first, which is the robot's business.
         self._plain = not robot.tree.floating_joints
-        self._placements, self._velocities = account(Quantity.PLACEMENT), account(Quantity.VELOCITY)
-        self._jacobians, self._accelerations = account(Quantity.JACOBIAN), account(Quantity.ACCELERATION)
         # Compiled, or read from disk, when they are first called.
         self._placement: Callable[..., int] = self._first_placement
         self._jacobian: Callable[..., int] = self._first_jacobian
@@ -73,42 +75,36 @@ class PreparedFrame:
         return self._robot.prepare, (self.frame, self.reference)
 
     # Where a kernel does not take what it is given, the robot's way says what is wrong, or does it all the
-    # same. One statement adds to an account: under the interpreter's lock no thread comes in between.
+    # same. The kernels count what they hand out themselves, for the ledger.
 
     def placement(self, q: ArrayLike, out: FloatArray | None = None) -> FloatArray:
         """(4, 4) T_world_frame: eq. 7.77."""
         pose = _empty((4, 4)) if out is None else out
         try:
-            done = self._placement(self._packed, q, pose) == 1
+            if self._placement(self._packed, q, pose) == 1:
+                return pose
         except _NOT_TAKEN:
-            done = False
-        if done:
-            self._placements.not_asked_for += 1
-            return pose
+            pass
         return self._robot.placement(q, self.frame, out=out, verify=False, threads=1)
 
     def velocity(self, q: ArrayLike, v: ArrayLike, out: FloatArray | None = None) -> FloatArray:
         """(6,) [linear; angular] m/s, rad/s: eq. 7.127, 7.128."""
         six = _empty(6) if out is None else out
         try:
-            done = self._motion(1, self._number, self._packed, q, v, v, six) == 1
+            if self._motion(1, self._packed, q, v, v, six) == 1:
+                return six
         except _NOT_TAKEN:
-            done = False
-        if done:
-            self._velocities.not_asked_for += 1
-            return six
+            pass
         return self._robot.velocity(q, v, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def jacobian(self, q: ArrayLike, out: FloatArray | None = None) -> FloatArray:
         """(6, nv): eq. 7.85."""
         J = _empty(self._shape) if out is None else out
         try:
-            done = self._jacobian(self._number, self._packed, q, J) == 1
+            if self._jacobian(self._packed, q, J) == 1:
+                return J
         except _NOT_TAKEN:
-            done = False
-        if done:
-            self._jacobians.not_asked_for += 1
-            return J
+            pass
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def acceleration(
@@ -117,12 +113,10 @@ class PreparedFrame:
         """(6,) [linear; angular] m/s^2, rad/s^2, classical: eq. 7.129, 7.130."""
         six = _empty(6) if out is None else out
         try:
-            done = self._motion(2, self._number, self._packed, q, v, a, six) == 1
+            if self._motion(2, self._packed, q, v, a, six) == 1:
+                return six
         except _NOT_TAKEN:
-            done = False
-        if done:
-            self._accelerations.not_asked_for += 1
-            return six
+            pass
         return self._robot.acceleration(q, v, a, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def _first_placement(self, *arguments: object) -> int:

@@ -23,6 +23,8 @@ _config: Any = numba.config  # settings that numba sets at run time
 
 # Inputs may be read-only; a writable array converts without a copy. One signature, compiled once.
 PLAN = types.Array(types.int64, 1, "C", readonly=True)
+#: A plan bound to scratch memory, for one configuration at a time.
+BOUND = types.Array(types.int64, 1, "C")
 NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 SCRATCH = types.Array(types.float64, 1, "C")

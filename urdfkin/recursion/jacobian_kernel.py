@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from urdfkin.recursion.columns import AXIS_OF, STEP, TURNS, put_column, write_matrix
-from urdfkin.recursion.compiling import INT, NUMBERS, PLAN, ROWS, SCRATCH, kernel, output
+from urdfkin.recursion.compiling import BOUND, INT, NUMBERS, PLAN, ROWS, SCRATCH, kernel, output
 from urdfkin.recursion.lanes import (
     LANES,
     apart,
@@ -21,6 +21,8 @@ from urdfkin.recursion.rows import ANGULAR, AXIS, FRAME, KEPT_ROWS, LINEAR, ORIG
 from urdfkin.recursion.steps import step
 from urdfkin.recursion.transposing import fetch_output
 from urdfkin.recursion.walk import (
+    REFERENCE,
+    counted,
     finite,
     frame_state,
     read_input,
@@ -118,8 +120,8 @@ def jacobians(reference, packed, base, q, out, scratch):
     return good
 
 
-@kernel(INT, PLAN, NUMBERS, output(2), nogil=False)
-def jacobian(reference, packed, q, out):
+@kernel(BOUND, NUMBERS, output(2), nogil=False)
+def jacobian(packed, q, out):
     """The velocity Jacobian (7.85) of one frame in one configuration; -1 for other arrays.
 
     Shapes: q (nq,), out (6, nv), memory of its own.
@@ -127,6 +129,6 @@ def jacobian(reference, packed, q, out):
     plan = walk_of(packed)
     if q.shape[0] != plan.nq or out.shape[0] != 6 or out.shape[1] != plan.nv or not apart(q, out):
         return -1
-    one = 1 + 0 * plan.nq
-    x, to = pointer_to(q), pointer_to(out)
-    return _jacobian_block(one, scratch_of(packed), plan, 0 * one, reference, still_base(), 0 * one, x, to)
+    one, s, x, to = 1 + 0 * plan.nq, scratch_of(packed), pointer_to(q), pointer_to(out)
+    good = _jacobian_block(one, s, plan, 0 * one, packed[REFERENCE], still_base(), 0 * one, x, to)
+    return counted(packed, 3, good)

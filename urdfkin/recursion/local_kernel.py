@@ -9,7 +9,7 @@ Pinocchio, which works in the links' axes, on short chains.
 
 from __future__ import annotations
 
-from urdfkin.recursion.compiling import INT, NUMBERS, PLAN, ROWS, SCRATCH, kernel, output
+from urdfkin.recursion.compiling import BOUND, INT, NUMBERS, PLAN, ROWS, SCRATCH, kernel, output
 from urdfkin.recursion.lanes import (
     LANES,
     copy_rows,
@@ -46,7 +46,16 @@ from urdfkin.recursion.rows import (
     W,
 )
 from urdfkin.recursion.steps import carry, gather_joint, gather_place, gather_rates
-from urdfkin.recursion.walk import read_inputs, resume, save, scratch_of, still_base, stride_of, walk_of
+from urdfkin.recursion.walk import (
+    counted,
+    read_inputs,
+    resume,
+    save,
+    scratch_of,
+    still_base,
+    stride_of,
+    walk_of,
+)
 
 _KIND = int(Step.KIND)
 _OFFSET = int(Geometry.OFFSET)
@@ -246,8 +255,8 @@ def local_motions(order, packed, base, q, v, a, out, scratch):
     return good
 
 
-@kernel(INT, INT, PLAN, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
-def local_motion(order, reference, packed, q, v, a, out):
+@kernel(INT, BOUND, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
+def local_motion(order, packed, q, v, a, out):
     """The same of one frame in one configuration, always LOCAL; -1 where the arrays cannot be taken.
 
     Shapes: q (nq,), v and a (nv,), out (6,), memory of its own.
@@ -257,4 +266,5 @@ def local_motion(order, reference, packed, q, v, a, out):
         return -1
     one = 1 + 0 * plan.nq
     s, x, y, z, to = scratch_of(packed), pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
-    return _local_block(one, s, plan, 0 * one, order, still_base(), 0 * one, x, y, z, to)
+    good = _local_block(one, s, plan, 0 * one, order, still_base(), 0 * one, x, y, z, to)
+    return counted(packed, order, good)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urdfkin.recursion.compiling import INT, NUMBERS, PLAN, ROWS, SCRATCH, kernel, output
+from urdfkin.recursion.compiling import BOUND, INT, NUMBERS, PLAN, ROWS, SCRATCH, kernel, output
 from urdfkin.recursion.lanes import (
     LANES,
     apart,
@@ -21,6 +21,8 @@ from urdfkin.recursion.rows import ALPHA, FRAME, ONE, ZERO, A, P, R, V, W
 from urdfkin.recursion.steps import step
 from urdfkin.recursion.transposing import write_rows
 from urdfkin.recursion.walk import (
+    REFERENCE,
+    counted,
     finite,
     frame_state,
     read_inputs,
@@ -130,7 +132,7 @@ def motions(order, reference, packed, base, q, v, a, out, scratch):
     return good
 
 
-@kernel(PLAN, NUMBERS, output(2), nogil=False)
+@kernel(BOUND, NUMBERS, output(2), nogil=False)
 def placement(packed, q, out):
     """The placement of one frame in one configuration; -1 for other arrays.
 
@@ -141,11 +143,12 @@ def placement(packed, q, out):
         return -1
     one, order = 1 + 0 * plan.nq, 0 * plan.nq
     s, x, to = scratch_of(packed), pointer_to(q), pointer_to(out)
-    return _motion_block(one, s, plan, order, order, order, still_base(), order, x, x, x, to)
+    good = _motion_block(one, s, plan, order, order, order, still_base(), order, x, x, x, to)
+    return counted(packed, 0, good)
 
 
-@kernel(INT, INT, PLAN, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
-def motion(order, reference, packed, q, v, a, out):
+@kernel(INT, BOUND, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
+def motion(order, packed, q, v, a, out):
     """The velocity (order 1) or acceleration (2) of one frame in one configuration; -1 for other arrays.
 
     Shapes: q (nq,), v and a (nv,), out (6,), memory of its own.
@@ -153,6 +156,7 @@ def motion(order, reference, packed, q, v, a, out):
     plan = walk_of(packed)
     if not shapes_fit(plan, order, q, v, a, out):
         return -1
-    one = 1 + 0 * plan.nq
+    one, reference = 1 + 0 * plan.nq, packed[REFERENCE]
     s, x, y, z, to = scratch_of(packed), pointer_to(q), pointer_to(v), pointer_to(a), pointer_to(out)
-    return _motion_block(one, s, plan, 0 * one, order, reference, still_base(), 0 * one, x, y, z, to)
+    good = _motion_block(one, s, plan, 0 * one, order, reference, still_base(), 0 * one, x, y, z, to)
+    return counted(packed, order, good)

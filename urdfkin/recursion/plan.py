@@ -37,7 +37,8 @@ class Step(IntEnum):
 class Packed(IntEnum):
     """Entries of `Plan.packed`: addresses of the plan's arrays, then their sizes, then rows of scratch.
 
-    Kernels for one configuration find the address of their scratch array behind them.
+    Kernels for one configuration find more behind them: the address of their scratch array, the reference,
+    and how often they have computed a placement, velocity, acceleration and Jacobian.
     """
 
     STEPS = 0
@@ -59,6 +60,8 @@ class Packed(IntEnum):
     NV = 16
     AREAS = 17
     SCRATCH = 24
+    REFERENCE = 25
+    COUNTS = 26
 
 
 class Motion(IntEnum):

@@ -32,8 +32,9 @@ _STEPS, _GEOMETRY, _FRAMES = int(Packed.STEPS), int(Packed.GEOMETRY), int(Packed
 _OFFSETS, _COLUMNS, _MULTIPLIERS = int(Packed.OFFSETS), int(Packed.COLUMNS), int(Packed.MULTIPLIERS)
 _LEADERS, _SOURCES = int(Packed.LEADERS), int(Packed.SOURCES)
 _BLOCKS_Q, _BLOCKS_V = int(Packed.BLOCKS_Q), int(Packed.BLOCKS_V)
-_COUNTS, _AREAS = int(Packed.STEP_COUNT), int(Packed.AREAS)
-_SCRATCH = int(Packed.SCRATCH)
+_SIZES, _AREAS = int(Packed.STEP_COUNT), int(Packed.AREAS)
+_SCRATCH, _COUNTS = int(Packed.SCRATCH), int(Packed.COUNTS)
+REFERENCE = int(Packed.REFERENCE)
 _RESUME, _SAVE = int(Step.RESUME), int(Step.SAVE)
 
 _STILL = STILL_STATE[0].copy()
@@ -81,13 +82,13 @@ def walk_of(packed):
         whole_numbers_at(packed[_SOURCES]),
         whole_numbers_at(packed[_BLOCKS_Q]),
         whole_numbers_at(packed[_BLOCKS_V]),
-        packed[_COUNTS],
-        packed[_COUNTS + 1],
-        packed[_COUNTS + 2],
-        packed[_COUNTS + 3],
-        packed[_COUNTS + 4],
-        packed[_COUNTS + 5],
-        packed[_COUNTS + 6],
+        packed[_SIZES],
+        packed[_SIZES + 1],
+        packed[_SIZES + 2],
+        packed[_SIZES + 3],
+        packed[_SIZES + 4],
+        packed[_SIZES + 5],
+        packed[_SIZES + 6],
         packed[_AREAS],
         packed[_AREAS + 1],
         packed[_AREAS + 2],
@@ -145,6 +146,13 @@ def start(m, s, plan, b, base, stride, order):
 def scratch_of(packed):
     """The scratch array of a kernel for one configuration."""
     return numbers_at(packed[_SCRATCH])
+
+
+@lane_function
+def counted(packed, which, good):
+    """What a kernel for one configuration answers; it counts what it has computed."""
+    packed[_COUNTS + which] += good
+    return good
 
 
 @lane_function

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from urdfkin.errors import UrdfkinError
+from urdfkin.recursion.plan import IntArray
 from urdfkin.tree import FloatArray
 from urdfkin.verification.bounds import Bound, Quantity, result_k
 from urdfkin.verification.worst import worst_of_each
@@ -171,16 +172,23 @@ class Account:
         checked: What Pinocchio confirmed.
         unchecked: How many results it could not check, or was not asked to because of a sample.
         not_asked_for: How many results nobody wanted checked.
+        counters: Arrays and places in them where others count more of these, each as it goes.
     """
 
     checked: Comparison = field(default_factory=Comparison.of_nothing)
     unchecked: int = 0
     not_asked_for: int = 0
+    counters: list[tuple[IntArray, int]] = field(default_factory=list)
+
+    @property
+    def unwanted(self) -> int:
+        """All results that nobody wanted checked."""
+        return self.not_asked_for + sum(int(counts[place]) for counts, place in self.counters)
 
     def line(self, quantity: Quantity) -> Line:
         """The same as a certificate has it."""
         found = self.checked
-        return Line(quantity, found.results, found.worst, found.share, self.unchecked + self.not_asked_for)
+        return Line(quantity, found.results, found.worst, found.share, self.unchecked + self.unwanted)
 
 
 @dataclass
@@ -218,7 +226,7 @@ class Ledger:
             found = [
                 (quantity, self._accounts[quantity]) for quantity in Quantity if quantity in self._accounts
             ]
-            reasons = [NOT_ASKED_FOR] if any(account.not_asked_for for _, account in found) else []
+            reasons = [NOT_ASKED_FOR] if any(account.unwanted for _, account in found) else []
             lines = [account.line(quantity) for quantity, account in found]
             return Certificate(
                 robot,
