@@ -23,7 +23,7 @@ from urdfkin.followers import with_rules_of_text
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import IntArray
 from urdfkin.reference import Reference
-from urdfkin.tree import FloatArray, KinematicTree
+from urdfkin.tree import FloatArray, JointKind, KinematicTree
 
 #: Pinocchio recurses over links: less than 4 kB of stack for each was measured (4.1.0), room for more.
 _STACK_FOR_A_LINK = 16_384
@@ -388,6 +388,13 @@ class _Layout:
         #: Whether Pinocchio's rates are the robot's: the same ones, in the same order.
         self._alike = np.array_equal(self._rate_index, np.arange(tree.nv)) and not v_base
         self._alike &= bool((self._rate_factor == 1.0).all())
+        #: Whether Pinocchio has other coordinates for a joint, or in another order.
+        self._otherwise = any(
+            tree.joints[i].mimic
+            or tree.joints[i].kind in (JointKind.CONTINUOUS, JointKind.PLANAR)
+            or tree.q_index[i] != model.joints[j].idx_q
+            for i, j in self._moving
+        )
 
     def _rate_rules(self) -> tuple[IntArray, FloatArray]:
         """For each of Pinocchio's rates: whose it is in urdfkin's `v`, and the factor (G)."""
@@ -401,6 +408,8 @@ class _Layout:
         return index, factor
 
     def configurations(self, q: FloatArray) -> FloatArray:
+        if not self._otherwise:
+            return np.array(q)
         full = np.zeros((len(q), self._model.nq))
         q_at = {i: self._model.joints[j].idx_q for i, j in self._moving}
         for i, block in pinocchio_blocks(self._tree, q, mimic=False):

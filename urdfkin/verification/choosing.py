@@ -18,7 +18,7 @@ SAMPLE = 100
 
 #: Numbers and configurations compared at a time: few enough for a cache and for memory not to grow with a
 #: batch, many enough for array expressions to be worth their call.
-_AT_A_TIME = 262_144
+_AT_A_TIME = 131_072
 _MOST = 4096
 
 

@@ -45,16 +45,21 @@ class Magnitudes:
 def magnitudes(
     plan: Plan, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: FloatArray
 ) -> Magnitudes:
-    """For flat batches q (n, nq), v and a (n, nv) or None for zero, and a base state (1 or n, 24)."""
-    n = len(q)
-    v, a = (np.zeros((1, plan.nv)) if x is None else x for x in (v, a))
-    start = [_norm(base[:, at : at + 3]) for at in (9, 12, 15, 18, 21)]
-    states = [[*start, np.zeros(1)]]
+    """For flat batches q (n, nq), v and a (n, nv) or None, and a base state (1 or n, 24).
+
+    Without v, only p and joints are those of the frames: what depends on places alone needs no more.
+    """
+    if v is not None and a is None:
+        a = np.zeros((1, plan.nv))
+    state = [_norm(base[:, at : at + 3]) for at in (9, 12, 15, 18, 21)]
+    states = [[*state, np.zeros(1)]]
     for i in range(len(plan.steps)):
-        states.append(_step(plan, i, states[plan.parents[i] + 1], q, v, a))
-    out = np.empty((6, n, len(plan.frames)))
+        state = states[plan.parents[i] + 1]
+        states.append(_place(plan, i, state, q) if v is None or a is None else _step(plan, i, state, q, v, a))
+    carry = _carry if v is not None else _carry_place
+    out = np.empty((6, len(q), len(plan.frames)))
     for f, (step, place) in enumerate(plan.frames):
-        for row, values in zip(out, _carry(states[step + 1], plan.lengths[len(plan.steps) + f]), strict=True):
+        for row, values in zip(out, carry(states[step + 1], plan.lengths[len(plan.steps) + f]), strict=True):
             row[:, place] = values  # what is the same for all configurations is one number
     out[5] += plan.depth + 1
     return Magnitudes(*out)
@@ -69,23 +74,55 @@ def _carry(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
     return [p + d, w, vel + w * d, alpha, acc + (alpha + w * w) * d, angles]
 
 
+def _carry_place(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
+    return [state[0] + d, *state[1:]]
+
+
+def _own(plan: Plan, i: int, q: FloatArray) -> FloatArray:
+    """The size of a single coordinate."""
+    multiplier, constant = plan.geometry[i, Geometry.MULTIPLIER :]
+    own: FloatArray = np.abs(multiplier * q[:, plan.steps[i, Step.Q]]) + abs(constant)
+    return own
+
+
+def _followed(plan: Plan, i: int, angles: FloatArray, q: FloatArray) -> FloatArray:
+    """A follower's angle is itself rounded."""
+    leads = plan.geometry[i, Geometry.MULTIPLIER] == 1.0 and plan.geometry[i, Geometry.CONSTANT] == 0.0
+    return angles if leads else angles + _own(plan, i, q)
+
+
+def _slid(plan: Plan, i: int, q: FloatArray) -> FloatArray:
+    """How far a joint slides."""
+    kind, at = int(plan.steps[i, Step.KIND]), int(plan.steps[i, Step.Q])
+    return (
+        _own(plan, i, q)
+        if kind == Motion.SLIDE
+        else _norm(q[:, at : at + (2 if kind == Motion.PLANAR else 3)])
+    )
+
+
+def _place(plan: Plan, i: int, state: list[FloatArray], q: FloatArray) -> list[FloatArray]:
+    if plan.steps[i, Step.KIND] == Motion.TURN:
+        *state, angles = _carry_place(state, plan.lengths[i])
+        return [*state, _followed(plan, i, angles, q)]
+    return _carry_place(state, plan.lengths[i] + _slid(plan, i, q))
+
+
 def _step(
     plan: Plan, i: int, state: list[FloatArray], q: FloatArray, v: FloatArray, a: FloatArray
 ) -> list[FloatArray]:
-    kind, at, rate_at = (int(plan.steps[i, c]) for c in (Step.KIND, Step.Q, Step.V))
-    multiplier, constant = plan.geometry[i, Geometry.MULTIPLIER :]
+    kind, rate_at = int(plan.steps[i, Step.KIND]), int(plan.steps[i, Step.V])
     if kind in (Motion.TURN, Motion.SLIDE):
-        own = np.abs(multiplier * q[:, at]) + abs(constant)
+        multiplier = plan.geometry[i, Geometry.MULTIPLIER]
         rate, rate_2 = np.abs(multiplier * v[:, rate_at]), np.abs(multiplier * a[:, rate_at])
         if kind == Motion.TURN:
             p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i])
-            follows = (multiplier, constant) != (1.0, 0.0)
             turned = alpha + rate_2 + rate * (w + rate)
-            return [p, w + rate, vel, turned, acc, angles + own if follows else angles]
-        p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i] + own)
+            return [p, w + rate, vel, turned, acc, _followed(plan, i, angles, q)]
+        p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i] + _slid(plan, i, q))
         return [p, w, vel + rate, alpha, acc + rate_2 + 2.0 * rate * w, angles]
     slides, turns = (2, 1) if kind == Motion.PLANAR else (3, 3)
-    p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i] + _norm(q[:, at : at + slides]))
+    p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i] + _slid(plan, i, q))
     u, o = _norm(v[:, rate_at : rate_at + slides]), _norm(v[:, rate_at + slides : rate_at + slides + turns])
     u_rate = _norm(a[:, rate_at : rate_at + slides])
     o_rate = _norm(a[:, rate_at + slides : rate_at + slides + turns])
