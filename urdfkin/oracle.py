@@ -389,7 +389,7 @@ class _Layout:
         self._alike = np.array_equal(self._rate_index, np.arange(tree.nv)) and not v_base
         self._alike &= bool((self._rate_factor == 1.0).all())
         #: Whether Pinocchio has other coordinates for a joint, or in another order.
-        self._otherwise = any(
+        self._otherwise = model.nq != tree.nq or any(
             tree.joints[i].mimic
             or tree.joints[i].kind in (JointKind.CONTINUOUS, JointKind.PLANAR)
             or tree.q_index[i] != model.joints[j].idx_q
