@@ -94,27 +94,28 @@ class Call:
             )
         )
 
-    def flat(self, out: FloatArray | None, *own: int) -> FloatArray | None:
-        """`out`, for one frame, as the kernels write it: (n, 1, ...)."""
+    def flat(self, out: FloatArray | None, *own: int, every: bool = False) -> FloatArray | None:
+        """`out`, for one frame or for every one, as the kernels write it: (n, frames, ...)."""
         if out is None:
             return None
+        wanted = (*self.shape, len(self.links), *own) if every else (*self.shape, *own)
         good = isinstance(out, np.ndarray) and out.dtype == np.float64 and out.flags.c_contiguous
-        if not good or out.shape != (*self.shape, *own) or not out.flags.writeable:
+        if not good or out.shape != wanted or not out.flags.writeable:
             raise InputError(
-                f"out must be a writable C-contiguous float64 array of shape {(*self.shape, *own)}",
+                f"out must be a writable C-contiguous float64 array of shape {wanted}",
                 found=f"{getattr(out, 'dtype', type(out).__name__)} {getattr(out, 'shape', '')}",
             )
         if any(np.may_share_memory(out, array) for array in (self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a: they are read again for the check")
-        return out.reshape(self.n, 1, *own)
+        return out.reshape(self.n, len(self.links), *own)
 
     def one(self, result: FloatArray, out: FloatArray | None) -> FloatArray:
         """The (n, 1, ...) result of a call for one frame, in the caller's batch shape."""
         return result.reshape(*self.shape, *result.shape[2:]) if out is None else out
 
-    def every(self, result: FloatArray) -> FloatArray:
+    def every(self, result: FloatArray, out: FloatArray | None = None) -> FloatArray:
         """The (n, frames, ...) result of a call for several, in the caller's batch shape."""
-        return result.reshape(*self.shape, *result.shape[1:])
+        return result.reshape(*self.shape, *result.shape[1:]) if out is None else out
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
         """Evaluate the walk, or name the number that is not finite."""

@@ -38,7 +38,9 @@ class Manipulator:
         frames: Sequence[str] | None = None,
         *,
         base: BaseMotion | None = None,
+        out: FloatArray | None = None,
         verify: Verify | None = None,
+        threads: int | None = None,
     ) -> FloatArray:
         """(..., frames, 4, 4) T_world_frame of several frames in one pass (7.77).
 
@@ -46,7 +48,10 @@ class Manipulator:
             q: (..., nq) rad, m.
             frames: Names of links or joints; None means every link, in the order of `link_names`.
             base: How the root link moves; None if it stands at the world's origin.
-            verify: Whether Pinocchio checks this call; None leaves it to the robot.
+            out: C-contiguous float64 array of the result's shape to write into; after an error it may hold
+                anything.
+            verify: As in `Robot.placement`.
+            threads: As in `Robot.placement`.
 
         Raises:
             InputError: wrong length, a number that is not finite, a batch that does not broadcast.
@@ -55,9 +60,12 @@ class Manipulator:
         """
         robot = _robot(self)
         call = Call(robot, _names(robot, frames), _ALIGNED, base, q)
-        result = call.compute(evaluate.placements, call.plan, call.q, base=call.state)
+        to = call.flat(out, 4, 4, every=True)
+        result = call.compute(
+            evaluate.placements, call.plan, call.q, base=call.state, out=to, threads=threads
+        )
         call.verify(Quantity.PLACEMENT, result, verify)
-        return call.every(result)
+        return call.every(result, out)
 
     def velocities(
         self,
@@ -67,7 +75,9 @@ class Manipulator:
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
+        out: FloatArray | None = None,
         verify: Verify | None = None,
+        threads: int | None = None,
     ) -> FloatArray:
         """(..., frames, 6) [linear; angular] of several frames in one pass (7.75 to 7.79 by 7.127, 7.128).
 
@@ -75,10 +85,11 @@ class Manipulator:
         """
         robot = _robot(self)
         call = Call(robot, _names(robot, frames), reference, base, q, v)
+        to = call.flat(out, 6, every=True)
         walk = call.plan, call.q, *call.rates, call.reference
-        result = call.compute(evaluate.velocities, *walk, base=call.state)
+        result = call.compute(evaluate.velocities, *walk, base=call.state, out=to, threads=threads)
         call.verify(Quantity.VELOCITY, result, verify)
-        return call.every(result)
+        return call.every(result, out)
 
     def jacobians(
         self,
@@ -87,7 +98,9 @@ class Manipulator:
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
+        out: FloatArray | None = None,
         verify: Verify | None = None,
+        threads: int | None = None,
     ) -> FloatArray:
         """(..., frames, 6, nv) velocity Jacobians of several frames in one pass (7.85).
 
@@ -95,9 +108,12 @@ class Manipulator:
         """
         robot = _robot(self)
         call = Call(robot, _names(robot, frames), reference, base, q)
-        result = call.compute(evaluate.jacobians, call.plan, call.q, call.reference, base=call.state)
+        to = call.flat(out, 6, robot.nv, every=True)
+        result = call.compute(
+            evaluate.jacobians, call.plan, call.q, call.reference, base=call.state, out=to, threads=threads
+        )
         call.verify(Quantity.JACOBIAN, result, verify)
-        return call.every(result)
+        return call.every(result, out)
 
     def accelerations(
         self,
@@ -108,7 +124,9 @@ class Manipulator:
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
+        out: FloatArray | None = None,
         verify: Verify | None = None,
+        threads: int | None = None,
     ) -> FloatArray:
         """(..., frames, 6) classical accelerations of several frames in one pass (7.129, 7.130).
 
@@ -116,11 +134,19 @@ class Manipulator:
         """
         robot = _robot(self)
         call = Call(robot, _names(robot, frames), reference, base, q, v, a)
+        to = call.flat(out, 6, every=True)
         result = call.compute(
-            evaluate.accelerations, call.plan, call.q, *call.rates, call.reference, base=call.state
+            evaluate.accelerations,
+            call.plan,
+            call.q,
+            *call.rates,
+            call.reference,
+            base=call.state,
+            out=to,
+            threads=threads,
         )
         call.verify(Quantity.ACCELERATION, result, verify)
-        return call.every(result)
+        return call.every(result, out)
 
     def jacobian_rate(
         self,
@@ -132,6 +158,7 @@ class Manipulator:
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
         verify: Verify | None = None,
+        threads: int | None = None,
     ) -> FloatArray:
         """(..., 6, nv) J-dot, the time derivative of `jacobian` along the motion (7.126).
 
@@ -146,7 +173,8 @@ class Manipulator:
             reference: For which point and in which axes.
             base: How the root link moves; None if it stands at the world's origin.
             out: C-contiguous float64 array of the result's shape to write into.
-            verify: Whether Pinocchio checks this call; None leaves it to the robot.
+            verify: As in `Robot.placement`.
+            threads: As in `Robot.placement`.
 
         Raises:
             InputError: wrong length, a number that is not finite, a batch that does not broadcast.
@@ -163,6 +191,7 @@ class Manipulator:
             call.reference,
             base=call.state,
             out=call.flat(out, 6, robot.nv),
+            threads=threads,
         )
         call.verify(Quantity.JACOBIAN_RATE, result, verify)
         return call.one(result, out)

@@ -48,10 +48,10 @@ def frame_rows(subject: Subject, counts: Sequence[int], rounds: int) -> Iterator
 
 def _frame_works(subject: Subject, frames: Sequence[str]) -> list[Work]:
     robot, q, n = subject.robot, subject.q, subject.n
-    out = np.empty((len(frames), n, 4, 4))
+    out, every = np.empty((len(frames), n, 4, 4)), np.empty((n, len(frames), 4, 4))
 
     def together() -> FloatArray:
-        return robot.placements(q, frames, verify=False)
+        return robot.placements(q, frames, out=every, threads=1, verify=False)
 
     def apart() -> None:
         for k, frame in enumerate(frames):

@@ -141,6 +141,28 @@ def test_out_is_written_and_handed_back(shape: tuple[int, ...]) -> None:
         assert (out == call(None)).all()
 
 
+@pytest.mark.parametrize("shape", [(), (3,), (2, 17), (0,)])
+def test_out_is_written_for_several_frames_and_by_several_threads_too(shape: tuple[int, ...]) -> None:
+    robot = load("panda", verify="sample")
+    n = int(np.prod(shape))
+    q, v, a = (x.reshape(*shape, 8) for x in state(robot, n, 6))
+    frames = ["panda_hand", "panda_link3", "panda_rightfinger"]
+    calls: list[tuple[tuple[int, ...], Callable[..., FloatArray]]] = [
+        ((4, 4), lambda **how: robot.placements(q, frames, **how)),
+        ((6,), lambda **how: robot.velocities(q, v, frames, "local", **how)),
+        ((6, 8), lambda **how: robot.jacobians(q, frames, **how)),
+        ((6,), lambda **how: robot.accelerations(q, v, a, frames, "world", **how)),
+    ]
+    for own, call in calls:
+        out = np.full((*shape, 3, *own), np.nan)
+        assert call(out=out, threads=2) is out
+        assert (out == call()).all()
+        with pytest.raises(InputError, match="out must be a writable"):
+            call(out=np.zeros((*shape, 2, *own)))
+    rates = robot.jacobian_rate(q, v, frames[0], threads=2)
+    assert (rates == robot.jacobian_rate(q, v, frames[0])).all()
+
+
 def test_an_out_that_cannot_be_used_is_refused_and_left_alone() -> None:
     robot = load("panda")
     q = robot.sample(3, 7)
