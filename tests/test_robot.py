@@ -12,14 +12,16 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as command
 from tests.robots.odd_urdfs import urdf_of
+from urdfkin import call
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.oracle import Oracle
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.rotation import exp_rotation
-from urdfkin.verification import bounds
+from urdfkin.verification import bounds, choosing
 from urdfkin.verification.bounds import Quantity
+from urdfkin.verification.certificate import Comparison
 
 
 @pytest.fixture
@@ -178,6 +180,23 @@ def test_a_result_that_is_no_number_is_a_disagreement(monkeypatch: pytest.Monkey
         panda.jacobian(panda.neutral(), "panda_hand")
 
 
+def test_a_disagreement_whose_share_is_no_number_is_raised_too(
+    monkeypatch: pytest.MonkeyPatch, panda: Robot
+) -> None:
+    # An infinite disagreement with an infinite bound: of the two parts of a check, either may be such a one.
+    wrong = Comparison(1, np.inf, np.nan, (0, 0))
+    for results in (
+        [wrong],
+        [wrong, Comparison(1, 1.0, 0.5, (0, 0))],
+        [Comparison(1, 1.0, 0.5, (0, 0)), wrong],
+    ):
+        found = iter(results)
+        monkeypatch.setattr(call, "compare", lambda *_, found=found: next(found))
+        monkeypatch.setattr(choosing, "_MOST", 1)
+        with pytest.raises(urdfkin.VerificationError):
+            panda.placement(panda.sample(len(results)), "panda_hand", verify=True)
+
+
 INPUTS = {
     "text": "abc",
     "complex numbers": np.ones(8) * 1j,
@@ -291,14 +310,14 @@ def test_a_base_is_read_only_and_comes_back_from_a_pickle() -> None:
 
 def test_errors_come_back_from_a_pickle_as_they_were() -> None:
     errors = []
-    for call in (
+    for attempt in (
         lambda: urdfkin.load("pnda"),
         lambda: urdfkin.load("/nowhere/x.urdf"),
         lambda: urdfkin.load("<robot/>"),
         lambda: urdfkin.load("ur5").placement(np.zeros(5), "tool0"),
     ):
         with pytest.raises(urdfkin.UrdfkinError) as caught:
-            call()
+            attempt()
         errors.append(caught.value)
     for error in errors:
         copy = pickle.loads(pickle.dumps(error))

@@ -140,7 +140,8 @@ class Call:
         total, worst = Comparison.of_nothing(), None
         for part in parts(wanted, self.n, results[:1].size):
             comparison, failure = self._compare(quantity, results[part], part)
-            worst = failure if comparison.share > total.share else worst
+            if failure is not None and (worst is None or comparison.share > total.share):
+                worst = failure
             total += comparison
         if worst is not None:
             raise worst
