@@ -1,0 +1,1 @@
+"""What attacks on urdfkin found, each as a claim that failed once: files, names, numbers, signals, strangers."""
