@@ -1,0 +1,38 @@
+"""Found on PYTHONPATH by every process of a mutant's test: one module of the package is read with its slip.
+
+`URDFKIN_MUTANT` is the module's name and the slip's number, `urdfkin.validation.tally:17`.
+"""
+
+import importlib.abc
+import importlib.machinery
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import CodeType, ModuleType
+
+MODULE, _, NUMBER = os.environ.get("URDFKIN_MUTANT", "").partition(":")
+
+
+class _Loader(importlib.machinery.SourceFileLoader):
+    def get_code(self, fullname: str) -> CodeType:
+        from scripts.mutating.operators import mutated  # noqa: PLC0415  only the process that needs it
+
+        tree = mutated(Path(self.path).read_text(encoding="utf-8"), int(NUMBER))
+        return compile(tree, str(self.path), "exec")
+
+
+class _Finder(importlib.abc.MetaPathFinder):
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        if fullname != MODULE:
+            return None
+        spec = importlib.machinery.PathFinder.find_spec(fullname, path)
+        if spec is not None and spec.origin is not None:
+            spec.loader = _Loader(fullname, spec.origin)
+        return spec
+
+
+if MODULE:
+    sys.meta_path.insert(0, _Finder())

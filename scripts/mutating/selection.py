@@ -1,0 +1,47 @@
+"""Which files can be mutated, and which tests are the first to ask about each."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
+
+#: Compiled by Numba from their files, which a slip made while they are read does not reach: their terms are
+#: changed by tests/laws/test_mutation.py, run without the compiler.
+_COMPILED = {
+    "lanes", "transposing", "steps", "walk", "columns", "motion_kernel", "local_kernel", "jacobian_kernel",
+    "jacobian_rate_kernel", "worst", "scratch",
+}  # fmt: skip
+
+
+def files(parts: list[str]) -> list[Path]:
+    """The package's files, or those whose path below the package begins with one of the words."""
+    found = sorted(path for path in PACKAGE.rglob("*.py") if path.stem not in _COMPILED)
+    return [path for path in found if not parts or _below(path).startswith(tuple(parts))]
+
+
+def module_of(path: Path) -> str:
+    """`urdfkin.dh.read` for its file."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def _below(path: Path) -> str:
+    return str(path.relative_to(PACKAGE))
+
+
+def near_tests(path: Path) -> list[str]:
+    """Test files that name the module, and those of its part: who is near it asks first."""
+    named = re.compile(rf"\b{re.escape(module_of(path))}\b(?!\.)|\b{re.escape(path.stem)}\b")
+    part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    near = {test for test, text in _texts().items() if named.search(text)}
+    own = {test for test in _texts() if test.relative_to(TESTS).parts[0] in (part, f"test_{part}.py")}
+    order = sorted(near | own, key=lambda test: (path.stem not in test.stem, test not in near, str(test)))
+    return [str(test.relative_to(ROOT)) for test in order]
+
+
+@cache
+def _texts() -> dict[Path, str]:
+    return {path: path.read_text(encoding="utf-8") for path in TESTS.rglob("test_*.py")}

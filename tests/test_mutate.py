@@ -1,0 +1,89 @@
+"""The script that makes slips makes each of them, the same ones each time, where the program really runs."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from scripts.mutate import Mutant, judge, mutants
+from scripts.mutating.operators import mutated, slips
+from scripts.mutating.selection import ROOT, files, near_tests
+
+SOURCE = '''
+"""A text is left alone: 1 < 2."""
+def f(x: "1 < 2", limit=3):
+    if x < limit and not x:
+        raise ValueError("x < 3")
+    for y in range(-2):
+        if done(x):
+            continue
+        log(y)
+    return min(x, 1.5) if ready else True
+'''
+
+WHAT = {
+    "x < limit  ->  x <= limit",
+    "x < limit and (not x)  ->  x < limit or not x",
+    "not x  ->  not not x",
+    "3  ->  4",
+    "raise ValueError('x < 3')  ->  pass",
+    "-2  ->  +2",
+    "2  ->  3",
+    "if done(x)  ->  if not done(x)",
+    "continue  ->  break",
+    "log(y)  ->  None",
+    "min  ->  max",
+    "1.5  ->  2.25",
+    "True  ->  False",
+    "min(x, 1.5) if ready else True  ->  min(x, 1.5) if not ready else True",
+}
+
+
+def test_every_kind_of_slip_is_made_once_and_nothing_that_does_not_run_is_touched() -> None:
+    found = [slip.what for slip in slips(ast.parse(SOURCE))]
+    assert sorted(found) == sorted(WHAT)
+
+
+def test_a_slip_changes_one_place_and_each_changes_another() -> None:
+    original = ast.unparse(ast.parse(SOURCE))
+    changed = {ast.unparse(mutated(SOURCE, number)) for number in range(len(WHAT))}
+    assert len(changed) == len(WHAT)
+    for text in changed:
+        pairs = zip(original.splitlines(), text.splitlines(), strict=True)
+        assert sum(old != new for old, new in pairs) == 1, text
+
+
+def test_every_slip_of_the_package_compiles_and_has_a_test_to_ask() -> None:
+    for path in files([]):
+        source = path.read_text(encoding="utf-8")
+        for number in range(0, len(slips(ast.parse(source))), 7):
+            compile(mutated(source, number), str(path), "exec")
+        if path.stem not in ("__init__", "__main__"):
+            assert near_tests(path), path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("what", "word"), [("self.share <= 1.0  ->  self.share < 1.0", "survived"), ("1.0  ->  1.5", "noticed")]
+)
+def test_what_no_test_looks_at_survives_and_what_one_does_is_noticed(
+    what: str, word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (mutant,) = [
+        m for m in mutants(["verification/certificate"]) if m.what == what and "agrees" in _method(m)
+    ]
+    test = tmp_path / "test_one.py"
+    test.write_text(
+        "from urdfkin.verification.certificate import Comparison\n"
+        "def test_a_share_above_one_disagrees():\n    assert not Comparison(1, 9.0, 1.4, ()).agrees\n",
+        encoding="utf-8",
+    )
+    monkeypatch.setattr("scripts.mutate.near_tests", lambda path: [str(test)])
+    assert judge(mutant, whole=False, timeout=100.0).word == word
+
+
+def _method(mutant: Mutant) -> str:
+    """The name of the function that a mutant stands in."""
+    tree = ast.parse((ROOT / mutant.file).read_text(encoding="utf-8"))
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    return next((f.name for f in functions if f.lineno <= mutant.line <= (f.end_lineno or 0)), "")
