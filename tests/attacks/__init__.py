@@ -1,1 +1,1 @@
-"""What attacks on urdfkin found, each as a claim that failed once: files, names, numbers, signals, strangers."""
+"""What attacks on urdfkin found, each as a claim that failed once: files, names, numbers, signals, people."""
