@@ -140,6 +140,7 @@ class Plan:
         lengths: (steps + frames,) metres: the sum of the lengths of all URDF offsets, fixed joints' too,
             from a step's parent to it, then from a frame's step to the frame (in the order of `frames`).
         depth: (frames,) in output order, how many URDF joints lie between a frame and the root.
+        tilts: (frames,) likewise, rad: their `Joint.tilt` added up.
     """
 
     nq: int
@@ -159,6 +160,7 @@ class Plan:
     parents: IntArray
     lengths: FloatArray
     depth: IntArray
+    tilts: FloatArray
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -237,6 +239,7 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
             + [end.length for end in ends]
         ),
         depth=np.array([len(path) for path in paths], dtype=np.int64),
+        tilts=np.array([math.fsum(tree.joints[i].tilt for i in path) for path in paths]),
     )
 
 
