@@ -80,6 +80,8 @@ class Quantity(StrEnum):
     JACOBIAN = "jacobian"
     JACOBIAN_RATE = "jacobian rate"
     ACCELERATION = "acceleration"
+    ANALYTICAL_JACOBIAN = "analytical jacobian"
+    ACCELERATION_BREAKDOWN = "acceleration breakdown"
     JOINT_JACOBIAN = "joint jacobian"
     JOINT_JACOBIAN_RATE = "joint jacobian rate"
     SCREWS = "screws"
@@ -92,6 +94,8 @@ _FACTORS = {
     Quantity.JACOBIAN: 2,
     Quantity.JACOBIAN_RATE: 3,
     Quantity.ACCELERATION: 3,
+    Quantity.ANALYTICAL_JACOBIAN: 2,
+    Quantity.ACCELERATION_BREAKDOWN: 3,
     Quantity.JOINT_JACOBIAN: 2,
     Quantity.JOINT_JACOBIAN_RATE: 3,
     Quantity.SCREWS: 2,
@@ -146,7 +150,14 @@ def velocity_bound(size: Magnitudes, reference: Reference) -> Bound:
 
 @_BEYOND
 def acceleration_bound(size: Magnitudes, reference: Reference) -> Bound:
-    """For (n, frames, 6). Pinocchio goes through spatial accelerations, which differ by w x vel."""
+    """For (n, frames, 6). Pinocchio goes through spatial accelerations, which differ by w x vel.
+
+    It is that of a breakdown's sum too. There the terms are gathered by joints: v_k z x (v_k z x d_k) and
+    2 w_{k-1} x (v_k z x d_k) with d_k from the joint to the frame have the lengths (w_k^2 - w_{k-1}^2) d_k, w
+    being the sum of the rates so far, and added over the joints they are w^2 times each link's own length, as
+    in 7.130. The d_k, differences of places seen from the frame, round as the sums of 7.77 do, and adding up
+    the 4 n parts rounds n + 3 times: both are less than the 2 eps that each joint has for sums.
+    """
     shared = product(size.w, size.vel)
     linear = size.acc + shared
     if reference is Reference.WORLD:
@@ -194,6 +205,48 @@ def jacobian_rate_bound(plan: Plan, size: Magnitudes, reference: Reference) -> B
     linear = product(turning, lever[..., None]) + again * product(sliding, size.w[..., None])
     scale = _six_rows(linear, angular)
     return Bound(scale, roundings(Quantity.JACOBIAN_RATE, reference, size)[..., None, None])
+
+
+@_BEYOND
+def euler_jacobian_bound(plan: Plan, size: Magnitudes, apart: FloatArray) -> Bound:
+    """For (n, frames, 6, nv): the positions' rows are those of the Jacobian; it grows near the singularity.
+
+    The rates of the outer angles are r . w, that of the middle one u . w, with the reciprocal basis of
+    the axes e_i, u and t = R e_k (`line_of_nodes`): |u| = 1, |r| = 1 / s, where s = |e_i x t| is the sine or
+    cosine of the middle angle. When t is off by no more than delta = k eps, u turns by delta / s, and r,
+    as -(r . du) u - (r . dt) r' shows, changes by 2 delta / s^2, with the least s there is: `apart` - delta.
+    With w off by delta of its size, the sums are 2 delta / s^2 + delta / s, at most 3 delta / s^2, and
+    delta / s + delta, at most 2 delta / s. In scales for the two factors of the Jacobian that is 1.5 / s^2
+    and 1 / s. What the angles' own arithmetic rounds (some 3 eps for arctan2 and its sine, 10 eps for
+    products and quotients, on either side) is held by the joint counted more: there is no offset to add here.
+
+    Args:
+        plan: The walk.
+        size: Of the frames.
+        apart: (n, frames) s of Pinocchio's rotation.
+    """
+    s = apart - EPS * _of_a_factor(size)
+    s = np.where(s > 0.0, s, 0.0)  # where rounding hides the singularity nothing is accepted
+    bound = jacobian_bound(plan, size, Reference.LOCAL_WORLD_ALIGNED)
+    with np.errstate(divide="ignore"):
+        bound.scale[..., [3, 5], :] *= (1.5 / (s * s))[..., None, None]
+        bound.scale[..., 4, :] *= (1.0 / s)[..., None]
+    return bound
+
+
+def quaternion_jacobian_bound(plan: Plan, size: Magnitudes) -> Bound:
+    """For (n, frames, 7, nv): the positions' rows are those of the Jacobian; there is no singularity.
+
+    A row of 4 q q^T is linear in R, off by less than 4.6 delta and at least 2 long, so that q is off by
+    2.3 delta, half the product of w and q by (2.3 + 1) / 2 delta of w: less than the Jacobian's two factors.
+    """
+    bound = jacobian_bound(plan, size, Reference.LOCAL_WORLD_ALIGNED)
+    return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
+
+
+def nearest_singularity(plan: Plan) -> float:
+    """From where on (rad) rounding leaves Euler rates a digit: four times what R may be off by."""
+    return 4.0 * float((EPS * ROUNDINGS * (plan.depth + 1) + 2.0 * plan.tilts).max(initial=0.0))
 
 
 def column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
