@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.call import Call
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, RangeError
 from urdfkin.motion.representation import analytical_jacobian
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import BaseMotion
@@ -239,7 +239,10 @@ class Manipulator:
         if call.wanted(verify):
             nearest = max(nearest, nearest_singularity(call.plan))
         R = call.one(poses, None)[..., :3, :3]
-        J = analytical_jacobian(representation, R, call.one(J_v, None), nearest)
+        with np.errstate(over="ignore", invalid="ignore"):
+            J = analytical_jacobian(representation, R, call.one(J_v, None), nearest)
+        if not np.isfinite(J).all():
+            raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
         call.verify(Quantity.ANALYTICAL_JACOBIAN, J.reshape(call.n, 1, *J.shape[-2:]), verify)
         return J
 

@@ -24,6 +24,11 @@ from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree
 IntArray = NDArray[np.int64]
 
 
+#: Where coordinates, rates, lengths and multipliers are smaller than this, no result overflows: with N joints
+#: a rate is less than LARGE^2, the path N LARGE^2, and so w^2 d, the largest product, N^3 LARGE^6.
+LARGE = 1e45
+
+
 class Step(IntEnum):
     """Columns of `Plan.steps` (whole numbers)."""
 
@@ -174,6 +179,12 @@ class Plan:
     def areas(self) -> rows.Areas:
         """Where the rows of scratch begin that depend on the plan."""
         return rows.areas(self.nq, self.nv, self.slots, len(self.columns))
+
+    @cached_property
+    def is_large(self) -> bool:
+        """Whether results may overflow although coordinates and rates are ordinary."""
+        numbers = self.geometry, self.offsets, self.lengths
+        return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
     @cached_property
     def packed(self) -> IntArray:
