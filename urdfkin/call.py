@@ -203,7 +203,7 @@ class Call:
         return comparison, VerificationError(
             quantity,
             self.frames[f],
-            self.reference.name,
+            x.representation or self.reference.name,
             index=self._index(k),
             ours=ours[i, f],
             theirs=theirs[i, f],
@@ -218,13 +218,11 @@ class Call:
 
     def _replay(self, quantity: Quantity, k: int, frame: str) -> str:
         values = {name: array[k].tolist() for name, array in zip("qva", (self.q, *self.rates), strict=False)}
-        options = dict(self.options)
-        if quantity not in (Quantity.PLACEMENT, Quantity.ANALYTICAL_JACOBIAN):
-            options["reference"] = self.reference.name.lower()
+        without = quantity in (Quantity.PLACEMENT, Quantity.ANALYTICAL_JACOBIAN)
+        reference = None if without else self.reference.name.lower()
         if self.base is None and quantity in _COMMANDS:
-            reference = options.get("reference")
-            command = _COMMANDS[quantity]
-            return replay_line(self.robot.origin, command, frame, reference and str(reference), values)
+            return replay_line(self.robot.origin, _COMMANDS[quantity], frame, reference, values)
+        options = self.options if reference is None else {"reference": reference, **self.options}
         # The command line has no words for a moving base, and none for the rest.
         words = [*map(repr, values.values()), repr(frame), *(f"{x}={y!r}" for x, y in options.items())]
         if self.base is not None:

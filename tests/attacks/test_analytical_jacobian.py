@@ -19,6 +19,7 @@ from urdfkin.motion import representation as module
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.robot import Robot
 from urdfkin.rotation.euler import SEQUENCES, rotation_from_euler
+from urdfkin.rotation.quaternion import quaternion_of
 from urdfkin.tree import FloatArray
 from urdfkin.verification.bounds import EPS, Quantity
 from urdfkin.verification.line_of_nodes import euler_jacobian, quaternion_jacobian
@@ -110,11 +111,11 @@ def test_near_the_singularity_it_is_verified_and_the_bound_grows(free: Robot, na
     for distance in (1e-1, 1e-3, 1e-5, 1e-7, 1e-8, 2e-9):
         angles = rng.uniform(-3.0, 3.0, (20, 3))
         angles[:, 1] = turn + distance if turn == 0.0 else turn - distance
-        q = np.hstack((rng.normal(size=(20, 3)), module.quaternion_of(rotation_from_euler(name, angles))))
+        q = np.hstack((rng.normal(size=(20, 3)), quaternion_of(rotation_from_euler(name, angles))))
         free.analytical_jacobian(q, "body", name)
     for distance in (1e-11, 1e-12, 1e-13):
         angles[:, 1] = turn + distance if turn == 0.0 else turn - distance
-        q[:, 3:] = module.quaternion_of(rotation_from_euler(name, angles))
+        q[:, 3:] = quaternion_of(rotation_from_euler(name, angles))
         with pytest.raises(RepresentationSingularityError):
             free.analytical_jacobian(q, "body", name)
         try:
@@ -134,7 +135,7 @@ def test_a_slip_far_above_rounding_is_caught_near_the_singularity_too(
     right = module.representation_inverse
     for distance in (1e-1, 1e-2, 1e-3):
         middle = distance if name == "ZYZ" else np.pi / 2 - distance
-        quat = module.quaternion_of(rotation_from_euler(name, [0.4, middle, 0.9]))
+        quat = quaternion_of(rotation_from_euler(name, [0.4, middle, 0.9]))
         slip = 200.0 * 24.0 * EPS / distance
         monkeypatch.setattr(module, "representation_inverse", lambda *x, s=slip: right(*x) * (1.0 + s))
         with pytest.raises(urdfkin.VerificationError):

@@ -104,7 +104,7 @@ def test_results_that_exist_are_handed_out_however_large(ur5: Robot, method: str
     if isinstance(slow, np.ndarray):
         np.testing.assert_array_equal(slow * factor * factor, fast)
         single = ur5.prepare(FRAME).acceleration(q[0], v[0] * factor, v[0] * factor * factor)
-        if method == "acceleration":
+        if method == "acceleration" and isinstance(fast, np.ndarray):
             np.testing.assert_array_equal(single, fast[0])
     METHODS[method](ur5, q, v * factor, v * factor * factor)
 

@@ -94,7 +94,9 @@ def tilts(robot: RobotRecord) -> dict[str, float]:
 
 def _snapped(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """The coordinate axis that Pinocchio takes for another one, and how far off it is; mostly None."""
-    for i in range(3) if axis is not None else ():
+    if axis is None:
+        return None
+    for i in range(3):
         unit = tuple(float(i == k) for k in range(3))
         tilt = math.hypot(*(x for k, x in enumerate(axis) if k != i))
         if tilt > _TILT and _is_approx(axis, unit):
