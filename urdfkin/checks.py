@@ -66,7 +66,7 @@ def _analytical(oracle: Oracle, x: Part, ours: FloatArray) -> tuple[FloatArray, 
     if x.representation == "quaternion":
         quat = oracle.quaternions(x.q, x.frames, x.base)
         bound = bounds.quaternion_jacobian_bound(x.plan, size)
-        theirs, hidden = quaternion_jacobian(quat, J_v), EPS * result_k(bound, quat.shape[:-1])
+        theirs, hidden = quaternion_jacobian(quat, J_v), 1.5 * EPS * result_k(bound, quat.shape[:-1])
         # Of q and -q the one with qw >= 0 counts; where rounding hides the sign of qw, either does.
         with_other = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
         turned = with_other & (np.abs(quat[..., 3]) <= hidden)
