@@ -72,20 +72,36 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
+    if snapped := _snapped(axis):
+        unit, tilt = snapped
+        written = " ".join(f"{x:g}" for x in unit)
+        report.add(
+            codes.NEARLY_COORDINATE_AXIS,
+            f"the axis is {tilt:.2g} rad off {written}, and Pinocchio takes {written}",
+            element,
+            attribute="xyz",
+            found=_written(joint),
+            remedy=f'write xyz="{written}"; if the tilt is meant, write the vector twice as long',
+            weight=tilt,
+        )
+
+
+def tilts(robot: RobotRecord) -> dict[str, float]:
+    """By how much (rad) Pinocchio's axis is off the file's, for the joints where that is a finding."""
+    snapped = ((joint.name, _snapped(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
+    return {name: taken[1] for name, taken in snapped if taken is not None}
+
+
+def _snapped(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
+    """The coordinate axis that Pinocchio takes for another one, and how far off it is; mostly None."""
+    if axis is None:
+        return None
     for i in range(3):
         unit = tuple(float(i == k) for k in range(3))
         tilt = math.hypot(*(x for k, x in enumerate(axis) if k != i))
         if tilt > _TILT and _is_approx(axis, unit):
-            written = " ".join(f"{x:g}" for x in unit)
-            report.add(
-                codes.NEARLY_COORDINATE_AXIS,
-                f"the axis is {tilt:.2g} rad off {written}, and Pinocchio takes {written}",
-                element,
-                attribute="xyz",
-                found=_written(joint),
-                remedy=f'write xyz="{written}"; if the tilt is meant, write the vector twice as long',
-                weight=tilt,
-            )
+            return unit, tilt
+    return None
 
 
 def _is_approx(axis: Sequence[float], unit: Sequence[float]) -> bool:

@@ -9,8 +9,21 @@ import xml.etree.ElementTree as Xml
 from dataclasses import dataclass
 
 from urdfkin.errors import InputError
-from urdfkin.judge.vectors import IDENTITY, ZERO, Matrix, Number, Vector, from_rpy, mp, unit
+from urdfkin.judge.vectors import (
+    IDENTITY,
+    ZERO,
+    Matrix,
+    Number,
+    Vector,
+    from_quaternion,
+    from_rpy,
+    mp,
+    unit,
+)
 from urdfkin.tree import JointKind, KinematicTree
+
+#: The version of URDF from which on `quat_xyzw` counts; in older files it is ignored.
+_WITH_QUATERNIONS = (1, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +55,9 @@ def read_exact(text: str, tree: KinematicTree) -> tuple[ExactJoint, ...]:
     Raises:
         InputError: the text and the tree are not of the same robot.
     """
-    elements = {str(element.get("name")): element for element in Xml.fromstring(text).findall("joint")}
+    root = Xml.fromstring(text)
+    elements = {str(element.get("name")): element for element in root.findall("joint")}
+    quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _WITH_QUATERNIONS
     joints = []
     for joint in tree.joints:
         element = elements.get(joint.name)
@@ -55,7 +70,7 @@ def read_exact(text: str, tree: KinematicTree) -> tuple[ExactJoint, ...]:
         axis = _vector(element.find("axis"), "xyz", "1 0 0")
         joints.append(
             ExactJoint(
-                R=_rotation(element.find("origin")),
+                R=_rotation(element.find("origin"), quaternions),
                 p=_vector(element.find("origin"), "xyz", "0 0 0"),
                 axis=unit(axis) if joint.kind.has_axis else axis,
                 multiplier=multiplier,
@@ -75,7 +90,10 @@ def _vector(element: Xml.Element | None, name: str, default: str) -> Vector:
     return x, y, z
 
 
-def _rotation(origin: Xml.Element | None) -> Matrix:
+def _rotation(origin: Xml.Element | None, quaternions: bool) -> Matrix:
+    """From roll, pitch and yaw, or the quaternion, of any length, that URDF 1.1 has in their place."""
+    if quaternions and origin is not None and "quat_xyzw" in origin.attrib:
+        return from_quaternion(*_numbers(origin, "quat_xyzw", ""))
     return from_rpy(_vector(origin, "rpy", "0 0 0"))
 
 

@@ -106,13 +106,14 @@ def _limit(limit: Any, kind: JointKind) -> Limit | None:
 
 
 def _resolve(joint: yourdf.Joint, joints: dict[str, yourdf.Joint]) -> Mimic:
-    """Follow a chain of mimic joints to the one that moves: multipliers multiply, offsets add up."""
-    multiplier, offset = 1.0, 0.0
-    follower, met = joint, {joint.name}
+    """Follow a chain of mimic joints to the one that moves: multipliers multiply, offsets add up.
+
+    From the leader's end, as the oracle does it for itself: the two then have the same doubles.
+    """
+    rules, follower, met = [], joint, {joint.name}
     while follower.mimic is not None and JointKind(follower.type) is not JointKind.FIXED:
         rule = follower.mimic
-        offset += multiplier * rule.offset
-        multiplier *= rule.multiplier
+        rules.append(rule)
         if rule.joint not in joints:
             raise UnknownNameError(
                 "mimic leader",
@@ -124,4 +125,7 @@ def _resolve(joint: yourdf.Joint, joints: dict[str, yourdf.Joint]) -> Mimic:
             raise InputError("mimic joints follow each other in a circle", where=f"joint {joint.name}")
         met.add(rule.joint)
         follower = joints[rule.joint]
+    multiplier, offset = 1.0, 0.0
+    for rule in reversed(rules):
+        multiplier, offset = rule.multiplier * multiplier, rule.multiplier * offset + rule.offset
     return Mimic(follower.name, multiplier, offset)

@@ -11,11 +11,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from urdfkin.diagnostics import joints
 from urdfkin.diagnostics.dialect import check_dialect
-from urdfkin.diagnostics.document import DEFAULT_LIMITS, Limits, parse
+from urdfkin.diagnostics.document import DEFAULT_LIMITS, Element, Limits, parse
 from urdfkin.diagnostics.encoding import utf8_bytes
 from urdfkin.diagnostics.finding import UrdfError
-from urdfkin.diagnostics.records import JointRecord, LimitRecord, read_robot
+from urdfkin.diagnostics.records import JointRecord, LimitRecord, RobotRecord, read_robot
 from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.rotation.arrays import FloatArray
 from urdfkin.rotation.euler import rpy_of
@@ -33,6 +34,25 @@ def skeleton(data: bytes, limits: Limits = DEFAULT_LIMITS) -> bytes:
     Raises:
         UrdfError: the file has errors that keep it from being read at all.
     """
+    root, robot = _records(data, limits)
+    lines = [f'<robot name="{attribute(root.attributes.get("name", ""))}">']
+    lines += [f'<link name="{attribute(link)}"/>' for link in robot.links]
+    for joint in robot.joints:
+        lines += _joint(joint)
+    lines.append("</robot>")
+    return "\n".join(lines).encode()
+
+
+def tilts(data: bytes) -> dict[str, float]:
+    """How far off (rad) the axes are that Pinocchio takes for x, y or z, by joint: see URDF514.
+
+    Args:
+        data: As for `skeleton`.
+    """
+    return joints.tilts(_records(data, DEFAULT_LIMITS)[1])
+
+
+def _records(data: bytes, limits: Limits) -> tuple[Element, RobotRecord]:
     report = Reporter("<text>", data)
     text = utf8_bytes(report, data)
     report.data = text or b""
@@ -40,13 +60,7 @@ def skeleton(data: bytes, limits: Limits = DEFAULT_LIMITS) -> bytes:
     version = None if root is None else check_dialect(report, root)
     if root is None or version is None:
         raise UrdfError(report.findings())
-    robot = read_robot(report, root, version)
-    lines = [f'<robot name="{attribute(root.attributes.get("name", ""))}">']
-    lines += [f'<link name="{attribute(link)}"/>' for link in robot.links]
-    for joint in robot.joints:
-        lines += _joint(joint)
-    lines.append("</robot>")
-    return "\n".join(lines).encode()
+    return root, read_robot(report, root, version)
 
 
 def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:
