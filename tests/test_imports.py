@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).parent.parent / "urdfkin"
 #: stands in its own row or above it. Imports inside functions count; those for types alone do not.
 LAYERS = (
     ("errors",),
-    ("rotation", "motion", "equations", "resources", "keeping", "figure"),
+    ("rotation", "motion", "equations", "resources", "keeping", "figure", "plain_xml"),
     ("tree", "reference"),
     ("coupling", "followers", "configuration", "chain"),
     ("recursion",),

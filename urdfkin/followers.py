@@ -1,15 +1,15 @@
 """Mimic rules as the URDF's text states them, for the oracle: read apart from urdfkin's own reader.
 
 Pinocchio couples nothing here (see `urdfkin.oracle`), so that a rule which the reader got wrong would be
-wrong on both sides, and agree. The standard library's parser reads it a second time.
+wrong on both sides, and agree. `urdfkin.plain_xml` reads it a second time.
 """
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as Xml
 from dataclasses import replace
 
 from urdfkin.errors import InputError
+from urdfkin.plain_xml import plain_xml
 from urdfkin.tree import KinematicTree, Mimic
 
 
@@ -29,7 +29,7 @@ def with_rules_of_text(tree: KinematicTree, text: str) -> KinematicTree:
         joint.get("name", ""): Mimic(
             rule.get("joint", ""), float(rule.get("multiplier", "1")), float(rule.get("offset", "0"))
         )
-        for joint in Xml.fromstring(text).iterfind("joint")
+        for joint in plain_xml(text).iterfind("joint")
         if (rule := joint.find("mimic")) is not None
     }
     missing = [joint.name for joint in tree.joints if joint.mimic and joint.name not in rules]

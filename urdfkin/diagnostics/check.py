@@ -11,6 +11,7 @@ from urdfkin.diagnostics.finding import Finding
 from urdfkin.diagnostics.joints import check_joints
 from urdfkin.diagnostics.mimic import check_mimic
 from urdfkin.diagnostics.names import check_names
+from urdfkin.diagnostics.prefixes import check_prefixes
 from urdfkin.diagnostics.records import RobotRecord, read_robot
 from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.diagnostics.structure import check_structure
@@ -77,6 +78,7 @@ def check_robot(
     version = check_dialect(report, root)
     if version is None:
         return None
+    check_prefixes(report, root)
     check_vocabulary(report, root)
     robot = read_robot(report, root, version)
     check_names(report, robot, root_joint)

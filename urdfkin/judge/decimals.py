@@ -5,11 +5,12 @@ Names and order come from the tree that was read; the text was checked before (`
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as Xml
 from dataclasses import dataclass
+from xml.etree.ElementTree import Element
 
 from urdfkin.errors import InputError
 from urdfkin.judge.vectors import IDENTITY, ZERO, Matrix, Number, Vector, from_rpy, mp, unit
+from urdfkin.plain_xml import plain_xml
 from urdfkin.tree import JointKind, KinematicTree
 
 
@@ -42,7 +43,7 @@ def read_exact(text: str, tree: KinematicTree) -> tuple[ExactJoint, ...]:
     Raises:
         InputError: the text and the tree are not of the same robot.
     """
-    elements = {str(element.get("name")): element for element in Xml.fromstring(text).findall("joint")}
+    elements = {str(element.get("name")): element for element in plain_xml(text).findall("joint")}
     joints = []
     for joint in tree.joints:
         element = elements.get(joint.name)
@@ -65,21 +66,21 @@ def read_exact(text: str, tree: KinematicTree) -> tuple[ExactJoint, ...]:
     return tuple(joints)
 
 
-def _numbers(element: Xml.Element | None, name: str, default: str) -> tuple[Number, ...]:
+def _numbers(element: Element | None, name: str, default: str) -> tuple[Number, ...]:
     written = default if element is None else element.get(name, default)
     return tuple(mp.mpf(word) for word in written.split())
 
 
-def _vector(element: Xml.Element | None, name: str, default: str) -> Vector:
+def _vector(element: Element | None, name: str, default: str) -> Vector:
     x, y, z = _numbers(element, name, default)
     return x, y, z
 
 
-def _rotation(origin: Xml.Element | None) -> Matrix:
+def _rotation(origin: Element | None) -> Matrix:
     return from_rpy(_vector(origin, "rpy", "0 0 0"))
 
 
-def _rule(elements: dict[str, Xml.Element], name: str) -> tuple[Number, Number]:
+def _rule(elements: dict[str, Element], name: str) -> tuple[Number, Number]:
     """Multiplier and offset of a follower, chains followed to the joint that moves."""
     multiplier, offset = mp.mpf(1), mp.mpf(0)
     while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":

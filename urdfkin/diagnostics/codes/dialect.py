@@ -165,3 +165,16 @@ NAMESPACE = Code(
     good='<robot name="r">\n  <link name="base"/>\n</robot>\n',
     others="Pinocchio reads it; yourdfpy reads it: a robot without links.",
 )
+
+UNDECLARED_PREFIX = Code(
+    "URDF214",
+    "undeclared-prefix",
+    WARNING,
+    "a prefix that no xmlns declares",
+    why="urdfdom takes <drake:x> for a name like any other. Readers that know namespaces, which most XML"
+    " libraries are, refuse the whole file or repair it by guessing.",
+    bad='<robot name="r">\n  <link name="base"/>\n  <drake:joint name="j"/>\n</robot>\n',
+    good='<robot name="r" xmlns:drake="http://drake.mit.edu">\n  <link name="base"/>\n'
+    '  <drake:joint name="j"/>\n</robot>\n',
+    others="Pinocchio reads it; yourdfpy reads it: a second parser recovers what it can.",
+)
