@@ -21,7 +21,8 @@ XACRO = Code(
     "the file holds xacro macros or expressions that were not expanded",
     why="Readers skip elements they do not know, so what a macro would have produced is missing from the"
     " robot in silence. Expand the file first (`xacro robot.urdf.xacro > robot.urdf`), or install the extra"
-    " `urdfkin[xacro]` and pass the .xacro file itself.",
+    " `urdfkin[xacro]` and pass the .xacro file itself. Where kinematics does not look (the file name of a"
+    " mesh, the name of the robot, what stands inside a <link>), the finding is a warning.",
     bad='<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">\n  <link name="base"/>\n'
     '  <xacro:leg prefix="left"/>\n</robot>\n',
     good='<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">\n  <link name="base"/>\n</robot>\n',

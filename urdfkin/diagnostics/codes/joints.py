@@ -71,8 +71,8 @@ EMPTY_AXIS = Code(
     "axis-without-xyz",
     ERROR,
     "an <axis> without xyz",
-    why="Two readers see two robots: the specification's default is 1 0 0, and urdfdom takes a zero vector, so"
-    " that Pinocchio's matrices are no rotations. Without any <axis>, both take 1 0 0. For a planar joint,"
+    why="Two readers see two robots: the specification's default is 1 0 0, and urdfdom takes a zero vector,"
+    " so that Pinocchio's matrices are no rotations. Without any <axis>, both take 1 0 0. For a planar joint,"
     " whose axis changes nothing, the finding is a warning.",
     bad=_joint("revolute", "  <axis/>\n"),
     good=_joint("revolute", '  <axis xyz="1 0 0"/>\n'),
