@@ -12,9 +12,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from urdfkin.diagnostics.dialect import check_dialect
-from urdfkin.diagnostics.document import DEFAULT_LIMITS, Limits, parse
+from urdfkin.diagnostics.document import parse
 from urdfkin.diagnostics.encoding import utf8_bytes
 from urdfkin.diagnostics.finding import UrdfError
+from urdfkin.diagnostics.limits import DEFAULT_LIMITS, Limits
 from urdfkin.diagnostics.records import JointRecord, LimitRecord, read_robot
 from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.rotation.arrays import FloatArray
@@ -33,10 +34,10 @@ def skeleton(data: bytes, limits: Limits = DEFAULT_LIMITS) -> bytes:
     Raises:
         UrdfError: the file has errors that keep it from being read at all.
     """
-    report = Reporter("<text>", data)
+    report = Reporter("<text>", data, limits)
     text = utf8_bytes(report, data)
     report.data = text or b""
-    root = None if text is None else parse(report, text, limits)
+    root = None if text is None else parse(report, text)
     version = None if root is None else check_dialect(report, root)
     if root is None or version is None:
         raise UrdfError(report.findings())
