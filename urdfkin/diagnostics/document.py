@@ -15,14 +15,12 @@ from xml.parsers import expat
 from urdfkin.diagnostics.codes import text as codes
 from urdfkin.diagnostics.codes.base import Code
 from urdfkin.diagnostics.escape import QUOTED, quoted, shortened
+from urdfkin.diagnostics.limits import ORACLE_DEPTH
 from urdfkin.diagnostics.reporter import Reporter
 
 #: libxml2 refused deeper nesting for many years, and with it everything built on it.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
-
-#: urdfdom's XML parser, and with it Pinocchio, refuses deeper nesting.
-ORACLE_DEPTH = 500
 
 
 @dataclass(slots=True, eq=False)
@@ -128,6 +126,7 @@ class _Builder:
         self.report, self.limits = report, report.limits
         self.root: Element | None = None
         self.open: list[Element] = []
+        self.begun = False
         self.count = self.deepest = 0
         self.deepest_element: Element | None = None
         self.parser = parser = expat.ParserCreate("utf-8")
@@ -136,6 +135,8 @@ class _Builder:
         parser.EndElementHandler = self.end
         parser.CharacterDataHandler = self.characters
         parser.StartDoctypeDeclHandler = self.doctype
+        parser.CommentHandler = self.comment
+        parser.ProcessingInstructionHandler = self.instruction
         parser.SkippedEntityHandler = self.skipped
 
     def here(self) -> tuple[int, int]:
@@ -147,7 +148,8 @@ class _Builder:
         parent = self.open[-1] if self.open else None
         element = Element(tag, attributes, parent, line, column, self.parser.CurrentByteIndex)
         if parent is None:
-            self.root = element
+            self.root, self.begun = element, True
+            self.parser.CommentHandler = None
         else:
             element.above = None if parent is self.root else parent.holder
             parent.append(element)
@@ -197,8 +199,23 @@ class _Builder:
         if len(element.text) < _KEPT and not text.isspace():
             element.text += (text if element.text else text.lstrip())[:_KEPT]
 
+    def comment(self, text: str) -> None:
+        self.begun = True
+
+    def instruction(self, target: str, text: str) -> None:
+        """Judge a processing instruction: urdfdom's parser allows them at the very beginning alone."""
+        if self.begun:
+            self.report.add(
+                codes.INSTRUCTION,
+                "a processing instruction stands after the beginning, where urdfdom refuses the file",
+                found=quoted(f"<?{target} {text}".strip() + "?>"),
+                remedy="remove it, or put it before everything but other instructions",
+                position=self.here(),
+            )
+
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
         """Judge a document type declaration before anything in it can act."""
+        self.begun = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
         if system is None and public is None and not has_subset:

@@ -8,6 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+#: urdfdom's XML parser, and with it Pinocchio, refuses deeper nesting: tinyxml2 counts to 500, with the
+#: document and the level that it refuses.
+ORACLE_DEPTH = 498
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -15,7 +19,7 @@ class Limits:
 
     Attributes:
         bytes: Size of the file.
-        depth: How deep elements may be nested; urdfdom's parser refuses more than 500.
+        depth: How deep elements may be nested; urdfdom's parser refuses more.
         elements: How many elements there may be.
         attributes: How many attributes one element may have.
         name: Characters of the name of an element, an attribute, a link or a joint.
@@ -23,7 +27,7 @@ class Limits:
     """
 
     bytes: int = 100_000_000
-    depth: int = 500
+    depth: int = ORACLE_DEPTH
     elements: int = 1_000_000
     attributes: int = 200
     name: int = 10_000

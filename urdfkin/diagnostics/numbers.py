@@ -135,9 +135,11 @@ class NumberReader:
             self._refused(element, attribute, "a tab or line end between or after the numbers")
 
     def _refused(self, element: Element, attribute: str, what: str) -> None:
+        needed = self.bad_number is codes.BAD_NUMBER
         self.report.add(
-            codes.WHITESPACE,
-            f"{attribute} has {what}, which urdfdom refuses",
+            # Where no robot depends on the number, urdfdom drops what it cannot read and reads the file.
+            codes.WHITESPACE if needed else self.bad_number,
+            f"{attribute} has {what}, which urdfdom {'refuses' if needed else 'does not read'}",
             element,
             attribute=attribute,
             found=quoted(self.report.raw(element, attribute) or element.attributes[attribute]),

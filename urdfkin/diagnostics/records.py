@@ -20,6 +20,9 @@ from urdfkin.diagnostics.vocabulary import JOINT_TYPES, nearest
 
 Vector = tuple[float, ...]
 
+#: Limits that count from version 1.2 on.
+FURTHER_LIMITS = ("acceleration", "deceleration", "jerk")
+
 #: Types whose motion has an axis.
 AXIAL = ("revolute", "continuous", "prismatic")
 
@@ -33,6 +36,9 @@ class LimitRecord:
     upper: float | None
     effort: float | None
     velocity: float | None
+    acceleration: float | None = None
+    deceleration: float | None = None
+    jerk: float | None = None
 
 
 @dataclass(slots=True)
@@ -272,7 +278,8 @@ class JointReader:
         required = ("effort", "velocity") if self.version < (1, 2) else ("lower", "upper") if bounded else ()
         for attribute in required:
             self.required(limit, attribute, _EXAMPLE_LIMIT, number=True)
-        values = {name: self.numbers.scalar(limit, name) for name in ("lower", "upper", "effort", "velocity")}
+        names = ("lower", "upper", "effort", "velocity", *(FURTHER_LIMITS if self.version >= (1, 2) else ()))
+        values = {name: self.numbers.scalar(limit, name) for name in names}
         joint.limit = LimitRecord(limit, **values)
 
     def _mimic(self, joint: JointRecord) -> None:

@@ -107,10 +107,10 @@ DEEP_NESTING = Code(
     WARNING,
     "elements are nested deeper than common readers accept",
     why="The robot can be computed, but programs built on an older libxml2 refuse more than 256 levels, and"
-    " urdfdom refuses more than 500.",
+    " urdfdom refuses more than 498.",
     bad='<robot name="example">\n  <link name="base"/>\n' + "<a>" * 300 + "</a>" * 300 + "\n</robot>\n",
     good=_ROBOT,
-    others="Pinocchio reads it: up to 500 levels; yourdfpy reads it.",
+    others="Pinocchio reads it: up to 498 levels; yourdfpy reads it.",
 )
 
 TOO_DEEP_FOR_ORACLE = Code(
@@ -179,11 +179,11 @@ TOO_DEEP = Code(
     "too-deep",
     ERROR,
     "elements are nested deeper than the limit allows",
-    why="The limit, 500 levels, is that of urdfdom's parser. A URDF needs seven; it can be raised:"
+    why="The limit, 498 levels, is that of urdfdom's parser. A URDF needs seven; it can be raised:"
     " --max-depth, or `Limits` in the library, and then nothing can be verified (URDF110).",
     bad='<robot name="example">\n  <link name="base"/>\n' + "<a>" * 500 + "</a>" * 500 + "\n</robot>\n",
     good=_ROBOT,
-    others="Pinocchio refuses it: 500 levels are the most its parser takes; yourdfpy reads it.",
+    others="Pinocchio refuses it: 498 levels are the most its parser takes; yourdfpy reads it.",
 )
 
 TOO_MANY_ATTRIBUTES = Code(
@@ -211,4 +211,18 @@ NAME_TOO_LONG = Code(
     bad=f'<robot name="example">\n  <link name="{"very_" * 2001}long"/>\n</robot>\n',
     good='<robot name="example">\n  <link name="long"/>\n</robot>\n',
     others="Pinocchio reads it; yourdfpy reads it.",
+)
+
+INSTRUCTION = Code(
+    "URDF118",
+    "processing-instruction",
+    WARNING,
+    "a processing instruction after the beginning of the file",
+    why="XML allows <?...?> anywhere. urdfdom's parser takes each for a declaration, which may only stand"
+    " before every element, comment and document type, and refuses the whole file. The robot is computed, but"
+    " Pinocchio cannot read it, so nothing can be verified.",
+    bad='<robot name="example">\n  <link name="base"/>\n  <?editor tab=2?>\n</robot>\n',
+    good="<?editor tab=2?>\n" + _ROBOT,
+    others="Pinocchio refuses it; yourdfpy reads it.",
+    oracle=REFUSES,
 )
