@@ -64,6 +64,11 @@ KINDS: dict[str, Kind] = {
     "one long name": lambda n: _robot(f'<link name="{"a" * n}"/>'),
     "one long tag": lambda n: _in_base(f"<{'a' * n}/>"),
     "one long attribute's name": lambda n: _in_base(f'<visual {"a" * n}="1"/>'),
+    "one long type": lambda n: _robot(f'<link name="l"/><joint name="j" type="{"a" * n}"/>'),
+    "one long version": lambda n: f'<robot name="r" version="{"1" * n}.0"><link name="l"/></robot>'.encode(),
+    "one long address": lambda n: _in_base(
+        f'<visual><geometry><mesh filename="package://{"a" * n}"/></geometry></visual>'
+    ),
     "names that say the same": lambda n: _robot(_filled(n, lambda i: '<link name="a"/>')),
     "names of combining marks": lambda n: _robot(
         _filled(n, lambda i: f'<link name="{i}' + "a" + "\u0301\u0323" * 100 + '"/>')

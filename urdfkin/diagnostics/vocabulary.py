@@ -258,9 +258,17 @@ def _check_repeats(report: Reporter, element: Element) -> None:
         seen.setdefault(child.tag, child)
 
 
-@lru_cache(1024)
 def nearest(word: str, known: frozenset[str]) -> str | None:
-    """The known word that `word` was probably meant to be."""
+    """The known word that `word` was probably meant to be; what is much longer than each was meant for none."""
+    return _nearest(word, known) if len(word) <= _LONGEST else None
+
+
+#: Longer words are like none of URDF's.
+_LONGEST = 32
+
+
+@lru_cache(1024)
+def _nearest(word: str, known: frozenset[str]) -> str | None:
     folded = {name.lower(): name for name in known}
     close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.8)
     if close:
