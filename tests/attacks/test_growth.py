@@ -3,6 +3,7 @@
 import re
 import signal
 import time
+import tracemalloc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -56,6 +57,22 @@ def grows_like_its_size(work: Callable[[int], object], size: int) -> None:
 def test_a_document_four_times_as_long_takes_about_four_times_the_time(kind: str) -> None:
     documents = {size: KINDS[kind](size) for size in (100_000, 400_000)}
     grows_like_its_size(lambda size: check_text(documents[size], fold=False), 100_000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_document_four_times_as_long_takes_about_four_times_the_memory(kind: str) -> None:
+    def megabytes(size: int) -> float:
+        document = KINDS[kind](size)
+        tracemalloc.start()
+        try:
+            check_text(document, fold=False)
+            return tracemalloc.get_traced_memory()[1] / 1e6
+        finally:
+            tracemalloc.stop()
+
+    with at_most(ENOUGH):
+        assert megabytes(100_000) < 6.0 * megabytes(25_000) + 1.0
 
 
 @pytest.mark.slow

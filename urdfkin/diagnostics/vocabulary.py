@@ -259,7 +259,7 @@ def _check_repeats(report: Reporter, element: Element) -> None:
 
 
 def nearest(word: str, known: frozenset[str]) -> str | None:
-    """The known word that `word` was probably meant to be; what is much longer than each was meant for none."""
+    """The known word that `word` was probably meant to be; none for what is much longer than each."""
     return _nearest(word, known) if len(word) <= _LONGEST else None
 
 
