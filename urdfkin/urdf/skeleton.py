@@ -13,9 +13,10 @@ import numpy as np
 
 from urdfkin.diagnostics import joints
 from urdfkin.diagnostics.dialect import check_dialect
-from urdfkin.diagnostics.document import DEFAULT_LIMITS, Element, Limits, parse
+from urdfkin.diagnostics.document import Element, parse
 from urdfkin.diagnostics.encoding import utf8_bytes
 from urdfkin.diagnostics.finding import UrdfError
+from urdfkin.diagnostics.limits import DEFAULT_LIMITS, Limits
 from urdfkin.diagnostics.records import JointRecord, LimitRecord, RobotRecord, read_robot
 from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.rotation.arrays import FloatArray
@@ -53,10 +54,10 @@ def tilts(data: bytes) -> dict[str, float]:
 
 
 def _records(data: bytes, limits: Limits) -> tuple[Element, RobotRecord]:
-    report = Reporter("<text>", data)
+    report = Reporter("<text>", data, limits)
     text = utf8_bytes(report, data)
     report.data = text or b""
-    root = None if text is None else parse(report, text, limits)
+    root = None if text is None else parse(report, text)
     version = None if root is None else check_dialect(report, root)
     if root is None or version is None:
         raise UrdfError(report.findings())
