@@ -81,7 +81,8 @@ class Robot(Manipulator, Tables):
 
     def __getstate__(self) -> dict[str, Any]:
         # Pinocchio's models are rebuilt where they are needed; compiled plans are cheap to rebuild too.
-        return {**self.__dict__, "_plans": {}, "_oracles": {}, "_prepared": {}}
+        # A copy, in this process or another, has handed out nothing yet: its ledger is empty.
+        return {**self.__dict__, "ledger": Ledger(), "_plans": {}, "_oracles": {}, "_prepared": {}}
 
     def __repr__(self) -> str:
         return f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>"
