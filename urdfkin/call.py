@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.checks import Part, bound_of, pinocchios
+from urdfkin.asked import Question
+from urdfkin.checks import Part, axes_of, bound_of, pinocchios
 from urdfkin.errors import InputError, NotFiniteError, RangeError
 from urdfkin.recursion.base import STILL_STATE, BaseMotion
 from urdfkin.recursion.plan import IntArray
@@ -33,20 +33,42 @@ class NotVerifiedWarning(UserWarning):
     """Results are handed out that Pinocchio could not check; the message says why."""
 
 
+def _named(frames: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(frames, str):
+        raise InputError("frames are a list of names", found=repr(frames), remedy=f"write [{frames!r}]")
+    return tuple(frames)
+
+
+def _every_link(robot: Robot) -> tuple[str, ...]:
+    return tuple(robot.tree.frame_name(link) for link in range(len(robot.tree.links)))
+
+
 class Call:
-    """One call's inputs as flat batches, and the way back to the caller's shape."""
+    """One call's inputs as flat batches, and the way back to the caller's shape.
+
+    Args:
+        robot: Who is asked.
+        frames: Names; None means every link.
+        reference: A member or its name.
+        base: How the root link moves; None if it stands still.
+        inputs: q, v and a, as far as the quantity needs them.
+    """
 
     def __init__(
         self,
         robot: Robot,
-        frames: Sequence[str],
+        frames: Sequence[str] | None,
         reference: Reference | str,
         base: BaseMotion | None,
         *inputs: ArrayLike,
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
             raise InputError("base is a BaseMotion or None", found=type(base).__name__)
-        self.robot, self.frames, self.base = robot, tuple(frames), base
+        self.robot, self.base = robot, base
+        self.question = Question(
+            robot.tree.link_frames if frames is None else frames, reference, base, inputs
+        )
+        self.frames = _every_link(robot) if frames is None else _named(frames)
         self.reference = Reference.of(reference)
         self.links = tuple(robot.tree.frame_link(frame) for frame in self.frames)
         self.plan = robot.plan(self.links)
@@ -81,19 +103,6 @@ class Call:
         """How many results the call hands out."""
         return self.n * len(self.links)
 
-    @cached_property
-    def flat_base(self) -> BaseMotion | None:
-        """The base with one flat batch axis, for the oracle."""
-        if self.base is None or not self.base.batch_shape:
-            return self.base
-        fields = (self.base.placement, 2), (self.base.velocity, 1), (self.base.acceleration, 1)
-        return BaseMotion(
-            *(
-                np.broadcast_to(x, (*self.shape, *x.shape[-own:])).reshape(self.n, *x.shape[-own:])
-                for x, own in fields
-            )
-        )
-
     def flat(self, out: FloatArray | None, *own: int, every: bool = False) -> FloatArray | None:
         """`out`, for one frame or for every one, as the kernels write it: (n, frames, ...)."""
         if out is None:
@@ -105,7 +114,7 @@ class Call:
                 f"out must be a writable C-contiguous float64 array of shape {wanted}",
                 found=f"{getattr(out, 'dtype', type(out).__name__)} {getattr(out, 'shape', '')}",
             )
-        if any(np.may_share_memory(out, array) for array in (self.q, *self.rates)):
+        if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a: they are read again for the check")
         return out.reshape(self.n, len(self.links), *own)
 
@@ -126,8 +135,13 @@ class Call:
                 self.robot.checked(x, name)
             raise
 
-    def verify(self, quantity: Quantity, results: FloatArray, verify: Verify | None) -> None:
-        """Have (n, frames, ...) results checked and entered in the ledger, or raise VerificationError."""
+    def verify(self, quantity: Quantity, handed_out: FloatArray, verify: Verify | None) -> None:
+        """Have results checked, in the shape in which the user gets them, and entered in the ledger.
+
+        Raises:
+            VerificationError: Pinocchio computes something else.
+            OracleError: they have another shape than what was asked.
+        """
         robot, ledger = self.robot, self.robot.ledger
         wanted = checked_choice(robot.verify if verify is None else verify)
         if wanted is False:
@@ -137,6 +151,7 @@ class Call:
             warnings.warn(f"not verified: {reason}", NotVerifiedWarning, stacklevel=3)
             ledger.unchecked(quantity, self.results, reason)
             return
+        results = self.question.flat(handed_out, axes_of(quantity))
         total, worst = Comparison.of_nothing(), None
         for part in parts(wanted, self.n, results[:1].size):
             comparison, failure = self._compare(quantity, results[part], part)
@@ -151,19 +166,16 @@ class Call:
 
     def part(self, part: slice | IntArray) -> Part:
         """Some of its configurations, for the check."""
-        base = self.flat_base
-        if base is not None and base.batch_shape:
-            base = BaseMotion(base.placement[part], base.velocity[part], base.acceleration[part])
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
-        return Part(self.plan, self.frames, self.reference, self.q[part], rates, base, state)
+        return Part(self.plan, self.reference, self.q[part], rates, state, self.question.rows(part))
 
     def _compare(
         self, quantity: Quantity, ours: FloatArray, part: slice | IntArray
     ) -> tuple[Comparison, VerificationError | None]:
         """Hold some of the results against Pinocchio's; the worst of them, if it disagrees."""
         x = self.part(part)
-        theirs = pinocchios(quantity, self.robot.oracle(self.base), x)
+        theirs = pinocchios(quantity, self.robot.oracle(self.base), x.asked)
         bound = bound_of(quantity, x)
         comparison = compare(ours, theirs, bound, 2)
         if comparison.agrees:
@@ -200,10 +212,10 @@ class Call:
             command = str(quantity).replace(" ", "-")
             return replay_line(self.robot.origin, command, frame, reference, values)
         # The command line has no words for a moving base.
-        base = self.flat_base or self.base
         arguments = [*map(repr, values.values()), repr(frame), *([repr(reference)] if reference else [])]
-        fields = ((base.placement, 2), (base.velocity, 1), (base.acceleration, 1))
-        motion = (repr((x if x.ndim == own else x[k]).tolist()) for x, own in fields)
+        asked = self.question.rows(np.array([k])).base
+        fields = () if asked is None else (asked.placement, asked.velocity, asked.acceleration)
+        motion = (repr(x[0].tolist()) for x in fields)
         return (
             f"{self.robot.origin.python}.{str(quantity).replace(' ', '_')}({', '.join(arguments)},"
             f" base=urdfkin.BaseMotion({', '.join(motion)}))"

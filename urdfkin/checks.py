@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+from urdfkin.asked import Rows
 from urdfkin.oracle import Oracle
-from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import Plan
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
@@ -24,39 +24,43 @@ _RATES = {
 
 
 class Part(NamedTuple):
-    """Some configurations of a call.
+    """Some configurations of a call, as urdfkin sees them and as the user asked for them.
 
     Attributes:
         plan: The walk.
-        frames: Names, in the order of the results.
         reference: For all but placements.
         q: (n, nq).
         rates: (n, nv) v, and a, as far as the call was given them.
-        base: How the base moves, with one batch axis or none; None if it stands still.
-        state: (n or 1, 24) the same for the kernels.
+        state: (n or 1, 24) how the base moves.
+        asked: The same configurations in the user's own numbers and names.
     """
 
     plan: Plan
-    frames: tuple[str, ...]
     reference: Reference
     q: FloatArray
     rates: tuple[FloatArray, ...]
-    base: BaseMotion | None
     state: FloatArray
+    asked: Rows
 
 
-def pinocchios(quantity: Quantity, oracle: Oracle, x: Part) -> FloatArray:
-    """(n, frames, ...) the same results, computed by Pinocchio."""
+def axes_of(quantity: Quantity) -> int:
+    """How many axes one result has: two for a matrix, one for [linear; angular]."""
+    return 1 if quantity in (Quantity.VELOCITY, Quantity.ACCELERATION) else 2
+
+
+def pinocchios(quantity: Quantity, oracle: Oracle, asked: Rows) -> FloatArray:
+    """(n, frames, ...) the same results, computed by Pinocchio for what the user asked."""
+    q, *given = asked.inputs
     if quantity is Quantity.PLACEMENT:
-        return oracle.placements(x.q, x.frames, x.base)
+        return oracle.placements(q, asked.frames, asked.base)
     in_references: dict[Quantity, Callable[..., FloatArray]] = {
         Quantity.VELOCITY: oracle.velocities,
         Quantity.JACOBIAN: oracle.jacobians,
         Quantity.JACOBIAN_RATE: oracle.jacobian_rates,
         Quantity.ACCELERATION: oracle.accelerations,
     }
-    rates, compute = x.rates[: _RATES[quantity]], in_references[quantity]
-    return compute(x.q, *rates, x.frames, [x.reference], x.base)[:, :, 0]
+    rates, compute = given[: _RATES[quantity]], in_references[quantity]
+    return compute(q, *rates, asked.frames, [asked.reference], asked.base)[:, :, 0]
 
 
 def bound_of(quantity: Quantity, x: Part) -> Bound:

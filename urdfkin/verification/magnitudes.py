@@ -18,6 +18,8 @@ import numpy as np
 from urdfkin.recursion.plan import Geometry, Motion, Plan, Step
 from urdfkin.tree import FloatArray
 
+_UNTURNED = np.eye(3).ravel()
+
 
 @dataclass(frozen=True, slots=True)
 class Magnitudes:
@@ -30,7 +32,8 @@ class Magnitudes:
         alpha: (n, frames) rad/s^2.
         acc: (n, frames) m/s^2.
         joints: (n, frames) how many joints' worth of rounding lies on the path: one for each URDF joint,
-            and for a follower its angle as well, which is itself rounded before its sine is taken.
+            one for a base that is turned, and for a follower its angle as well, which is itself rounded
+            before its sine is taken.
     """
 
     p: FloatArray
@@ -52,7 +55,8 @@ def magnitudes(
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
     state = [_norm(base[:, at : at + 3]) for at in (9, 12, 15, 18, 21)]
-    states = [[*state, np.zeros(1)]]
+    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # such a base rounds like a joint: see `bounds`
+    states = [[*state, turned.astype(np.float64)]]
     for i in range(len(plan.steps)):
         state = states[plan.parents[i] + 1]
         states.append(_place(plan, i, state, q) if v is None or a is None else _step(plan, i, state, q, v, a))
