@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import urdfkin
@@ -174,6 +174,7 @@ def meant(name: str, links: list[str], joints: list[str]) -> int | str:
     return "unknown"
 
 
+@settings(deadline=None, max_examples=60)
 @given(
     links=st.lists(st.sampled_from(POOL), min_size=1, max_size=5, unique=True),
     data=st.data(),
