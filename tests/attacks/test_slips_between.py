@@ -67,6 +67,11 @@ FRAGMENTS = [
     ("recursion.plan", "order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)",
      "order = sorted(range(len(links)), key=lambda place: -anchors[links[place]].step)"),
     ("rotation.aligning", "return", "return -"),
+    # a table's URDF
+    ("dh.to_tree", "ways = [s @ x for s, x", "ways = [x @ s for s, x"),
+    ("dh.to_tree", "poses[-1] @ table.tool\n", "table.tool @ poses[-1]\n"),
+    ("urdf.writer", "numbers(rpy_of(T[:3, :3]))", "numbers(rpy_of(T[:3, :3])[::-1])"),
+    ("urdf.writer", "numbers(T[:3, 3])", "numbers(T[:3, :3] @ T[:3, 3])"),
     # Pinocchio's side
     ("oracle_base", "linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])", "linear = acc[..., :3]"),
     ("oracle_layout", "*at[rule.leader], rule.multiplier", "*at[rule.leader][::-1], rule.multiplier"),
