@@ -45,7 +45,7 @@ FRAGMENTS = [
     ("tree", "tuple(int(own[i]) for i in leaders)", "tuple(int(own[i]) for i in range(len(self.joints)))"),
     ("tree", "return sorted(joints, key=lambda pair: pair[0].name, reverse=True)",
      "return sorted(joints, key=lambda pair: pair[0].name)"),
-    ("urdf.reader", "offset = rule.multiplier * end.offset + rule.offset", "offset = end.offset + rule.offset"),
+    ("urdf.reader", "= rule.multiplier * end.offset + rule.offset", "= end.offset + rule.offset"),
     ("urdf.reader", "rule.multiplier * end.multiplier, offset)", "rule.multiplier, offset)"),
     ("urdf.reader", "resolved[follower] = Mimic(end.leader,", "resolved[follower] = Mimic('b',"),
     ("followers", "offset = rule.multiplier * end.offset + rule.offset", "offset = end.offset + rule.offset"),
