@@ -20,8 +20,11 @@ def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
         joints: The joints that move; others follow nobody, whatever the text says.
 
     Raises:
-        InputError: a rule's numbers are no numbers.
+        ValueError: a rule's numbers are no numbers.
+        expat.ExpatError: the text is not well-formed.
     """
+    if "mimic" not in text:
+        return {}
     rules = {
         name: Mimic(rule.get("joint", ""), float(rule.get("multiplier", "1")), float(rule.get("offset", "0")))
         for joint in plain_xml(text).iterfind("joint")

@@ -17,11 +17,12 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from typing import Any
+from xml.parsers.expat import ExpatError
 
 import numpy as np
 
 from urdfkin.deep_stack import with_stack
-from urdfkin.errors import InputError, OracleError
+from urdfkin.errors import OracleError
 from urdfkin.followers import rules_of_text
 from urdfkin.oracle_base import BaseNumbers, free_flyer, free_flyer_rates, free_flyer_second_rates
 from urdfkin.oracle_frames import Frames
@@ -109,7 +110,7 @@ class Oracle:
         """The text's own mimic rules; urdfkin's reading of them is under test too."""
         try:
             return rules_of_text(text, set(joints))
-        except (InputError, ValueError) as error:
+        except (ValueError, ExpatError) as error:
             raise OracleError(
                 "the mimic rules read differently", where=self._tree.name, found=str(error)
             ) from error

@@ -50,12 +50,14 @@ from urdfkin.urdf.reader import read_tree
 #: Where a user's numbers pass on their way to the result, and on their way to Pinocchio.
 MODULES = (
     "asked", "call", "chain", "checks", "configuration", "coupling", "dh.to_tree", "followers",
-    "frame_names", "from_table", "manipulator", "oracle", "oracle_base", "oracle_frames",
-    "oracle_layout", "recursion.base", "recursion.batch", "recursion.columns", "recursion.evaluate",
-    "recursion.plan", "recursion.rows", "reference", "robot", "rotation.aligning",
-    "rotation.arrays", "rotation.nearest", "rotation.quaternion", "tables", "tree", "urdf.reader",
-    "urdf.skeleton", "urdf.writer", "verification.bounds", "verification.certificate",
-    "verification.choosing", "verification.magnitudes", "verification.tables",
+    "frame_names", "from_table", "manipulator", "motion.representation", "oracle", "oracle_base",
+    "oracle_frames", "oracle_layout", "recursion.base", "recursion.batch", "recursion.columns",
+    "recursion.evaluate", "recursion.plan", "recursion.rows", "reference", "robot",
+    "rotation.aligning", "rotation.arrays", "rotation.euler", "rotation.euler_rates",
+    "rotation.nearest", "rotation.quaternion", "rotation.quaternion_rates", "tables", "tree",
+    "urdf.reader", "urdf.skeleton", "urdf.writer", "verification.bounds",
+    "verification.certificate", "verification.choosing", "verification.line_of_nodes",
+    "verification.magnitudes", "verification.tables",
 )  # fmt: skip
 
 #: A result is the right one when it is off by less than this share of the largest number.
@@ -117,6 +119,8 @@ def results() -> Iterator[tuple[str, Callable[[Robot], FloatArray]]]:
     yield "acceleration", lambda r: r.acceleration(q, v, a, "f", "local", base=moves)
     yield "acceleration, alone", lambda r: r.acceleration(*one, "link:b")
     yield "accelerations", lambda r: r.accelerations(q, v, a, ["f", "g", "link:b"], "world", base=moves)
+    yield "analytical jacobian", lambda r: r.analytical_jacobian(q, "f", "xyz", base=moves)
+    yield "of a quaternion", lambda r: r.analytical_jacobian(one[0], "link:b", "quaternion", base=stands)
     yield "breakdown", lambda r: r.acceleration_breakdown(q, v, a, "f", base=moves).total
     yield "table", lambda r: _by_table(r, q)
     yield "robot of a table", lambda r: _of_table(q[..., :3])
