@@ -1,5 +1,6 @@
 """Time and memory of a check grow with the file and no faster, whatever the file is made of."""
 
+import json
 import re
 import signal
 import time
@@ -14,6 +15,7 @@ from scripts.growing.kinds import KINDS
 from tests.diagnostics.cases.arm import arm
 from urdfkin.diagnostics import Finding, Severity, UrdfError, check_text
 from urdfkin.diagnostics.document import parse
+from urdfkin.diagnostics.formats import as_json
 from urdfkin.diagnostics.reporter import ERRORS_SHOWN, WRITTEN_OUT, Reporter
 from urdfkin.followers import rules_of_text
 from urdfkin.nearest import nearest
@@ -163,6 +165,9 @@ def test_without_folding_findings_are_complete_up_to_the_stated_number_and_the_r
     assert len(findings) == WRITTEN_OUT
     assert [finding.line for finding in findings] == list(range(2, WRITTEN_OUT + 2))
     assert findings[-1].also == tuple(range(WRITTEN_OUT + 2, MANY + 1))
+    document = json.loads(as_json(findings, ["f"], "1"))
+    assert document["counts"]["error"] == MANY - 1
+    assert document["findings"][-1]["also"][-1] == MANY
 
 
 @pytest.mark.slow
