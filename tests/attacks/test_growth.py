@@ -207,9 +207,9 @@ def test_an_attribute_among_many_is_found_on_its_line_and_column() -> None:
 
 
 def test_who_is_nearest_is_found_without_comparing_for_ever() -> None:
-    known = ["ab" * 30 + str(i) for i in range(100_000)]
+    known = ["ab" * 60 + str(i) for i in range(100_000)]
     with at_most(ENOUGH):
-        assert len(nearest("ba" * 30, known)) == 3
+        assert len(nearest("ba" * 60, known)) == 3
     assert nearest("elbwo", ["shoulder", "elbow", "wrist"]) == ["elbow"]
 
 
