@@ -213,6 +213,31 @@ def test_who_is_nearest_is_found_without_comparing_for_ever() -> None:
     assert nearest("elbwo", ["shoulder", "elbow", "wrist"]) == ["elbow"]
 
 
+@pytest.mark.parametrize(
+    ("inside", "filling"),
+    [
+        ("<!--{}-->", "a"),
+        ("<?a {}?>", "a"),
+        ('<material note="{}"/>', "a"),
+        ("<material {}/>", 'a="1" '),
+    ],
+)
+def test_markup_that_does_not_end_is_refused_before_it_is_read_again_and_again(
+    inside: str, filling: str
+) -> None:
+    long = inside.format(filling * (15_000_000 // len(filling)))
+    with at_most(ENOUGH):
+        findings = urdfkin.check(f'<robot name="r"><link name="l"/>{long}</robot>')
+    assert [(finding.code, finding.line) for finding in findings] == [("URDF119", 1)]
+
+
+@pytest.mark.parametrize("inside", ["<!--{}-->", "<![CDATA[{}]]>", '<material note="{}"/>'])
+def test_pieces_that_are_cut_while_they_are_read_stay_whole(inside: str) -> None:
+    text = f'<robot name="r">\n<link name="l"/>{inside.format("ä&lt;>" * 400_000)}\n<link name="l"/></robot>'
+    double = next(f for f in urdfkin.check(text) if f.code == "URDF402")
+    assert (double.line, double.column) == (3, 7)
+
+
 def test_limits_are_kept_before_anything_else_reads_the_file() -> None:
     for text, code in (
         (arm(origin=f'<origin xyz="{"1" * 200_000} 0 0"/>'), "URDF305"),
