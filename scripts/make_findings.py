@@ -61,8 +61,9 @@ be used.
 Time and memory grow with the file, and no faster (`scripts/check_growth.py` measures it for every kind of
 content). Limits, which options raise: {limits.bytes:,} bytes (`--max-bytes`), {limits.depth:,} levels of
 nesting (`--max-depth`), {limits.elements:,} elements (`--max-elements`), {limits.attributes:,} attributes of
-one element (`--max-attributes`), {limits.name:,} characters of a name (`--max-name`) and {limits.number:,} of
-a number (`--max-number`). `load` keeps the same limits.
+one element (`--max-attributes`), {limits.name:,} characters of a name (`--max-name`), {limits.number:,} of a
+number (`--max-number`) and {limits.markup:,} bytes of one tag or comment (`--max-markup`). `load` keeps the
+same limits.
 
 On a terminal, many warnings of one kind become one that tells the lines, and so do errors from the hundredth
 of a kind on; `--each` prints each. Of every kind, {written:,} findings of a file are written out, in JSON and

@@ -33,10 +33,12 @@ def check(
             except for the robots whose catalogue entry says that theirs cannot work.
         root_joint: `"floating"` or `"planar"` when the robot will hang from such a joint.
         xacro_args: Arguments for a .xacro file, which is expanded first; lines are those of the result.
-        fold: Whether many warnings of one kind are folded into one that lists the lines.
+        fold: Whether many warnings of one kind are folded into one that lists the lines, and errors from the
+            hundredth of a kind on into that one.
 
     Returns:
-        The findings; an empty list for a file nothing can be said against.
+        The findings; an empty list for a file nothing can be said against. Of each kind 10,000 are written
+        out; `also` of the last holds the lines of the others.
 
     Raises:
         SourceError: the file cannot be read.

@@ -7,7 +7,7 @@ import heapq
 from collections.abc import Iterable
 
 #: Characters of a name that are compared.
-_COMPARED = 64
+_COMPARED = 128
 
 #: Pairs of characters that are compared for one word, after what tells at a glance that names differ.
 WORK = 1_000_000

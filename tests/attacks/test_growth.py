@@ -1,5 +1,6 @@
 """Time and memory of a check grow with the file and no faster, whatever the file is made of."""
 
+import json
 import re
 import signal
 import time
@@ -14,6 +15,7 @@ from scripts.growing.kinds import KINDS
 from tests.diagnostics.cases.arm import arm
 from urdfkin.diagnostics import Finding, Severity, UrdfError, check_text
 from urdfkin.diagnostics.document import parse
+from urdfkin.diagnostics.formats import as_json
 from urdfkin.diagnostics.reporter import ERRORS_SHOWN, WRITTEN_OUT, Reporter
 from urdfkin.followers import rules_of_text
 from urdfkin.nearest import nearest
@@ -163,6 +165,9 @@ def test_without_folding_findings_are_complete_up_to_the_stated_number_and_the_r
     assert len(findings) == WRITTEN_OUT
     assert [finding.line for finding in findings] == list(range(2, WRITTEN_OUT + 2))
     assert findings[-1].also == tuple(range(WRITTEN_OUT + 2, MANY + 1))
+    document = json.loads(as_json(findings, ["f"], "1"))
+    assert document["counts"]["error"] == MANY - 1
+    assert document["findings"][-1]["also"][-1] == MANY
 
 
 @pytest.mark.slow
@@ -202,10 +207,35 @@ def test_an_attribute_among_many_is_found_on_its_line_and_column() -> None:
 
 
 def test_who_is_nearest_is_found_without_comparing_for_ever() -> None:
-    known = ["ab" * 30 + str(i) for i in range(100_000)]
+    known = ["ab" * 60 + str(i) for i in range(100_000)]
     with at_most(ENOUGH):
-        assert len(nearest("ba" * 30, known)) == 3
+        assert len(nearest("ba" * 60, known)) == 3
     assert nearest("elbwo", ["shoulder", "elbow", "wrist"]) == ["elbow"]
+
+
+@pytest.mark.parametrize(
+    ("inside", "filling"),
+    [
+        ("<!--{}-->", "a"),
+        ("<?a {}?>", "a"),
+        ('<material note="{}"/>', "a"),
+        ("<material {}/>", 'a="1" '),
+    ],
+)
+def test_markup_that_does_not_end_is_refused_before_it_is_read_again_and_again(
+    inside: str, filling: str
+) -> None:
+    long = inside.format(filling * (15_000_000 // len(filling)))
+    with at_most(ENOUGH):
+        findings = urdfkin.check(f'<robot name="r"><link name="l"/>{long}</robot>')
+    assert [(finding.code, finding.line) for finding in findings] == [("URDF119", 1)]
+
+
+@pytest.mark.parametrize("inside", ["<!--{}-->", "<![CDATA[{}]]>", '<material note="{}"/>'])
+def test_pieces_that_are_cut_while_they_are_read_stay_whole(inside: str) -> None:
+    text = f'<robot name="r">\n<link name="l"/>{inside.format("ä&lt;>" * 400_000)}\n<link name="l"/></robot>'
+    double = next(f for f in urdfkin.check(text) if f.code == "URDF402")
+    assert (double.line, double.column) == (3, 7)
 
 
 def test_limits_are_kept_before_anything_else_reads_the_file() -> None:

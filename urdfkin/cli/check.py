@@ -50,6 +50,7 @@ _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "b
 )
 @click.option("--max-name", type=click.IntRange(1), default=DEFAULT_LIMITS.name, show_default=True)
 @click.option("--max-number", type=click.IntRange(1), default=DEFAULT_LIMITS.number, show_default=True)
+@click.option("--max-markup", type=click.IntRange(1), default=DEFAULT_LIMITS.markup, show_default=True)
 def command(
     files: Sequence[str],
     style: str,
@@ -65,6 +66,7 @@ def command(
     max_attributes: int,
     max_name: int,
     max_number: int,
+    max_markup: int,
 ) -> None:
     """Check URDFs and print what is wrong with them: code, place, what was found, what to do.
 
@@ -78,7 +80,7 @@ def command(
       urdfkin explain URDF502
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
     ignored = _codes(ignore)
-    limits = Limits(max_bytes, max_depth, max_elements, max_attributes, max_name, max_number)
+    limits = Limits(max_bytes, max_depth, max_elements, max_attributes, max_name, max_number, max_markup)
     fold = style == "terminal" and not each
     findings: list[Finding] = []
     unreadable: list[UrdfkinError] = []

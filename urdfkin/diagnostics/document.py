@@ -80,6 +80,9 @@ class Element:
         return self.holder.attributes.get("name") if self.parent is not None else None
 
 
+#: Bytes that the parser is given at once.
+_PIECE = 1_000_000
+
 #: Characters of an element's text that are kept: more than a message shows.
 _KEPT = 2 * QUOTED
 
@@ -99,9 +102,8 @@ def parse(report: Reporter, data: bytes) -> Element | None:
         data: UTF-8 bytes, already checked by `urdfkin.diagnostics.encoding`, without a byte order mark.
     """
     builder = _Builder(report)
-    parser = builder.parser
     try:
-        parser.Parse(data, True)
+        builder.read(data)
     except _Stop:
         return None
     except expat.ExpatError as error:
@@ -138,6 +140,19 @@ class _Builder:
         parser.CommentHandler = self.comment
         parser.ProcessingInstructionHandler = self.instruction
         parser.SkippedEntityHandler = self.skipped
+
+    def read(self, data: bytes) -> None:
+        """Feed the parser piece by piece; what is not complete it reads again with the next piece."""
+        whole, size = memoryview(data), min(_PIECE, self.limits.markup)
+        for start in range(0, len(whole), size):
+            fed = min(start + size, len(whole))
+            self.parser.Parse(whole[start:fed], False)
+            if fed - max(self.parser.CurrentByteIndex, 0) > self.limits.markup:
+                found = f"more than {self.limits.markup} bytes without an end"
+                self.refuse(
+                    codes.MARKUP_TOO_LONG, "markup", "a tag, comment or instruction is too long", found
+                )
+        self.parser.Parse(b"", True)
 
     def here(self) -> tuple[int, int]:
         """Line and column of what expat is reading."""

@@ -35,7 +35,7 @@ def as_json(findings: Sequence[Finding], files: Sequence[str], version: str) -> 
         "version": JSON_VERSION,
         "urdfkin": version,
         "files": list(files),
-        "counts": {s.value: sum(f.severity is s for f in findings) for s in Severity},
+        "counts": {s.value: sum(f.count for f in findings if f.severity is s) for s in Severity},
         "findings": [{**finding.as_dict(), "title": REGISTRY[finding.code].title} for finding in findings],
     }
     return json.dumps(document, indent=2)

@@ -24,6 +24,7 @@ class Limits:
         attributes: How many attributes one element may have.
         name: Characters of the name of an element, an attribute, a link or a joint.
         number: Characters of one number.
+        markup: Bytes of one tag, comment or instruction, give or take a tenth; libxml2 has the same limit.
     """
 
     bytes: int = 100_000_000
@@ -32,6 +33,7 @@ class Limits:
     attributes: int = 200
     name: int = 10_000
     number: int = 2_000
+    markup: int = 10_000_000
 
 
 DEFAULT_LIMITS = Limits()

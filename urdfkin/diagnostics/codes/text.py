@@ -226,3 +226,16 @@ INSTRUCTION = Code(
     others="Pinocchio refuses it; yourdfpy reads it.",
     oracle=REFUSES,
 )
+
+MARKUP_TOO_LONG = Code(
+    "URDF119",
+    "markup-too-long",
+    ERROR,
+    "a tag, comment or instruction is longer than the limit allows",
+    why="The limit, 10,000,000 bytes, is that of libxml2, which most readers are built on. What is longer"
+    " is read again and again until its end is found. It can be raised: --max-markup, or `Limits` in the"
+    " library. The example is checked with a limit of 100 bytes.",
+    bad=f'<robot name="example">\n  <link name="base"/>\n  <!-- {"-+" * 100} -->\n</robot>\n',
+    good=_ROBOT,
+    others="Pinocchio reads it; yourdfpy reads it.",
+)
