@@ -59,6 +59,7 @@ class FrameChain:
         T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base when nothing moves).
         lengths: (n + 1,) how long the way is between joint origins, summed over the folded fixed joints: the
             k-th entry bounds the distance from joint k's origin to the next one's, whatever the rotations.
+        folded: How many joints of the URDF, fixed ones too, each of the n + 1 constants is a product of.
     """
 
     robot: str
@@ -67,6 +68,7 @@ class FrameChain:
     joints: tuple[ChainJoint, ...]
     T_last_tip: FloatArray
     lengths: FloatArray
+    folded: tuple[int, ...]
 
     @cached_property
     def coupling(self) -> Coupling:
@@ -137,19 +139,23 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
     """
     base_name = tree.links[0] if base is None else base
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0
-    lengths = list[float]()
+    lengths, folded, count = list[float](), list[int](), 0
     for joint, backwards in steps_between(tree, tip, base_name):
         _refuse_many_coordinates(tree, joint, base_name, tip)
         to_joint, from_joint = _around(joint, backwards)
         A = A @ to_joint
         length += 0.0 if backwards else _norm(joint)
+        count += 1
         if joint.kind.has_axis:
             joints.append(ChainJoint(joint.name, joint.kind, backwards, frozen(A), joint.limit, joint.mimic))
             lengths.append(length)
-            A, length = np.eye(4), 0.0
+            folded.append(count)
+            # A joint passed backwards has its constant after its motion, one passed forwards before it.
+            A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += _norm(joint) if backwards else 0.0
-    return FrameChain(tree.name, base_name, tip, tuple(joints), frozen(A), frozen([*lengths, length]))
+    ends = frozen(A), frozen([*lengths, length]), (*folded, count)
+    return FrameChain(tree.name, base_name, tip, tuple(joints), *ends)
 
 
 def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:

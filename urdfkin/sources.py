@@ -52,7 +52,8 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
 
     Raises:
         SourceError: the file cannot be read.
-        UnknownNameError: neither a file nor a name of the catalogue; the nearest names are offered.
+        UnknownNameError: neither a file nor a name of the catalogue, or an argument that the xacro file does
+            not take; the nearest names are offered.
         InputError: something else than a source.
     """
     if is_xacro(source):
@@ -87,9 +88,12 @@ def is_xacro(source: object) -> TypeGuard[str | os.PathLike[str]]:
 
 def _expanded(path: Path, arguments: Mapping[str, object]) -> Text:
     from urdfkin.urdf.xacro import expand  # noqa: PLC0415  only for those who pass xacro
+    from urdfkin.urdf.xacro_arguments import check_arguments  # noqa: PLC0415
 
     words = {name: str(value) for name, value in arguments.items()}
-    return Text(expand(path, words), f"{path} (expanded)", as_word(path), xacro_args=tuple(words.items()))
+    data = expand(path, words)
+    check_arguments(path, words)
+    return Text(data, f"{path} (expanded)", as_word(path), xacro_args=tuple(words.items()))
 
 
 def _read_word(word: str, most: int) -> Text:

@@ -130,6 +130,8 @@ class Tables:
 def verified(robot: Robot, table: DHTable, samples: int = SAMPLES, seed: int = 0) -> TableCheck | None:
     """Hold a table against Pinocchio; None, with a warning, where Pinocchio cannot check the robot.
 
+    A strict table whose lengths lose more than rounding of the robot's own is warned of as well.
+
     Raises:
         TableError: the two disagree.
     """
@@ -145,6 +147,8 @@ def verified(robot: Robot, table: DHTable, samples: int = SAMPLES, seed: int = 0
             found=str(check),
             remedy="please report this as an error of urdfkin, with the URDF",
         )
+    if check.loss is not None:
+        _warn(str(check))
     return check
 
 

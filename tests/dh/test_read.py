@@ -65,12 +65,15 @@ def test_a_file_is_read_by_its_ending(tmp_path: Path) -> None:
         ),
         (
             {"convention": "standard", "rows": [[0, 0, 0, 0, "X"]]},
-            "row 1: a row is revolute, continuous or prismatic",
+            "row 1, kind: a row is revolute, continuous or prismatic",
         ),
         ({"convention": "standard", "rows": [{"a": 0, "alhpa": 1}]}, "unknown key in a row: found 'alhpa'"),
         ({"convention": "standard", "rows": [{"a": "wide"}]}, "row 1, a: not a number: found 'wide'"),
         ({"convention": "standard", "rows": [{"a": 0, "sense": 0}]}, "the sense is"),
-        ({"convention": "standard", "rows": ROWS, "base": [[1, 0], [0, 1]]}, "a pose is a"),
+        (
+            {"convention": "standard", "rows": ROWS, "base": [[1, 0], [0, 1]]},
+            "base: the base is a matrix of numbers, 4 x 4",
+        ),
         ({"convention": "standard", "rows": ROWS, "tool": "none"}, "the tool is a matrix of numbers"),
         ({"convention": "standard", "rows": [{"mimic": "j1"}]}, "mimic is {leader"),
     ],

@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 
 from urdfkin.catalogue import examples
+from urdfkin.dh.elements import EPS
 from urdfkin.dh.make import dh_table
+from urdfkin.dh.noise import left_out
 from urdfkin.loading import load
 from urdfkin.tables import verified
 
@@ -27,7 +29,7 @@ def test_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long_row(name: st
         check = verified(robot, table, samples=10)
         assert check is not None
         assert check.agrees
-        assert max(check.units.values()) <= 20.0
+        assert max(check.units.values()) <= 20.0 + left_out(robot.chain(tip, root)) / EPS
         reach = float(robot.chain(tip, root).lengths.sum())
         assert all(max(abs(row.a), abs(row.d)) <= LENGTH_BOUND * reach for row in table.rows)
 

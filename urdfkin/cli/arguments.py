@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from urdfkin.cli.idle import refuse_idle
 from urdfkin.errors import InputError, SourceError
 
 if TYPE_CHECKING:
@@ -131,11 +132,13 @@ def read_inputs(
     """Values from the command line; batches of one length, single ones repeated.
 
     Raises:
-        InputError: a number that is none, a wrong count, batches of different lengths.
+        InputError: a number that is none, a wrong count, batches of different lengths, a seed for nothing.
         SourceError: a file that cannot be read.
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
+    if not any(text.startswith("random") for text in (q, v, a)):
+        refuse_idle(click.get_current_context(), ("seed",), "without a random --q, --v or --a")
     rng = np.random.default_rng(seed)
     rows = [_values(robot, letter, text, rng) for letter, text in (("q", q), ("v", v), ("a", a))]
     lengths = {len(part) for part in rows if len(part) != 1}

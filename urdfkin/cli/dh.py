@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from urdfkin.cli.arguments import load_robot, robot_argument, together, verify_option
+from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.output import compiling, output_option
 
 #: Forms of a table. They repeat `urdfkin.dh.export.FORMATS`, whose import --help does not need.
@@ -57,6 +58,9 @@ compare_options = together(
         metavar="MM",
         help="Millimetres at the tip up to which --compare agrees.",
     ),
+    click.option(
+        "--fit/--no-fit", default=True, help="Whether --compare fits base, tool and joint offsets (default)."
+    ),
 )
 form_options = together(
     click.option(
@@ -66,6 +70,30 @@ form_options = together(
     click.option("--millimetres/--metres", default=False, help="Lengths in what people read."),
     click.option("--digits", type=click.IntRange(3, 17), default=10, show_default=True, help="Significant."),
 )
+
+
+_CHOICES = ("convention", "near_parallel", "snap", "last", "parallel_offset", "flip")
+_UNITS = ("degrees", "millimetres", "digits")
+
+
+def _refuse_idle(context: click.Context, is_table: bool, options: dict[str, Any]) -> None:
+    """Which options do nothing beside which others."""
+    compares, tree, form = options["compare"] is not None, options["tree"], options["format_"]
+    written = ("terminal", "markdown") if tree or compares else ("terminal", "markdown", "latex")
+    for idle, where, because in (
+        (("tolerance", "fit"), not compares, "without --compare"),
+        ((*_CHOICES, "verify"), compares, "with --compare"),
+        ((*_CHOICES, "base", "tip"), tree, "with --tree"),
+        (("tip",), options["all_"], "with --all"),
+        (
+            _UNITS,
+            form not in written,
+            f"in the form {form!r}, which is in metres and radians, to the last digit",
+        ),
+        (("mimic", "root_joint", "xacro_arg"), is_table, "for a robot that is a table"),
+    ):
+        if where:
+            refuse_idle(context, idle, because)
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")
@@ -94,11 +122,13 @@ def command(
     ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json,
     .csv), which is made a robot first: to convert it, or to write it as a URDF.
 
-    Exit 0: verified, or the compared table agrees. 1: a disagreement. 2: bad input. 3: not checked.
+    Exit 0: verified, or the compared table agrees. 1: a disagreement. 2: bad input. 3: not checked, or a
+    strict table that loses more to rounding than the robot itself.
     """
     from urdfkin.cli.dh_work import Work, run, table_robot  # noqa: PLC0415  keeps --help fast
 
     is_table = Path(robot).suffix in (".toml", ".json", ".csv")
+    _refuse_idle(context, is_table, options)
     loaded = table_robot(robot, verify) if is_table else load_robot(robot, mimic, root_joint, verify=verify)
     with compiling():
         code = run(Work(robot=loaded, output=output, **options))

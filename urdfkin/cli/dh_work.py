@@ -8,24 +8,32 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
 from urdfkin.cli.output import write_file
 from urdfkin.dh import DHTable, Units, export, read_table, units_of
-from urdfkin.dh.compare import Comparison, compare, comparison_text
+from urdfkin.dh.compare import CellDifference, Comparison, compare, comparison_text
+from urdfkin.dh.digits import last_digits
 from urdfkin.dh.export.mapping import to_mapping
 from urdfkin.dh.export.tree import as_mapping, write_tree
+from urdfkin.dh.hint import snap_hint
+from urdfkin.dh.printed import printed, printed_tree
+from urdfkin.dh.read import read_mapping, table_of
 from urdfkin.dh.references import reference_path
 from urdfkin.dh.tree_parameters import tree_parameters
 from urdfkin.errors import InputError
 from urdfkin.oracle import version
 from urdfkin.robot import Robot
 from urdfkin.tables import SAMPLES, verified, verified_tree
+from urdfkin.verification.sampling import draw
 from urdfkin.verification.tables import TableCheck
 
 #: Forms that can hold several tables one after the other.
 _SEVERAL = ("terminal", "markdown", "latex", "json")
 #: Forms under which the check's result is written; elsewhere it goes to stderr.
 _READ = ("terminal", "markdown")
+#: Forms that round, and with how many digits they write base and tool, if not with those asked for.
+_ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +54,7 @@ class Work:
     flip: tuple[str, ...]
     compare: str | None
     tolerance: float
+    fit: bool
     format_: str
     degrees: bool
     millimetres: bool
@@ -96,9 +105,9 @@ def _tables(work: Work) -> int:
         text = "\n".join(_written(work, table, check) for table, check in made)
     _put(work, text)
     if work.format_ not in (*_READ, "json"):
-        for _, check in made:
-            click.echo(check_line(check), err=True)
-    return 0 if all(check is not None for _, check in made) else 3
+        for table, check in made:
+            click.echo(_said(work, table, check), err=True)
+    return 0 if all(check is not None and check.within for _, check in made) else 3
 
 
 def _tips(work: Work) -> list[str | None]:
@@ -107,22 +116,25 @@ def _tips(work: Work) -> list[str | None]:
 
 
 def _table(work: Work, tip: str | None) -> tuple[DHTable, TableCheck | None]:
-    robot = work.robot
-    base = work.base
+    robot, table = work.robot, _made(work, tip, work.snap)
+    return table, verified(robot, table) if robot.verify else None
+
+
+def _made(work: Work, tip: str | None, snap: float) -> DHTable:
+    robot, base = work.robot, work.base
     if base is None and work.all_:
         base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
-    table = robot.dh(
+    return robot.dh(
         tip,
         base,
         work.convention,
         near_parallel=work.near_parallel,
-        snap=work.snap,
+        snap=snap,
         last=work.last,
         parallel_offset=work.parallel_offset,
         flip=work.flip,
         verify=False,
     )
-    return table, verified(robot, table) if robot.verify else None
 
 
 def _written(work: Work, table: DHTable, check: TableCheck | None) -> str:
@@ -133,7 +145,17 @@ def _written(work: Work, table: DHTable, check: TableCheck | None) -> str:
 
         return drawing(table)
     text = export(table, work.format_, work.units)
-    return f"{text}\n{check_line(check)}\n" if work.format_ in _READ else text
+    return f"{text}\n{_said(work, table, check)}\n" if work.format_ in _READ else text
+
+
+def _said(work: Work, table: DHTable, check: TableCheck | None) -> str:
+    """The lines under a table: the check, what its digits lose, and whether to snap."""
+    lines = [check_line(check)]
+    if work.format_ in _ROUNDED:
+        lines.append(str(printed(table, work.units, _ROUNDED[work.format_])))
+    if hint := snap_hint(table, lambda snap: _made(work, table.tip_frame, snap)):
+        lines.append(f"hint: {hint}")
+    return "\n".join(lines)
 
 
 def _document(table: DHTable, check: TableCheck | None) -> dict[str, Any]:
@@ -161,6 +183,8 @@ def _tree(work: Work) -> int:
     check = verified_tree(work.robot, parameters, SAMPLES) if work.robot.verify else None
     if work.format_ in _READ:
         text += f"\n{check or check_line(None)}\n"
+        q = draw(work.robot.tree, SAMPLES, np.random.default_rng(1), with_special=True).q
+        text += f"{printed_tree(parameters, work.units, q)}\n"
     else:
         click.echo(str(check or check_line(None)), err=True)
     _put(work, text)
@@ -171,13 +195,15 @@ def _tree(work: Work) -> int:
 
 
 def _compare(work: Work, name: str) -> int:
-    reference = read_table(reference_path(name))
+    path = reference_path(name)
+    data = read_mapping(path)
+    reference = table_of(data, str(path))
     robot = work.robot
     known = robot.frame_names
     base = work.base or (reference.base_frame if reference.base_frame in known else None)
     tip = work.tip or (reference.tip_frame if reference.tip_frame in known else None)
     chain = robot.chain(tip, base)
-    found = compare(chain, reference, work.tolerance / 1e3)
+    found = compare(chain, reference, work.tolerance / 1e3, fit=work.fit, digits=last_digits(data))
     if work.format_ == "json":
         text = json.dumps(_comparison(found), indent=2, allow_nan=False) + "\n"
     elif work.format_ == "terminal":
@@ -194,22 +220,30 @@ def _comparison(found: Comparison) -> dict[str, Any]:
         "exact": found.exact,
         "tip_off_at_most_m": found.metres,
         "tip_turned_at_most_rad": found.radians,
+        "as_written_tip_off_at_most_m": found.written_metres,
+        "as_written_tip_turned_at_most_rad": found.written_radians,
+        "base_took_up": {"metres": found.base.metres, "radians": found.base.radians},
+        "tool_took_up": {"metres": found.tool.metres, "radians": found.tool.radians},
         "residual_m": found.residual,
         "samples": found.samples,
         "senses": list(found.senses),
         "offsets": list(found.offsets),
-        "differences": [
-            {
-                "row": one.row + 1,
-                "joint": one.joint,
-                "cell": one.cell,
-                "table": one.reference,
-                "urdf": one.urdf,
-                "tip_m": one.tip,
-            }
-            for one in found.differences
-        ],
+        "not_compared": [{"row": row + 1, "cell": cell} for row, cell in found.hidden],
+        "differences": [_difference(one) for one in found.differences],
+        "without_fitting": [_difference(one) for one in found.instead],
         "fitted": to_mapping(found.reference),
+    }
+
+
+def _difference(one: CellDifference) -> dict[str, Any]:
+    return {
+        "row": one.row + 1,
+        "joint": one.joint,
+        "cell": one.cell,
+        "table": one.reference,
+        "urdf": one.urdf,
+        "tip_m": one.tip,
+        "within_last_digit": one.is_rounding,
     }
 
 

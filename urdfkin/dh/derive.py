@@ -18,9 +18,9 @@ import numpy as np
 
 from urdfkin.chain import ChainJoint, FrameChain
 from urdfkin.dh.elements import EPS, as_step, between_axes
+from urdfkin.dh.noise import Noise, noises, tilt_of
 from urdfkin.dh.normals import (
     NEARLY_PARALLEL,
-    PARALLEL,
     NearParallel,
     Step,
     cleaned_angle,
@@ -102,15 +102,16 @@ def derive(chain: FrameChain, choices: Choices) -> DHTable:
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
     if not chain.joints:
         return _table(chain, choices, [], [], (constants[0], np.eye(4)))
+    first, *between, end = noises(chain, reach)
     _use_freedom_of_prismatic_axes(chain, constants, choices, reach)
-    base, phi_in, carry = _frame_zero(constants[0], reach)
+    base, phi_in, carry = _frame_zero(constants[0], reach, first)
     rows, steps = list[tuple[float, float]](), list[Step]()
-    for A in constants[1:-1]:
-        step, theta = _next_step(A, phi_in, carry, reach, choices)
+    for A, noise in zip(constants[1:-1], between, strict=True):
+        step, theta = _next_step(A, phi_in, carry, reach, choices, noise)
         rows.append((theta, step.delta))
         steps.append(step)
         phi_in, carry = step.phi_next, step.delta_next
-    theta, d, last, tool = _last(_lifted(constants[-1], carry), phi_in, carry, reach, choices)
+    theta, d, last, tool = _last(_lifted(constants[-1], carry), phi_in, carry, reach, choices, end)
     rows.append((theta, d))
     if choices.parallel_offset is ParallelOffset.FIRST:
         rows = _offsets_first(rows, steps)
@@ -177,9 +178,10 @@ def _use_freedom_of_prismatic_axes(
     parallel to a neighbour's is moved onto that neighbour, so that no foot is far away.
     """
     slides = [not joint.kind.turns for joint in chain.joints]
+    noise = noises(chain, reach)
     n = len(slides)
     moved = [
-        slides[k] and choices.near_parallel is NearParallel.STRICT and _meets_neighbour(constants, k, n)
+        slides[k] and choices.near_parallel is NearParallel.STRICT and _meets_neighbour(constants, k, noise)
         for k in range(n)
     ]
     if slides[0] and not moved[0]:
@@ -187,17 +189,17 @@ def _use_freedom_of_prismatic_axes(
         moved[0] = True
     if slides[-1] and not moved[-1] and choices.last is Last.TIP:
         tip = constants[-1]
-        if not _representable(tip, reach, choices) and abs(tip[2, 0]) <= PARALLEL:
+        if not _representable(tip, choices, noise[-1]) and abs(tip[2, 0]) <= noise[-1].radians:
             _shift_before(constants, n - 1, np.array([tip[0, 3], tip[1, 3], 0.0]))
 
 
-def _meets_neighbour(constants: list[FloatArray], k: int, n: int) -> bool:
+def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) -> bool:
     """Move joint k's line through the origin of a nearly parallel neighbour, if it has one."""
     before, after = constants[k], constants[k + 1]
-    if k > 0 and PARALLEL < math.hypot(before[0, 2], before[1, 2]) < NEARLY_PARALLEL:
+    if k > 0 and noise[k].radians < tilt_of(before) < NEARLY_PARALLEL:
         _shift_after(constants, k, before[:3, :3].T @ before[:3, 3])
         return True
-    if k < n - 1 and PARALLEL < math.hypot(after[0, 2], after[1, 2]) < NEARLY_PARALLEL:
+    if k + 2 < len(noise) and noise[k + 1].radians < tilt_of(after) < NEARLY_PARALLEL:
         _shift_before(constants, k, after[:3, 3].copy())
         return True
     return False
@@ -218,13 +220,13 @@ def _shift_before(constants: list[FloatArray], k: int, offset: FloatArray) -> No
 # -- the pass ------------------------------------------------------------------------------------------
 
 
-def _frame_zero(A: FloatArray, reach: float) -> tuple[FloatArray, float, float]:
+def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, float, float]:
     """T_base_0, then the turn and the offset along z_0 that lead to the first joint's frame."""
     z, p = A[:3, 2], A[:3, 3]
-    offset = cleaned_length(float(z @ p), reach)
+    offset = cleaned_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
-    base[:3, 3] = [cleaned_length(component, reach) for component in p - offset * z]
-    if math.hypot(z[0], z[1]) <= PARALLEL:  # the base's own z, either way up
+    base[:3, 3] = [cleaned_length(component, reach, noise.metres) for component in p - offset * z]
+    if tilt_of(A) <= noise.radians:  # the base's own z, either way up
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
     x = np.array([1.0, 0.0, 0.0]) - z[0] * z
     if np.linalg.norm(x) < NEARLY_PARALLEL:  # the axis runs along the base's x, whose shadow is a point
@@ -250,11 +252,11 @@ def _lifted(A: FloatArray, carry: float) -> FloatArray:
 
 
 def _next_step(
-    A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices
+    A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: Noise
 ) -> tuple[Step, float]:
     """The step to the next axis and theta of its row, with x turned so that theta stays small."""
     each = choices.parallel_offset is not ParallelOffset.LAST
-    step = step_between(_lifted(A, carry), reach, choices.near_parallel, -phi_in, each)
+    step = step_between(_lifted(A, carry), reach, choices.near_parallel, -phi_in, each, noise)
     theta = cleaned_angle(phi_in + step.phi)
     if abs(theta) > math.pi / 2.0 + RIGHT_ANGLE_SLACK:
         step = step.turned()
@@ -262,28 +264,28 @@ def _next_step(
     return step, theta
 
 
-def _representable(A: FloatArray, reach: float, choices: Choices) -> bool:
+def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:
     """Whether Rz Tz Tx Rx (standard) or Rz Tz (modified) is all of A."""
     if choices.last is Last.FLANGE:
         return False
     x_along_z, lateral = abs(A[2, 0]), abs(A[0, 0] * A[1, 3] - A[1, 0] * A[0, 3])
     if choices.convention is Convention.MODIFIED:
-        tilt, aside = math.hypot(A[0, 2], A[1, 2]), math.hypot(A[0, 3], A[1, 3])
-        return tilt <= PARALLEL and A[2, 2] > 0.0 and aside <= PARALLEL * reach
-    return bool(x_along_z <= PARALLEL and lateral <= PARALLEL * reach)
+        aside = math.hypot(A[0, 3], A[1, 3])
+        return tilt_of(A) <= noise.radians and A[2, 2] > 0.0 and aside <= 2.0 * noise.metres
+    return bool(x_along_z <= noise.radians and lateral <= 2.0 * noise.metres)
 
 
 def _last(
-    A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices
+    A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: Noise
 ) -> tuple[float, float, Step, FloatArray]:
     """theta, d and the step of the last row, and the tool; `A` is measured from O_{n-1}."""
-    if _representable(A, reach, choices):
+    if _representable(A, choices, noise):
         phi = math.atan2(A[1, 0], A[0, 0])
-        a = cleaned_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach)
+        a = cleaned_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)
         alpha = cleaned_angle(math.atan2(A[2, 1], A[2, 2]))
         step = Step(phi, 0.0, a, alpha, 0.0, 0.0, 0.0)
-        return cleaned_angle(phi_in + phi), cleaned_length(A[2, 3], reach), step, np.eye(4)
-    d = cleaned_length(carry if choices.last is Last.FLANGE else A[2, 3], reach)
+        return cleaned_angle(phi_in + phi), cleaned_length(A[2, 3], reach, noise.metres), step, np.eye(4)
+    d = cleaned_length(carry if choices.last is Last.FLANGE else A[2, 3], reach, noise.metres)
     tool = A.copy()
     tool[2, 3] -= d
     if phi_in:
@@ -291,7 +293,7 @@ def _last(
         turn[:2, :2] = [[math.cos(phi_in), -math.sin(phi_in)], [math.sin(phi_in), math.cos(phi_in)]]
         tool = turn @ tool
     _clean_rotation(tool)
-    tool[:3, 3] = [cleaned_length(component, reach) for component in tool[:3, 3]]
+    tool[:3, 3] = [cleaned_length(component, reach, noise.metres) for component in tool[:3, 3]]
     return 0.0, d, Step(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), tool
 
 

@@ -19,10 +19,8 @@ from enum import StrEnum
 import numpy as np
 
 from urdfkin.dh.elements import EPS, between_axes, wrapped
+from urdfkin.dh.noise import SUMMED, Noise, noise_of, tilt_of
 from urdfkin.tree import FloatArray
-
-#: Two axes whose tilt is no larger than this (rad) are parallel: the tilt is the rounding of the pose itself.
-PARALLEL = 8.0 * EPS
 
 #: Below this tilt (rad) a pair is nearly parallel: the feet would magnify errors in the URDF a hundredfold.
 NEARLY_PARALLEL = 1e-2
@@ -70,23 +68,30 @@ class Step:
 
 
 def step_between(
-    A: FloatArray, reach: float, near_parallel: NearParallel, phi_free: float = 0.0, delta_each: bool = False
+    A: FloatArray,
+    reach: float,
+    near_parallel: NearParallel,
+    phi_free: float = 0.0,
+    delta_each: bool = False,
+    noise: Noise | None = None,
 ) -> Step:
     """Take a constant pose apart.
 
     Args:
         A: (4, 4) pose of the next joint's frame in this joint's frame.
-        reach: Metres; lengths below its rounding are zero, and feet beyond it are far.
+        reach: Metres; feet beyond it are far.
         near_parallel: What to do where the axes are nearly parallel.
         phi_free: The value of phi where the axes coincide and any would do.
         delta_each: Leave the offset between parallel axes in this step (`delta`) instead of passing it on.
+        noise: Tilts and lengths below this are zero; that of one joint's constant when None.
     """
-    sine = math.hypot(A[0, 2], A[1, 2])
-    if sine <= PARALLEL:
-        return _parallel(A, reach, phi_free, delta_each)
-    feet = _skew(A, sine, reach)
+    noise = noise or noise_of(1, 0.0, reach)
+    sine = tilt_of(A)
+    if sine <= noise.radians:
+        return _parallel(A, reach, noise, phi_free, delta_each)
+    feet = _skew(A, sine, reach, noise)
     if near_parallel is NearParallel.HAYATI and _is_near(feet, sine, reach):
-        return _hayati(A, reach, phi_free)
+        return _hayati(A, reach, noise, phi_free)
     return feet
 
 
@@ -95,35 +100,35 @@ def _is_near(feet: Step, sine: float, reach: float) -> bool:
     return sine < NEARLY_PARALLEL or (sine < FAR_FEET and far)
 
 
-def _skew(A: FloatArray, sine: float, reach: float) -> Step:
+def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
     """X along z cross z_next, a > 0 where the axes do not meet."""
     phi = math.atan2(A[0, 2], -A[1, 2])
     along = math.cos(phi) * A[0, 3] + math.sin(phi) * A[1, 3]
     across = math.cos(phi) * A[1, 3] - math.sin(phi) * A[0, 3]
-    delta_next = cleaned_length(-across / sine, reach)
-    delta = cleaned_length(A[2, 3] - delta_next * A[2, 2], reach)
-    a, alpha = cleaned_length(along, reach), cleaned_angle(math.atan2(sine, A[2, 2]))
+    delta_next = cleaned_length(-across / sine, reach, noise.metres)
+    delta = cleaned_length(A[2, 3] - delta_next * A[2, 2], reach, noise.metres)
+    a, alpha = cleaned_length(along, reach, noise.metres), cleaned_angle(math.atan2(sine, A[2, 2]))
     step = Step(phi, delta, a, alpha, 0.0, _rest(A, phi, alpha, 0.0), delta_next)
     return step.turned() if a < 0.0 else step
 
 
-def _parallel(A: FloatArray, reach: float, phi_free: float, delta_each: bool) -> Step:
+def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_each: bool) -> Step:
     """The perpendicular from this origin; collinear axes leave phi free."""
     sign = math.copysign(1.0, A[2, 2])
     alpha = 0.0 if sign > 0.0 else math.pi
-    offset = cleaned_length(A[2, 3], reach)
+    offset = cleaned_length(A[2, 3], reach, noise.metres)
     delta, delta_next = (offset, 0.0) if delta_each else (0.0, sign * offset)
-    a = cleaned_length(math.hypot(A[0, 3], A[1, 3]), reach)
+    a = cleaned_length(math.hypot(A[0, 3], A[1, 3]), reach, noise.metres)
     phi = math.atan2(A[1, 3], A[0, 3]) if a else phi_free
     return Step(phi, delta, a, alpha, 0.0, _rest(A, phi, alpha, 0.0), delta_next, free=not a)
 
 
-def _hayati(A: FloatArray, reach: float, phi_free: float) -> Step:
+def _hayati(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> Step:
     """X from this origin to where the next axis pierces the plane normal to this one (Hayati, 1983)."""
     z = A[:3, 2]
-    delta_next = cleaned_length(A[2, 3] / z[2], reach)
+    delta_next = cleaned_length(A[2, 3] / z[2], reach, noise.metres)
     across = A[:2, 3] - delta_next * z[:2]
-    a = cleaned_length(math.hypot(across[0], across[1]), reach)
+    a = cleaned_length(math.hypot(across[0], across[1]), reach, noise.metres)
     phi = math.atan2(across[1], across[0]) if a else phi_free
     x = math.cos(phi) * z[0] + math.sin(phi) * z[1]
     y = math.cos(phi) * z[1] - math.sin(phi) * z[0]
@@ -139,14 +144,19 @@ def _rest(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
     return math.atan2(M[1, 0] - M[0, 1], M[0, 0] + M[1, 1])
 
 
-def cleaned_length(length: float, reach: float) -> float:
+def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
     """A length without rounding noise: zero, or twelve digits, where that is no further away than rounding.
+
+    Args:
+        length: Metres.
+        reach: Metres, from which it is measured.
+        noise: Metres below which it is zero, if that is more than `reach` makes it.
 
     Example:
         >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
         (0.0, 0.076, -5e-12)
     """
-    if abs(length) <= 4.0 * EPS * reach:
+    if abs(length) <= max(SUMMED * EPS * reach, noise):
         return 0.0
     short = float(f"{length:.12g}")
     return short if abs(length - short) <= 2.0 * EPS * reach else float(length)

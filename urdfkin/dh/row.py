@@ -25,7 +25,7 @@ def convention_of(name: str) -> Convention:
     """The convention by name; raises InputError for anything else."""
     try:
         return Convention(name)
-    except ValueError:
+    except (ValueError, TypeError):
         raise InputError(
             "unknown convention", found=repr(name), remedy="say 'standard' or 'modified'"
         ) from None
@@ -77,6 +77,16 @@ class DHRow:
     def cells(self) -> tuple[float, float, float, float, float]:
         """(a, alpha, d, theta, beta)."""
         return (self.a, self.alpha, self.d, self.theta, self.beta)
+
+    @property
+    def foot(self) -> float:
+        """Metres: how far away four parameters would put the foot of this row's common normal.
+
+        A Hayati row's x reaches the next axis at `a`, where that axis leans by `beta` along x and by `alpha`
+        across. The common normal stands across both; its foot lies at a sin(beta) / sin^2(tilt).
+        """
+        across, along = math.sin(self.alpha) * math.cos(self.beta), math.sin(self.beta)
+        return abs(self.a * along) / (across**2 + along**2) if self.beta else 0.0
 
     @property
     def X(self) -> FloatArray:

@@ -6,16 +6,18 @@ One form underlies all of them, a mapping:
     angles = "degrees"              # radians when not said
     lengths = "millimetres"         # metres when not said
     robot, base_frame, tip_frame    # names, optional
-    base, tool                      # 4 x 4 (or 3 x 4), always metres; the identity when not said
+    base, tool                      # 4 x 4 (or 3 x 4); the identity when not said
+    coordinates = ["leader", ...]   # only where a joint follows one that is on no row
     rows = [{joint = "j1", kind = "revolute", a = 0, alpha = "-pi/2", d = 0.3, theta = 0}, ...]
 
 A row may also be a list [a, alpha, d, theta, "R" or "P"]; `theta` and `d` are the constant parts. In a
-modified table a and alpha of row i are a_{i-1} and alpha_{i-1}.
+modified table a and alpha of row i are a_{i-1} and alpha_{i-1}. A row's `mimic` is {leader, multiplier,
+offset}, its `limit` {lower, upper, velocity, effort}. The units hold for cells, limits, offsets of followers
+and for the places of base and tool; a multiplier is a ratio of SI values, an effort N or N m.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -24,25 +26,21 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.row import DHRow, convention_of
 from urdfkin.dh.table import DHTable
-from urdfkin.dh.units import Angles, Lengths, Units, read_number, units_of
-from urdfkin.errors import InputError
-from urdfkin.tree import FloatArray, JointKind, Limit, Mimic
+from urdfkin.dh.units import Units, read_number, units_of
+from urdfkin.dh.written_row import name_of, refuse_other_order, written_row
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.tree import FloatArray
 
-_KINDS = {
-    "r": JointKind.REVOLUTE,
-    "p": JointKind.PRISMATIC,
-    "revolute": JointKind.REVOLUTE,
-    "continuous": JointKind.CONTINUOUS,
-    "prismatic": JointKind.PRISMATIC,
-}
-_ROW_KEYS = ("joint", "kind", "a", "alpha", "d", "theta", "sense", "beta", "mimic", "limit")
-_TABLE_KEYS = ("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool", "rows")
+_TABLE_KEYS = (
+    *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
+    *("coordinates", "rows"),
+)
 #: Keys that a file may carry for people: where the numbers come from, and about which URDF.
 NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
 
 
 def table_from_rows(
-    rows: Sequence[Any],
+    rows: Any,
     convention: str,
     *,
     angles: str = "radians",
@@ -52,6 +50,7 @@ def table_from_rows(
     robot: str = "robot",
     base_frame: str = "base",
     tip_frame: str = "tip",
+    coordinates: Sequence[str] = (),
 ) -> DHTable:
     """A table from rows written by hand.
 
@@ -61,14 +60,16 @@ def table_from_rows(
         convention: "standard" or "modified".
         angles: "radians" or "degrees".
         lengths: "metres" or "millimetres".
-        base: (4, 4) or (3, 4) T_base_0, metres; the identity when None.
+        base: (4, 4) or (3, 4) T_base_0, its lengths like the rows'; the identity when None.
         tool: Likewise T_n_tip.
         robot: The robot's name.
         base_frame: What the base is called.
         tip_frame: What the tip is called.
+        coordinates: Joints that move rows without standing in one: leaders that are elsewhere on the robot.
 
     Raises:
-        InputError: an unknown convention or unit, a row that is none, two rows for one joint.
+        InputError: an unknown convention or unit, a row that is none or none at all, two rows for one joint.
+        UnknownNameError: a row follows a joint that is neither a row's nor a coordinate.
 
     Example:
         >>> table = table_from_rows([[0, 90, 0.3, 0], [0.4, 0, 0, 0]], "standard", angles="degrees")
@@ -76,15 +77,27 @@ def table_from_rows(
         (('joint_1', 'joint_2'), [0.4, 0.0, 0.3])
     """
     units = units_of(angles, lengths)
-    made = tuple(_row(row, i, units) for i, row in enumerate(rows))
+    rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
+    if not isinstance(rows, Sequence) or isinstance(rows, (str, bytes)):
+        raise InputError("a table needs a list of rows", where="rows", found=repr(rows)[:60])
+    if len(rows) == 0 and base is None and tool is None:
+        raise InputError(
+            "a table without rows, base and tool says nothing",
+            where="rows",
+            found="[]",
+            remedy="write a row for each moving joint",
+        )
+    refuse_other_order(rows)
+    made = tuple(written_row(row, i, units) for i, row in enumerate(rows))
+    _check_leaders(made, coordinates)
     return DHTable(
         convention_of(convention),
         made,
-        _pose(base, "base"),
-        _pose(tool, "tool"),
-        robot,
-        base_frame,
-        tip_frame,
+        _pose(base, "base", units),
+        _pose(tool, "tool", units),
+        name_of(robot, "robot"),
+        name_of(base_frame, "base_frame"),
+        name_of(tip_frame, "tip_frame"),
     )
 
 
@@ -104,97 +117,46 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
                 "unknown key in a table", found=repr(key), remedy=f"keys are {', '.join(_TABLE_KEYS)}"
             )
     options = {key: data[key] for key in _TABLE_KEYS if key in data and key not in ("convention", "rows")}
-    rows = data.get("rows")
-    if not isinstance(rows, Sequence) or isinstance(rows, str):
-        raise InputError("a table needs a list of rows", found=repr(rows))
-    return table_from_rows(rows, str(data["convention"]), **options)
+    return table_from_rows(data.get("rows"), data["convention"], **options)
 
 
-def _row(row: Any, index: int, units: Units) -> DHRow:
-    if isinstance(row, DHRow):
-        return row
-    where = f"row {index + 1}"
-    if isinstance(row, Mapping):
-        return _row_of_mapping(row, index, units, where)
-    if not isinstance(row, Sequence) or isinstance(row, str) or not 4 <= len(row) <= 5:
-        raise InputError(
-            "a row is a mapping or [a, alpha, d, theta, 'R' or 'P']", where=where, found=repr(row)
-        )
-    fields = dict(zip(("a", "alpha", "d", "theta", "kind"), row, strict=False))
-    return _row_of_mapping(fields, index, units, where)
-
-
-def _row_of_mapping(row: Mapping[str, Any], index: int, units: Units, where: str) -> DHRow:
-    for key in row:
-        if key not in _ROW_KEYS:
+def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
+    """A leader has a row of its own, or is said to be elsewhere; it does not follow another."""
+    if not isinstance(coordinates, Sequence) or isinstance(coordinates, str):
+        raise InputError("coordinates are a list of names", where="coordinates", found=repr(coordinates))
+    leads = {row.joint for row in rows if row.mimic is None}
+    known = [*leads, *(name_of(name, "coordinates") for name in coordinates)]
+    for i, row in enumerate(rows):
+        if row.mimic is None or row.mimic.leader in known:
+            continue
+        where = f"row {i + 1}, leader"
+        if any(row.mimic.leader == other.joint for other in rows):
             raise InputError(
-                "unknown key in a row",
+                "a joint cannot follow one that follows",
                 where=where,
-                found=repr(key),
-                remedy=f"keys are {', '.join(_ROW_KEYS)}",
+                found=repr(row.mimic.leader),
+                remedy="name the joint at the end, with the multipliers multiplied",
             )
-    kind = _KINDS.get(str(row.get("kind", "R")).lower())
-    if kind is None:
-        raise InputError(
-            "a row is revolute, continuous or prismatic",
-            where=where,
-            found=repr(row["kind"]),
-            remedy="write R or P",
-        )
-    return DHRow(
-        a=_length(row.get("a", 0.0), units, f"{where}, a"),
-        alpha=_angle(row.get("alpha", 0.0), units, f"{where}, alpha"),
-        d=_length(row.get("d", 0.0), units, f"{where}, d"),
-        theta=_angle(row.get("theta", 0.0), units, f"{where}, theta"),
-        kind=kind,
-        joint=str(row.get("joint") or f"joint_{index + 1}"),
-        sense=int(read_number(row.get("sense", 1), f"{where}, sense")),
-        beta=_angle(row.get("beta", 0.0), units, f"{where}, beta"),
-        mimic=_mimic(row.get("mimic"), where),
-        limit=_limit(row.get("limit"), where),
-    )
+        error = UnknownNameError("joint", row.mimic.leader, known, where=where)
+        error.remedy = f"{error.remedy}; a leader that no row has is named in coordinates = [...]"
+        raise error
 
 
-def _length(value: Any, units: Units, where: str) -> float:
-    metres = read_number(value, where)
-    return metres / 1000.0 if units.lengths is Lengths.MILLIMETRES else metres
-
-
-def _angle(value: Any, units: Units, where: str) -> float:
-    """Radians; "pi/2" is radians whatever the unit of plain numbers, 90 degrees is pi/2 to the bit."""
-    number = read_number(value, where)
-    if units.angles is Angles.RADIANS or (isinstance(value, str) and "pi" in value):
-        return number
-    twelfths = number / 15.0
-    return twelfths * math.pi / 12.0 if twelfths == round(twelfths) else math.radians(number)
-
-
-def _mimic(value: Any, where: str) -> Mimic | None:
-    if value is None:
-        return None
-    if not isinstance(value, Mapping) or "leader" not in value:
-        raise InputError("mimic is {leader, multiplier, offset}", where=where, found=repr(value))
-    numbers = [
-        read_number(value.get(key, default), f"{where}, {key}")
-        for key, default in (("multiplier", 1.0), ("offset", 0.0))
-    ]
-    return Mimic(str(value["leader"]), *numbers)
-
-
-def _limit(value: Any, where: str) -> Limit | None:
-    if value is None:
-        return None
-    if not isinstance(value, Mapping):
-        raise InputError("limit is {lower, upper, velocity, effort}", where=where, found=repr(value))
-    keys = (("lower", -np.inf), ("upper", np.inf), ("velocity", np.inf), ("effort", np.inf))
-    return Limit(*(read_number(value.get(key, default), f"{where}, {key}") for key, default in keys))
-
-
-def _pose(value: ArrayLike | None, what: str) -> FloatArray:
+def _pose(value: ArrayLike | None, what: str, units: Units) -> FloatArray:
     if value is None:
         return np.eye(4)
-    try:
-        pose = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"the {what} is a matrix of numbers", found=repr(value)) from None
-    return np.vstack([pose, [0.0, 0.0, 0.0, 1.0]]) if pose.shape == (3, 4) else pose
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    rows = value if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) else ()
+    if len(rows) not in (3, 4) or not all(isinstance(row, Sequence) and len(row) == 4 for row in rows):
+        raise InputError(
+            f"the {what} is a matrix of numbers, 4 x 4 or 3 x 4", where=what, found=repr(value)[:60]
+        )
+    pose = np.eye(4)
+    for i, row in enumerate(rows):
+        pose[i] = [
+            read_number(number, f"{what}, row {i + 1}, column {j + 1}") for j, number in enumerate(row)
+        ]
+    if units.counts_millimetres:
+        pose[:3, 3] /= 1000.0
+    return pose

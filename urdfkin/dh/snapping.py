@@ -16,7 +16,7 @@ import numpy as np
 
 from urdfkin.chain import ChainJoint, FrameChain, chain, steps_between
 from urdfkin.dh.elements import EPS, nearest_twelfth, wrapped
-from urdfkin.dh.row import Convention
+from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.statement import SnapChange, SnapStatement
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
@@ -79,10 +79,11 @@ def statement(
     for change in changes:
         for name in change.sliders:
             per_metre[name] = per_metre.get(name, 0.0) + change.angle
-    travel = {joint.name: _travel(joint.limit) for joint in exact.joints}
+    reached = {joint.name: travel(joint.limit) for joint in exact.joints}
     metres = sum((change.tip for change in changes), 0.0)
-    metres += sum(rate * travel[name] for name, rate in per_metre.items())
-    q = _samples(exact, samples)
+    metres += sum(rate * reached[name] for name, rate in per_metre.items())
+    bounds = {joint.name: range_of(joint) for joint in exact.joints if joint.mimic is None}
+    q = values_within(bounds, exact.joint_names, samples)
     T_exact, T_table = exact.placement(q), table.placement(q)
     shift = np.linalg.norm(T_exact[:, :3, 3] - T_table[:, :3, 3], axis=-1)
     turn = rotation_angle(T_exact[:, :3, :3], T_table[:, :3, :3])
@@ -203,19 +204,21 @@ def row_of_constant(table: DHTable, k: int) -> int:
     return k - 1 if table.convention is Convention.STANDARD else k
 
 
-def _travel(limit: Limit | None) -> float:
+def travel(limit: Limit | None) -> float:
     """Metres: how far a sliding joint may be from zero; one metre where the file does not say."""
     return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
 
 
-def _samples(exact: FrameChain, count: int) -> FloatArray:
-    """(count, coordinates) within limits; a whole turn where there are none."""
-    bounds = {joint.name: _range(joint) for joint in exact.joints if joint.mimic is None}
-    lower, upper = np.array([bounds.get(name, (-1.0, 1.0)) for name in exact.joint_names]).reshape(-1, 2).T
-    return np.random.default_rng(0).uniform(lower, upper, (count, len(exact.joint_names)))
+def values_within(bounds: Mapping[str, tuple[float, float]], names: Sequence[str], count: int) -> FloatArray:
+    """(count, coordinates) within bounds by name, uniformly; -1 to 1 for a name that has none."""
+    lower, upper = np.array([bounds.get(name, (-1.0, 1.0)) for name in names]).reshape(-1, 2).T
+    return np.random.default_rng(0).uniform(lower, upper, (count, len(names)))
 
 
-def _range(joint: ChainJoint) -> tuple[float, float]:
-    if joint.kind is JointKind.CONTINUOUS or joint.limit is None:
+def range_of(joint: ChainJoint | DHRow) -> tuple[float, float]:
+    """Where a joint may be: its limits; a whole turn, or a metre either way, where there are none."""
+    limit = joint.limit
+    bounded = limit is not None and math.isfinite(limit.lower) and math.isfinite(limit.upper)
+    if joint.kind is JointKind.CONTINUOUS or limit is None or not bounded:
         return (-math.pi, math.pi) if joint.kind.turns else (-1.0, 1.0)
-    return (joint.limit.lower, joint.limit.upper)
+    return (limit.lower, limit.upper)

@@ -23,7 +23,8 @@ import numpy as np
 
 from urdfkin.chain import motion_about_z
 from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
-from urdfkin.dh.elements import along_axis, between_axes
+from urdfkin.dh.elements import EPS, along_axis, between_axes
+from urdfkin.dh.noise import Noise, noise_of, tilt_of
 from urdfkin.dh.normals import NearParallel, Step, cleaned_angle, cleaned_length, step_between
 from urdfkin.errors import InputError
 from urdfkin.rotation import axis_aligning
@@ -85,6 +86,8 @@ class TreeParameters:
         ways: (joints,) metres: the URDF's own way from the root to each joint, all offsets added up.
         T_frame_link: (joints, 4, 4) pose of the URDF's link frame in the row's frame: a turn and a shift
             that make z the joint's axis and x the common normal.
+        left_out: Radians: the tilts that are taken for rounding (`urdfkin.dh.noise`), added up on the way on
+            which they are most.
     """
 
     robot: str
@@ -92,6 +95,7 @@ class TreeParameters:
     rows: tuple[TreeRow, ...]
     ways: FloatArray
     T_frame_link: FloatArray
+    left_out: float = 0.0
 
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
@@ -101,7 +105,8 @@ class TreeParameters:
     @property
     def roundings(self) -> float:
         """How many eps of the reach rounding may make: eight for each joint of the deepest link, and more."""
-        return 8.0 * (2.0 + max((len(self._way(j)) for j in range(len(self.rows))), default=0))
+        deepest = max((len(self._way(j)) for j in range(len(self.rows))), default=0)
+        return 8.0 * (2.0 + deepest) + self.left_out / EPS
 
     def reach(self, q: FloatArray) -> FloatArray:
         """(..., joints) metres: the way from the root to each link at `q`, the URDF's or the table's."""
@@ -183,31 +188,44 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
     poses = [
         np.linalg.inv(along_axis(*own.get(j, (0.0, 0.0)))) @ links[j].T_link_axis.T for j in range(len(rows))
     ]
-    return TreeParameters(tree.name, tree.links[0], rows, frozen(ways), frozen(np.reshape(poses, (-1, 4, 4))))
+    T_frame_link = frozen(np.reshape(poses, (-1, 4, 4)))
+    left_out = max((link.left_out for link in links), default=0.0)
+    return TreeParameters(tree.name, tree.links[0], rows, frozen(ways), T_frame_link, left_out)
 
 
 @dataclass(frozen=True, slots=True)
 class _Link:
-    """Where a link's axis frame stands: the antecedent is the nearest link that moves (-1 the root)."""
+    """Where a link's axis frame stands: the antecedent is the nearest link that moves (-1 the root).
+
+    Attributes:
+        noise: Of the pose in the antecedent.
+        left_out: Radians: tilts that are taken for rounding, from the root to here.
+    """
 
     antecedent: int
     T_antecedent_axis: FloatArray
     T_link_axis: FloatArray
+    noise: Noise
+    left_out: float
 
 
 def _links(tree: KinematicTree) -> list[_Link]:
     """For each joint: its axis frame (z the axis; the link's own frame if fixed) in the antecedent's."""
     links = list[_Link]()
-    # Of each link: the moving link that carries it, and its frame in that one's axis frame.
-    carried = [(-1, np.eye(4))]
-    for j, joint in enumerate(tree.joints):
-        antecedent, T = carried[joint.parent]
+    # Of each link: the moving link that carries it, its frame in that one's axis frame, and how many joints
+    # lie between the two.
+    carried = [(-1, np.eye(4), 0)]
+    for j, (joint, way) in enumerate(zip(tree.joints, _ways(tree), strict=True)):
+        antecedent, T, folded = carried[joint.parent]
         align = np.eye(4)
         if joint.kind.has_axis:
             align[:3, :3] = axis_aligning(joint.axis)
         here = T @ joint.T_parent_joint @ align
-        links.append(_Link(antecedent, here, align))
-        carried.append((j, align.T) if joint.kind.has_axis else (antecedent, here))
+        noise, tilt = noise_of(folded + 1, 0.0, way), tilt_of(here)
+        left_out = links[antecedent].left_out if antecedent >= 0 else 0.0
+        left_out += tilt if tilt <= noise.radians else 0.0
+        links.append(_Link(antecedent, here, align, noise, left_out))
+        carried.append((j, align.T, 0) if joint.kind.has_axis else (antecedent, here, folded + 1))
     return links
 
 
@@ -225,7 +243,7 @@ def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[in
         before = steps[i].phi_next if i >= 0 else 0.0
         known = own.get(i, (-before, 0.0))[0]
         start = -before if defines else known
-        step = step_between(link.T_antecedent_axis, way, NearParallel.HAYATI, start)
+        step = step_between(link.T_antecedent_axis, way, NearParallel.HAYATI, start, noise=link.noise)
         if abs(cleaned_angle(step.phi - start)) > np.pi / 2.0 + RIGHT_ANGLE_SLACK:
             step = step.turned()
         if defines:

@@ -10,6 +10,7 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
+from numbers import Real
 
 from urdfkin.errors import InputError
 
@@ -41,6 +42,11 @@ class Units:
     angles: Angles = Angles.RADIANS
     lengths: Lengths = Lengths.METRES
     digits: int = 10
+
+    @property
+    def counts_millimetres(self) -> bool:
+        """Whether lengths are millimetres."""
+        return self.lengths is Lengths.MILLIMETRES
 
     @property
     def angle_name(self) -> str:
@@ -83,13 +89,18 @@ class Units:
         return f"{value:.{self.digits}g}" if value else "0"
 
 
+_SHORT = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"}
+
+
 def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10) -> Units:
-    """Units by name; raises InputError for a name that is none."""
+    """Units by name, rad, deg, m and mm included; raises InputError for a name that is none."""
     try:
+        angles, lengths = (_SHORT.get(name, name) for name in (angles, lengths))
         return Units(Angles(angles), Lengths(lengths), digits)
-    except ValueError:
+    except (ValueError, TypeError):
         raise InputError(
             "unknown unit",
+            where="angles or lengths",
             found=f"{angles!r}, {lengths!r}",
             remedy="say radians or degrees, metres or millimetres",
         ) from None
@@ -127,15 +138,34 @@ def read_number(value: object, where: str) -> float:
         >>> read_number("-pi/2", "alpha") == -math.pi / 2
         True
     """
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
+    try:
+        number = _number(value)
+    except (ValueError, TypeError, OverflowError, ZeroDivisionError):
+        raise InputError(
+            "not a number", where=where, found=repr(value)[:60], remedy="write 1.5708 or pi/2"
+        ) from None
+    if not math.isfinite(number):
+        raise InputError("not a finite number", where=where, found=repr(value)[:60])
+    return number
+
+
+def _number(value: object) -> float:
+    if isinstance(value, Real) and not isinstance(value, bool):
         return float(value)
-    if isinstance(value, str):
-        if match := _PI.fullmatch(value):
-            sign, count, divisor = match.groups()
-            size = float(count or 1.0) * math.pi / float(divisor or 1.0)
-            return -size if sign == "-" else size
-        try:
-            return float(value)
-        except ValueError:
-            pass
-    raise InputError("not a number", where=where, found=repr(value), remedy="write 1.5708 or pi/2")
+    if not isinstance(value, str) or not value.isascii() or "_" in value:
+        raise TypeError(value)
+    if match := _PI.fullmatch(value):
+        sign, count, divisor = match.groups()
+        size = float(count or 1.0) * math.pi / float(divisor or 1.0)
+        return -size if sign == "-" else size
+    return float(value)
+
+
+def cell_in_si(name: str, number: float, units: Units) -> float:
+    """A cell, by its name a length or an angle, in metres or radians; 90 degrees are pi/2 to the bit."""
+    if name in ("a", "d"):
+        return number / 1000.0 if units.counts_millimetres else number
+    if units.angles is Angles.RADIANS:
+        return number
+    twelfths = number / 15.0
+    return twelfths * math.pi / 12.0 if twelfths == round(twelfths) else math.radians(number)

@@ -10,15 +10,24 @@ Pinocchio knows frames in the world; a table's numbers are relative to its base,
 
 which are 7.124 and 7.125 solved for the motion seen from the moving frame. The bound is what rounding can do
 to either side, plus what a snapped table declares.
+
+Rounding is measured by the robot: by the ways from the root to both ends, with what slides, and in each
+column of the Jacobian by the mimic multipliers that move it. A table's own lengths count up to the promise
+that Hayati rows keep (`PROMISED`), and no further. Four parameters for a nearly parallel pair may need a foot
+kilometres away, and two such lengths cancel to eps times themselves: a table that is off by no more than
+that is no disagreement, but it is not the robot to rounding either. It says what it loses.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urdfkin.dh.snapping import rotation_angle
+from urdfkin.chain import chain
+from urdfkin.dh.noise import left_out
+from urdfkin.dh.snapping import LARGEST_TOLERANCE, rotation_angle
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.oracle import Oracle
@@ -28,6 +37,8 @@ from urdfkin.verification.sampling import Samples
 
 _EPS = float(np.finfo(np.float64).eps)
 _ALIGNED = [Reference.LOCAL_WORLD_ALIGNED]
+#: No length of a table with Hayati rows exceeds so many times the robot's reach (docs/dh.md).
+PROMISED = 10.0
 
 
 class TableError(UrdfkinError):
@@ -47,6 +58,8 @@ class TableCheck:
         units: Of "placement", "jacobian" and "acceleration": the disagreement in eps * scale.
         shares: Likewise: the disagreement over the bound; 1 is as much as the bound allows.
         snapped: Whether the bound includes what snapping declares.
+        loss: What rounding costs a table whose lengths go far beyond the robot, if that explains more than
+            the bound; None otherwise.
     """
 
     samples: int
@@ -55,13 +68,24 @@ class TableCheck:
     units: dict[str, float]
     shares: dict[str, float]
     snapped: bool
+    loss: str | None = None
 
     @property
-    def agrees(self) -> bool:
+    def within(self) -> bool:
         """Whether every sample is within its bound."""
         return all(share <= 1.0 for share in self.shares.values())
 
+    @property
+    def agrees(self) -> bool:
+        """Whether all is rounding and snapping, be it the rounding of the table's own lengths."""
+        return self.within or self.loss is not None
+
     def __str__(self) -> str:
+        if self.loss is not None:
+            return (
+                f"the table LOSES {self.metres * 1e3:.2g} mm and {self.radians:.2g} rad to rounding on"
+                f" {self.samples} samples: {self.loss}"
+            )
         bound = "rounding and what was snapped" if self.snapped else "rounding"
         figures = self.shares if self.snapped else self.units
         unit = "of the bound" if self.snapped else "in eps*scale"
@@ -90,30 +114,77 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
     columns = list(table.coupling.v_index(tree))
     own_v, own_a = samples.v[:, columns], samples.a[:, columns]
     motion = relative_motion(oracle, tree, table, samples)
-    size = _sizes(tree, table, samples)
-    metres, radians = table.tolerance(own_q)
     T = table.placement(own_q)
-    off = np.linalg.norm(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1)
-    turn = rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3])
-    J = _split(np.abs(table.jacobian(own_q) - motion.jacobian[..., columns]).max(axis=-1, initial=0.0))
-    acc = _split(np.abs(table.acceleration(own_q, own_v, own_a) - motion.acceleration))
-    slack = _Slack(table, metres, size)
+    apart = _Apart(
+        np.linalg.norm(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
+        rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3]),
+        np.abs(table.jacobian(own_q) - motion.jacobian[..., columns]),
+        _split(np.abs(table.acceleration(own_q, own_v, own_a) - motion.acceleration)),
+    )
+    size = sizes(tree, table, samples)
+    slack = _Slack(table, own_q, size)
+    units, shares = _measured(apart, size, slack)
+    loss = None
+    own = own_length(table)
+    if table.rows and max(shares.values()) > 1.0 and (own > size.reach).any():
+        _, longer = _measured(apart, size.of_length(own), slack)
+        loss = _loss(table) if max(longer.values()) <= 1.0 else None
+    worst = (float(apart.metres.max(initial=0.0)), float(apart.radians.max(initial=0.0)))
+    return TableCheck(len(own_q), *worst, units, shares, bool(table.snap and table.snap.changes), loss)
+
+
+def own_length(table: DHTable) -> float:
+    """Metres: all lengths of a table, base and tool included."""
+    return table.span + float(np.linalg.norm(table.base[:3, 3]))
+
+
+def _loss(table: DHTable) -> str:
+    """Why a table loses digits, how many, and what to do."""
+    length, cell, joint = max(
+        (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
+    )
+    tilts = [abs(math.sin(row.alpha)) for row in table.rows if row.alpha not in (0.0, math.pi)]
+    tilt = math.asin(min(tilts, default=1.0))
+    snap = f"take --snap {10.0 ** math.ceil(math.log10(tilt)):.0e}, or " if tilt <= LARGEST_TOLERANCE else ""
+    return (
+        f"{cell} of {joint} is {length:.3g} m, and eps times that is {_EPS * length * 1e3:.2g} mm;"
+        f" {snap}take Hayati rows"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Apart:
+    """How far a table is from Pinocchio on each sample: (n,), (n,), (n, 6, columns), two of (n,)."""
+
+    metres: FloatArray
+    radians: FloatArray
+    jacobian: FloatArray
+    acceleration: tuple[FloatArray, FloatArray]
+
+
+def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, float], dict[str, float]]:
+    """The worst of each quantity in eps * scale, and over the bound."""
     rates = size.rates**2 + size.accelerations
-    one = np.ones_like(off)
-    pairs: dict[str, tuple[tuple[FloatArray, FloatArray, FloatArray], ...]] = {
-        "placement": ((off, size.reach, metres), (turn, one, radians)),
-        "jacobian": ((J[0], size.reach + size.slides, slack.jacobian), (J[1], one, slack.turn * one)),
+    one = np.ones_like(apart.metres)
+    columns = size.turning + size.sliding
+    J_linear, J_angular = apart.jacobian[:, :3].max(axis=1), apart.jacobian[:, 3:].max(axis=1)
+    reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
+    pairs: dict[str, tuple[tuple[FloatArray, FloatArray, FloatArray | float], ...]] = {
+        "placement": ((apart.metres, size.reach, slack.metres), (apart.radians, one, slack.turn)),
+        "jacobian": (
+            (J_linear, size.turning * reach + size.sliding, slack.jacobian[:, None] * columns),
+            (J_angular, size.turning * one[:, None], slack.turn * columns),
+        ),
         "acceleration": (
-            (acc[0], (size.reach + size.slides) * rates, slack.acceleration * rates),
-            (acc[1], rates, 4.0 * slack.turn * rates),
+            (apart.acceleration[0], (size.reach + slides) * rates, slack.acceleration * rates),
+            (apart.acceleration[1], rates, 4.0 * slack.turn * rates),
         ),
     }
     units, shares = dict[str, float](), dict[str, float]()
     for name, halves in pairs.items():
         units[name] = max(_worst(x, scale * _EPS) for x, scale, _ in halves)
-        shares[name] = max(_worst(x, scale * size.rounding + allowed) for x, scale, allowed in halves)
-    worst = (float(off.max(initial=0.0)), float(turn.max(initial=0.0)))
-    return TableCheck(len(own_q), *worst, units, shares, bool(table.snap and table.snap.changes))
+        shares[name] = max(_worst(x, (scale.T * size.rounding).T + allowed) for x, scale, allowed in halves)
+    return units, shares
 
 
 def _worst(found: FloatArray, unit: FloatArray | float) -> float:
@@ -159,45 +230,63 @@ def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples
 
 
 @dataclass(frozen=True, slots=True)
-class _Sizes:
-    """What rounding is measured by: (n,) metres, sums of rates, and the count of roundings times eps.
+class Sizes:
+    """What rounding is measured by.
 
-    `slides` is 1 where a joint slides: its column z is of size one, however short the robot is.
+    Attributes:
+        reach: (n,) metres: the ways from the root to both ends.
+        turning: (columns,) the sum of the multipliers with which a coordinate turns joints on these ways.
+        sliding: Likewise, slides.
+        rates: (n,) the sum of all joints' rates, rad/s and m/s.
+        accelerations: (n,) likewise.
+        rounding: (n,) the count of roundings times eps, an angle being itself rounded; and the tilts that a
+            table leaves out as rounding (`urdfkin.dh.noise`).
     """
 
     reach: FloatArray
-    slides: float
+    turning: FloatArray
+    sliding: FloatArray
     rates: FloatArray
     accelerations: FloatArray
-    rounding: float
+    rounding: FloatArray
+
+    def of_length(self, metres: float) -> Sizes:
+        """The same for a table of that length."""
+        return replace(self, reach=np.maximum(self.reach, metres))
 
 
-def _sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> _Sizes:
+def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
     """Everything from the root to either end counts: Pinocchio goes there and back."""
     n = len(samples.q)
-    reach, rates, accelerations, joints = np.zeros(n), np.zeros(n), np.zeros(n), 0
-    slides = tilt = 0.0
+    reach, rates, accelerations, angles = np.zeros((4, n))
+    names, joints, tilt = table.joint_names, 0, 0.0
+    weights = {True: np.zeros(len(names)), False: np.zeros(len(names))}
     for link in {tree.frame_link(table.base_frame), tree.frame_link(table.tip_frame)}:
         for i in tree.path(link):
             joint = tree.joints[i]
             joints += 1
             tilt += joint.tilt
             reach += float(np.linalg.norm(joint.T_parent_joint[:3, 3]))
-            factor = abs(joint.mimic.multiplier) if joint.mimic else 1.0
+            factor, offset, leader = 1.0, 0.0, joint.name
+            if (rule := joint.mimic) is not None:
+                factor, offset, leader = abs(rule.multiplier), abs(rule.offset), rule.leader
             v_at, q_at = tree.v_index[i], tree.q_index[i]
             rates += factor * np.abs(samples.v[:, v_at : v_at + joint.kind.nv]).sum(axis=-1)
             accelerations += factor * np.abs(samples.a[:, v_at : v_at + joint.kind.nv]).sum(axis=-1)
-            if joint.kind.has_axis and not joint.kind.turns:
-                slides = 1.0
-            if not joint.kind.turns:
-                offset = abs(joint.mimic.offset) if joint.mimic else 0.0
-                reach += offset + factor * np.abs(samples.q[:, q_at : q_at + joint.kind.nq]).sum(axis=-1)
-    # A table in strict rows may be far longer than the robot, and rounds accordingly.
-    reach = np.maximum(reach, table.span + float(np.linalg.norm(table.base[:3, 3])))
+            value = offset + factor * np.abs(samples.q[:, q_at : q_at + joint.kind.nq]).sum(axis=-1)
+            if joint.kind.turns:
+                angles += value
+            elif joint.kind.nq:
+                reach += value
+            if leader in names:
+                weights[joint.kind.turns][names.index(leader)] += factor
+    own = own_length(table)
+    reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
     # An axis that Pinocchio takes for another turns each factor by twice the tilt (`verification.bounds`), of
     # which the acceleration seen from the base has four.
-    rounding = _EPS * (8.0 + 8.0 * (joints + len(table.rows))) + 8.0 * tilt
-    return _Sizes(reach, slides, rates, accelerations, rounding)
+    left = left_out(chain(tree, table.tip_frame, table.base_frame)) + 8.0 * tilt
+    rounding = _EPS * (8.0 + 8.0 * (joints + len(table.rows)) + angles) + left
+    return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 
 class _Slack:
@@ -208,12 +297,14 @@ class _Slack:
     by twice that. Angular terms z x z change by twice the turn.
     """
 
-    def __init__(self, table: DHTable, metres: FloatArray, size: _Sizes) -> None:
-        snapped = table.snap is not None
-        self.turn = table.snap.radians if table.snap is not None else 0.0
-        shift = metres if snapped else np.zeros_like(metres)
-        self.jacobian = self.turn * (size.reach + 1.0) + 2.0 * shift
-        self.acceleration = 2.0 * self.turn * (size.reach + 2.0) + 4.0 * shift
+    def __init__(self, table: DHTable, own_q: FloatArray, size: Sizes) -> None:
+        self.turn, self.metres = 0.0, np.zeros(len(own_q))
+        if table.snap is not None:
+            values = table.coupling.values(own_q)
+            by_name = {row.joint: values[:, i] for i, row in enumerate(table.rows)}
+            self.turn, self.metres = table.snap.radians, self.metres + table.snap.bound(by_name)
+        self.jacobian = self.turn * (size.reach + 1.0) + 2.0 * self.metres
+        self.acceleration = 2.0 * self.turn * (size.reach + 2.0) + 4.0 * self.metres
 
 
 def _split(six: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -122,8 +122,25 @@ def errors(poses: FloatArray, wanted: FloatArray, scale: float) -> FloatArray:
     return np.concatenate([wanted[:, :3, 3] - poses[:, :3, 3], scale * turn], axis=-1).ravel()
 
 
-def fit_cells(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> Model:
-    """The smallest and fewest changes of cells with which the table is the URDF."""
+def fit_cells(
+    model: Model,
+    values: FloatArray,
+    wanted: FloatArray,
+    scale: float,
+    cells_of: FloatArray,
+    *,
+    free: bool = True,
+) -> Model:
+    """The smallest and fewest changes of cells with which the table is the URDF.
+
+    Args:
+        model: The table.
+        values: (s, n) the URDF's joint values.
+        wanted: (s, 4, 4) its tip there.
+        scale: Metres that a radian counts as much as.
+        cells_of: (n, 5) which cells may change: 1 or 0.
+        free: Whether base, tool and offsets may, too.
+    """
     start, best, best_size = model, model, np.inf
     for _ in range(_ROUNDS):
         poses, freedoms, cells = columns(model, values, scale)
@@ -133,11 +150,13 @@ def fit_cells(model: Model, values: FloatArray, wanted: FloatArray, scale: float
             best, best_size = model, size
         elif size > 2.0 * best_size or size <= 1e-14 * scale * len(error):
             break
+        cells = cells * cells_of.ravel()
+        freedoms = freedoms if free else np.zeros_like(freedoms)
         change = _sparse(model, start, freedoms, cells, error, scale)
         # Axes that nearly coincide let two offsets grow against each other for nothing: cut those off.
-        free = np.linalg.lstsq(freedoms, error - cells @ change, rcond=1e-8)[0]
-        shorten = min(1.0, 0.5 * scale / max(float(np.abs(free).max()), 1e-300))
-        model = moved(model, np.asarray(free * shorten, np.float64), scale, change * shorten)
+        given = np.linalg.lstsq(freedoms, error - cells @ change, rcond=1e-8)[0]
+        shorten = min(1.0, 0.5 * scale / max(float(np.abs(given).max()), 1e-300))
+        model = moved(model, np.asarray(given * shorten, np.float64), scale, change * shorten)
     return best
 
 
@@ -145,7 +164,7 @@ def _sparse(
     model: Model, start: Model, freedoms: FloatArray, cells: FloatArray, error: FloatArray, scale: float
 ) -> FloatArray:
     """Changes of cells that take what the freedoms cannot, the sum with those so far having few entries."""
-    Q, _ = np.linalg.qr(freedoms)
+    Q = _span(freedoms)
     cells_left = cells - Q @ (Q.T @ cells)
     in_metres = np.array([scale, 1.0, 1.0, scale, scale])
     so_far = ((model.cells - start.cells) * in_metres).ravel()
@@ -159,6 +178,20 @@ def _sparse(
         weights = np.abs(total) + 1e-9 * scale
         weights[4::5] *= 0.5
     return np.asarray(total - so_far, np.float64)
+
+
+def _span(freedoms: FloatArray) -> FloatArray:
+    """An orthonormal basis of what the freedoms can do; no column where there are none."""
+    return np.linalg.qr(freedoms)[0] if freedoms.any() else np.zeros((len(freedoms), 0))
+
+
+def hidden_cells(model: Model, values: FloatArray, scale: float) -> list[tuple[int, int]]:
+    """(row, number of the cell) for which the freedoms can stand in, to a millionth of the cell's effect."""
+    _, freedoms, cells = columns(model, values, scale)
+    Q = _span(freedoms)
+    left = np.linalg.norm(cells - Q @ (Q.T @ cells), axis=0)
+    seen = np.flatnonzero(left <= 1e-6 * np.linalg.norm(cells, axis=0))
+    return [(int(one) // len(CELLS), int(one) % len(CELLS)) for one in seen]
 
 
 def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | None = None) -> Model:

@@ -1,10 +1,13 @@
-"""A comparison in words: the verdict, the freedoms that were fitted, the cells that differ."""
+"""A comparison in words: the verdict, what was fitted, the cells that differ."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
-from urdfkin.dh.compare.compare import Comparison
+from urdfkin.dh.compare.result import CellDifference, Comparison, TakenUp
 from urdfkin.dh.elements import nearest_twelfth
 from urdfkin.dh.export.terminal import aligned
 from urdfkin.dh.export.words import added, pose_lines
@@ -14,26 +17,12 @@ from urdfkin.dh.units import Units
 
 def comparison_text(found: Comparison, units: Units) -> str:
     """Lines for a terminal, the last one ended."""
-    table = found.reference
-    path = f"{table.robot}, {table.base_frame} to {table.tip_frame}"
-    off = f"the tip is off by at most {found.metres * 1e3:.3g} mm and {found.radians:.3g} rad"
-    verdict = "agrees exactly" if found.exact else "agrees" if found.agrees else "DIFFERS"
-    lines = [
-        f"The table {verdict}: {path}: {off}",
-        f"({found.samples} samples, base, tool and joint offsets fitted).",
-    ]
-    if not found.differences:
-        lines.append("Every cell is the URDF's.")
-    else:
-        body = [["row", "joint", "cell", "table", "URDF", "difference", "tip [mm]"]]
-        for one in found.differences:
-            write = units.length if one.cell in ("a", "d") else units.angle
-            texts = [write(one.reference), write(one.urdf), write(one.difference), f"{one.tip * 1e3:.3g}"]
-            body.append([str(one.row + 1), one.joint, one.cell, *texts])
-        lines += ["", f"Cells that differ ({units.length_name}, {units.angle_name}):", *aligned(body)]
-    if found.residual > 1e-9 * max(table.span, 1.0):
+    lines = [*_verdict(found), *_cells(found, units)]
+    if found.residual > 1e-9 * found.reach:
         lines.append(f"No change of cells explains the URDF: {found.residual * 1e3:.3g} mm are left.")
-    fine = resolution(found)
+        if not found.fitted:
+            lines.append("Its frames may stand elsewhere: without --no-fit, base and tool are fitted.")
+    table, fine = found.reference, resolution(found)
     moved = [
         f"  {row.joint}: {added('-q' if sense < 0 else 'q', shown_offset(offset, row, fine, units))}"
         for row, sense, offset in zip(table.rows, found.senses, found.offsets, strict=True)
@@ -48,10 +37,87 @@ def comparison_text(found: Comparison, units: Units) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _verdict(found: Comparison) -> list[str]:
+    """What the table is, with what was fitted and without."""
+    table = found.reference
+    path = f"{table.robot}, {table.base_frame} to {table.tip_frame}"
+    verdict = "agrees exactly" if found.exact else "agrees" if found.agrees else "DIFFERS"
+    off = _off(found.metres, found.radians)
+    if found.as_written:
+        return [f"The table {verdict} as it is written: {path}: {off}", f"({found.samples} samples)."]
+    if not found.fitted:
+        return [
+            f"The table {verdict}: {path}: {off}",
+            f"({found.samples} samples, nothing fitted: base, tool and joint variables as written).",
+        ]
+    fine = resolution(found)
+    ends = [
+        f"{what} {taken.metres * 1e3:.3g} mm and {taken.radians:.3g} rad"
+        for what, taken in (("the base", found.base), ("the tool", found.tool))
+        if _is_taken(taken, found)
+    ]
+    zeros = sum(abs(offset) > fine for offset in found.offsets)
+    if zeros:
+        ends.append(f"the zeros of {zeros} joint{'s' if zeros > 1 else ''} (below)")
+    reversed_ = sum(sense < 0 for sense in found.senses)
+    if reversed_:
+        ends.append(
+            f"the way {reversed_} joint{'s' if reversed_ > 1 else ''} count{'s' * (reversed_ == 1)} (below)"
+        )
+    once = " once base, tool and joint offsets are fitted" if found.agrees and ends else ""
+    fitted = "" if found.agrees else ", base, tool and joint offsets fitted"
+    lines = [f"The table {verdict}{once}: {path}: {off}", f"({found.samples} samples{fitted})."]
+    lines.append(f"As it is written {_off(found.written_metres, found.written_radians)}.")
+    if ends:
+        lines.append(f"Fitting gave {', '.join(ends)}; --no-fit keeps to what is written.")
+    return lines
+
+
+def _off(metres: float, radians: float) -> str:
+    return f"the tip is off by at most {metres * 1e3:.3g} mm and {radians:.3g} rad"
+
+
+def _is_taken(taken: TakenUp, found: Comparison) -> bool:
+    return taken.metres > found.rounding * found.reach or taken.radians > found.rounding
+
+
+def _cells(found: Comparison, units: Units) -> list[str]:
+    """The cells that differ, those that nobody can tell, and those that could be meant instead."""
+    unit = f"({units.length_name}, {units.angle_name})"
+    lines = []
+    if found.differences:
+        lines += ["", f"Cells that differ {unit}:", *_table(found.differences, units)]
+        rounded = sum(one.is_rounding for one in found.differences)
+        if rounded:
+            all_ = "All" if rounded == len(found.differences) else f"{rounded} of {len(found.differences)}"
+            lines.append(f"{all_} within the last digit that the table gives (*).")
+    elif found.as_written:
+        lines.append("Every cell is the URDF's.")
+    elif found.exact:
+        lines.append("No cell differs that can be told from what was fitted.")
+    if found.hidden and not found.as_written:
+        cells = ", ".join(f"{cell}{row + 1}" for row, cell in found.hidden)
+        lines.append(f"Base, tool and offsets stand in for {cells}: these were not compared.")
+    if {(one.row, one.cell) for one in found.instead} - {(one.row, one.cell) for one in found.differences}:
+        lines += ["", f"Without fitting, these cells would have to change {unit}:"]
+        lines += _table(found.instead, units)
+    return lines
+
+
+def _table(cells: Sequence[CellDifference], units: Units) -> list[str]:
+    body = [["row", "joint", "cell", "table", "URDF", "difference", "tip [mm]"]]
+    for one in cells:
+        write = units.length if one.cell in ("a", "d") else units.angle
+        texts = [write(one.reference), write(one.urdf), write(one.difference), f"{one.tip * 1e3:.3g}"]
+        star = "*" if one.is_rounding else ""
+        body.append([str(one.row + 1), one.joint, one.cell + star, *texts])
+    return aligned(body)
+
+
 def resolution(found: Comparison) -> float:
     """A power of ten below which fitted numbers only reflect how well the table fits."""
-    error = max(found.metres / max(found.reference.span, 1e-9), found.radians, 1e-12)
-    return float(10.0 ** np.ceil(np.log10(2.0 * error)))
+    error = max(found.metres / found.reach, found.radians, 1e-12)
+    return float(10.0 ** math.ceil(math.log10(2.0 * error)))
 
 
 def shown_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:

@@ -31,6 +31,9 @@ def to_mapping(table: DHTable) -> dict[str, Any]:
                 for change in snap.changes
             ],
         }
+    elsewhere = [name for name in table.joint_names if name not in {row.joint for row in table.rows}]
+    if elsewhere:
+        data["coordinates"] = elsewhere
     data["rows"] = [_row(row) for row in table.rows]
     return data
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
+from urdfkin.dh.elements import EPS
 from urdfkin.dh.export.code import header, is_coupled, numbers, plain
 from urdfkin.dh.row import Convention, DHRow
+from urdfkin.dh.snapping import LARGEST_TOLERANCE
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
@@ -18,10 +22,18 @@ def write(table: DHTable, units: Units) -> str:
     del units
     where = f"table of {table.robot}"
     if table.has_hayati_rows:
+        longest = max(table.rows, key=lambda row: row.foot)
+        tilt = max(math.hypot(math.sin(row.alpha), math.sin(row.beta)) for row in table.rows if row.beta)
+        snap = 10.0 ** math.ceil(math.log10(tilt))
+        rounding = "snap (--snap), which says what it moves,"
+        if snap <= LARGEST_TOLERANCE:
+            rounding = f"snap={snap:.0e} (--snap {snap:.0e}), which says what it moves,"
         raise InputError(
             "DHRobot has no fifth parameter for the table's Hayati rows",
             where=where,
-            remedy="make the table with near_parallel='strict' or snap=TOL, or use the NumPy form",
+            found=f"beta = {longest.beta:.3g} rad in the row of {longest.joint}",
+            remedy=f"make the table with {rounding} or use the NumPy form; near_parallel='strict' would need"
+            f" d = {longest.foot:.2g} m there, whose rounding is {EPS * longest.foot * 1e3:.1g} mm",
         )
     if is_coupled(table):
         raise InputError(

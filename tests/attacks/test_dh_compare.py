@@ -1,0 +1,211 @@
+"""A comparison says what it fitted, what it did not compare, and which cell is wrong by how much."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as command
+from urdfkin.chain import FrameChain, chain
+from urdfkin.dh import DHTable, dh_table, read_table, units_of
+from urdfkin.dh.compare import compare, comparison_text
+from urdfkin.dh.digits import last_digits
+from urdfkin.dh.read import read_mapping, table_of
+from urdfkin.dh.references import reference_path
+from urdfkin.rotation import exp_rotation
+from urdfkin.tree import KinematicTree
+
+pytestmark = pytest.mark.slow
+
+
+def ur5() -> FrameChain:
+    return urdfkin.load("ur5").chain("tool0", "base")
+
+
+def with_cell(table: DHTable, row: int, **cells: Any) -> DHTable:
+    rows = list(table.rows)
+    rows[row] = replace(rows[row], **cells)
+    return replace(table, rows=tuple(rows))
+
+
+def wrong_d1() -> DHTable:
+    table = read_table(reference_path("ur5"))
+    return with_cell(table, 0, d=table.rows[0].d + 0.01)
+
+
+def test_a_wrong_d1_that_the_base_takes_up_is_told_with_its_millimetres() -> None:
+    found = compare(ur5(), wrong_d1())
+    assert found.agrees  # with a base fitted, it does
+    assert not found.as_written
+    assert found.written_metres == pytest.approx(0.01, rel=1e-6)
+    assert found.base.metres == pytest.approx(0.01, rel=1e-6)
+    assert (0, "d") in found.hidden
+    text = comparison_text(found, units_of("radians", "millimetres"))
+    assert "very cell" not in text
+    assert "once base, tool and joint offsets are fitted" in text
+    assert "the base 10 mm" in text
+    assert "stand in for d1" in text
+    assert [(one.row, one.cell) for one in found.instead] == [(0, "d")]
+    assert found.instead[0].difference == pytest.approx(-0.01, rel=1e-6)
+
+
+def test_without_fitting_the_wrong_d1_differs_and_is_named() -> None:
+    found = compare(ur5(), wrong_d1(), fit=False)
+    assert not found.agrees
+    assert [(one.row, one.cell) for one in found.differences] == [(0, "d")]
+    assert found.differences[0].difference == pytest.approx(-0.01, rel=1e-6)
+    assert found.residual <= 1e-12
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize(
+    ("row", "cell"), [(0, "d"), (0, "theta"), (2, "theta"), (3, "d"), (1, "a"), (5, "d")]
+)
+def test_without_fitting_every_wrong_cell_differs(convention: str, row: int, cell: str) -> None:
+    path = ur5()
+    table = dh_table(urdfkin.load("ur5").tree, "tool0", "base", convention, snap=1e-6)
+    right = compare(path, table, fit=False)
+    assert right.agrees
+    wrong = with_cell(table, row, **{cell: getattr(table.rows[row], cell) + 3e-3})
+    found = compare(path, wrong, fit=False)
+    assert not found.agrees
+    assert found.metres > 1e-3 or found.radians > 1e-3
+
+
+def test_only_a_table_that_is_the_urdf_as_written_has_every_cell() -> None:
+    robot = urdfkin.load("panda")
+    table = robot.dh("panda_link8", "panda_link0")
+    found = compare(robot.chain("panda_link8", "panda_link0"), table)
+    assert found.as_written
+    assert "Every cell is the URDF's." in comparison_text(found, units_of())
+    assert found.base.metres == found.base.radians == found.tool.metres == found.tool.radians == 0.0
+
+
+def test_a_turned_tool_is_a_difference_where_nothing_is_fitted() -> None:
+    robot = urdfkin.load("panda")
+    table = robot.dh("panda_link8", "panda_link0")
+    tool = np.array(table.tool)
+    tool[:3, :3] = tool[:3, :3] @ exp_rotation(np.array([0.0, 0.0, 0.5]))
+    found = compare(robot.chain("panda_link8", "panda_link0"), replace(table, tool=tool), fit=False)
+    assert found.metres <= 1e-12
+    assert not found.agrees
+
+
+def test_cells_that_explain_nothing_are_not_blamed() -> None:
+    robot = urdfkin.load("kinova")
+    reference = read_table(reference_path("kinova"))
+    found = compare(robot.chain(reference.tip_frame, reference.base_frame), reference, fit=False)
+    assert not found.agrees
+    assert found.differences == ()
+    text = comparison_text(found, units_of())
+    assert "No change of cells explains the URDF" in text
+    assert "without --no-fit" in text
+
+
+# -- calibrated robots ----------------------------------------------------------------------------------
+
+
+def calibrated(tree: KinematicTree, seed: int, radians: float = 3e-4, metres: float = 2e-4) -> KinematicTree:
+    rng, joints = np.random.default_rng(seed), []
+    for joint in tree.joints:
+        T = np.array(joint.T_parent_joint)
+        if joint.kind.has_axis:
+            T[:3, :3] = T[:3, :3] @ exp_rotation(radians * rng.normal(size=3))
+            T[:3, 3] += metres * rng.normal(size=3)
+        joints.append(replace(joint, T_parent_joint=T))
+    return replace(tree, joints=tuple(joints))
+
+
+CALIBRATED = [(name, seed) for name in ("ur5", "kinova") for seed in range(3)]
+
+
+@pytest.mark.parametrize(("name", "seed"), CALIBRATED)
+def test_a_calibrated_strict_table_is_as_far_off_as_its_hayati_form(name: str, seed: int) -> None:
+    robot = urdfkin.load(name)
+    base, tip = ("base", "tool0") if name == "ur5" else (robot.base_frame, robot.tip_frame)
+    tree, path = calibrated(robot.tree, seed), robot.chain(tip, base)
+    off = {
+        form: compare(path, dh_table(tree, tip, base, near_parallel=form)).metres
+        for form in ("hayati", "strict")
+    }
+    assert 1e-4 < off["hayati"] < 3e-3
+    assert off["strict"] <= 1.5 * off["hayati"]
+
+
+@pytest.mark.parametrize(("name", "seed"), CALIBRATED)
+def test_no_cell_of_a_nominal_table_is_blamed_for_more_than_the_tip_is_off(name: str, seed: int) -> None:
+    robot = urdfkin.load(name)
+    base, tip = ("base", "tool0") if name == "ur5" else (robot.base_frame, robot.tip_frame)
+    nominal = dh_table(robot.tree, tip, base, snap=1e-4)
+    strict = dh_table(calibrated(robot.tree, seed), tip, base, near_parallel="strict")
+    assert max(abs(row.d) for row in strict.rows) > 100.0
+    found = compare(chain(strict.to_tree(), tip, base), nominal)
+    assert found.metres < 3e-3
+    assert found.differences[0].tip <= 2.0 * found.metres
+    assert found.residual <= 1e-9
+
+
+def test_cells_come_in_the_order_of_their_effect() -> None:
+    robot = urdfkin.load("ur5")
+    table = dh_table(calibrated(robot.tree, 1), "tool0", "base")
+    effects = [one.tip for one in compare(ur5(), table).differences]
+    assert len(effects) > 5
+    assert effects == sorted(effects, reverse=True)
+
+
+# -- digits ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("written", "is_rounding"), [("0.095", True), ("0.0947", True), ("0.0950", False), ("0.09480", False)]
+)
+@pytest.mark.parametrize("suffix", [".toml", ".json", ".csv"])
+def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
+    written: str, is_rounding: bool, suffix: str, tmp_path: Path
+) -> None:
+    """UR5's d5 is 0.09465."""
+    rows = [
+        ["0", "pi/2", "0.089159"], ["-0.425", "0", "0"], ["-0.39225", "0", "0"],
+        ["0", "pi/2", "0.10915"], ["0", "-pi/2", written], ["0", "0", "0.0823"],
+    ]  # fmt: skip
+    quoted = [[cell if "pi" not in cell else f'"{cell}"' for cell in row] for row in rows]
+    lists = ", ".join(f"[{', '.join(row)}, 0]" for row in quoted)
+    texts = {
+        ".toml": f'convention = "standard"\nrows = [{lists}]',
+        ".json": f'{{"convention": "standard", "rows": [{lists}]}}',
+        ".csv": "\n".join(
+            ["# convention: standard", "a,alpha,d,theta", *(f"{','.join(row)},0" for row in rows)]
+        ),
+    }
+    file = tmp_path / f"sheet{suffix}"
+    file.write_text(texts[suffix])
+    data = read_mapping(file)
+    found = compare(ur5(), table_of(data, "sheet"), digits=last_digits(data))
+    largest = found.differences[0]
+    assert (largest.row, largest.cell) == (4, "d")
+    assert largest.is_rounding == is_rounding
+    assert ("within the last digit" in comparison_text(found, units_of())) == is_rounding
+
+
+def test_the_kinova_sheet_is_said_to_be_rounded() -> None:
+    done = command("dh", "kinova", "--compare", "kinova")
+    assert "All within the last digit that the table gives (*)." in done.text
+    data = json.loads(command("dh", "kinova", "--compare", "kinova", "--format", "json").text)
+    assert [one["within_last_digit"] for one in data["differences"]] == [True]
+
+
+def test_the_command_knows_no_fit(tmp_path: Path) -> None:
+    file = tmp_path / "wrong.toml"
+    file.write_text(reference_path("ur5").read_text().replace("0.089159", "0.099159"))
+    fitted = command("dh", "ur5", "--compare", str(file))
+    assert fitted.code == 0
+    assert "Every cell" not in fitted.text
+    assert "10 mm" in fitted.text
+    assert command("dh", "ur5", "--compare", str(file), "--no-fit").code == 1
+    assert command("dh", "ur5", "--compare", "ur5", "--no-fit").code == 0

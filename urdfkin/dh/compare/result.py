@@ -1,0 +1,115 @@
+"""What a comparison found: cells, what was fitted, and how far the tip is off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from urdfkin.dh.elements import EPS
+from urdfkin.dh.table import DHTable
+
+
+@dataclass(frozen=True, slots=True)
+class CellDifference:
+    """One cell that is not the URDF's.
+
+    Attributes:
+        row: Index of the row in the reference table, from 0.
+        joint: Name of the joint in the URDF.
+        cell: "a", "alpha", "d", "theta" or "beta".
+        reference: The table's value, metres or radians.
+        urdf: What it would have to be.
+        tip: Metres: how far this cell alone moves the tip, at the worst of the samples.
+        last_digit: Half a unit of the last digit that the table's file gives, metres or radians; 0 where the
+            value was written exactly, or how it was written is not known.
+    """
+
+    row: int
+    joint: str
+    cell: str
+    reference: float
+    urdf: float
+    tip: float
+    last_digit: float = 0.0
+
+    @property
+    def difference(self) -> float:
+        """URDF less reference, metres or radians."""
+        return self.urdf - self.reference
+
+    @property
+    def is_rounding(self) -> bool:
+        """Whether the table could not have said it better with the digits that it gives."""
+        return abs(self.difference) <= self.last_digit * (1.0 + 1e-6)
+
+
+@dataclass(frozen=True, slots=True)
+class TakenUp:
+    """What fitting gave to one end of a table, away from what is written: metres and radians."""
+
+    metres: float
+    radians: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """What a comparison found.
+
+    Attributes:
+        reference: The table, its joints named as in the URDF, with base, tool, senses and offsets fitted:
+            its `placement` takes the URDF's coordinates.
+        reach: Metres: the robot's, by which rounding and angles are measured.
+        fitted: Whether base, tool, senses and offsets were free.
+        senses: Of each joint: the table's variable is sense * q + offset.
+        offsets: Likewise, radians or metres.
+        base: What fitting gave to the base.
+        tool: What it gave to the tool.
+        metres: How far the tip is off at the worst of the samples, with what was fitted.
+        radians: Likewise its orientation.
+        written_metres: Likewise the tip's distance with the table exactly as it is written.
+        written_radians: Likewise its orientation.
+        differences: The cells that differ, the largest effect at the tip first.
+        instead: The cells that would have to change if nothing were fitted; none if that does not explain
+            the URDF, or nothing but the cells of `differences` is to be explained.
+        hidden: (row, cell) that base, tool and offsets stand in for: no sample can tell these.
+        residual: Metres left when the cells are the URDF's: rounding, unless no cells explain the URDF.
+        tolerance: Metres up to which the two are said to agree.
+        samples: How many configurations were tried.
+    """
+
+    reference: DHTable
+    reach: float
+    fitted: bool
+    senses: tuple[int, ...]
+    offsets: tuple[float, ...]
+    base: TakenUp
+    tool: TakenUp
+    metres: float
+    radians: float
+    written_metres: float
+    written_radians: float
+    differences: tuple[CellDifference, ...]
+    instead: tuple[CellDifference, ...]
+    hidden: tuple[tuple[int, str], ...]
+    residual: float
+    tolerance: float
+    samples: int
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the tip is never off by more than the tolerance, nor by its turn times the reach."""
+        return self.metres <= self.tolerance and self.radians * self.reach <= self.tolerance
+
+    @property
+    def rounding(self) -> float:
+        """Radians, and metres for each metre of the robot's reach, that count as rounding."""
+        return 100.0 * EPS * (1.0 + len(self.reference.rows))
+
+    @property
+    def exact(self) -> bool:
+        """Whether rounding explains all of the difference."""
+        return self.metres <= self.rounding * self.reach and self.radians <= self.rounding
+
+    @property
+    def as_written(self) -> bool:
+        """Whether the table is the URDF's as it is written, base, tool and offsets too, to rounding."""
+        return self.written_metres <= self.rounding * self.reach and self.written_radians <= self.rounding
