@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -76,6 +76,11 @@ class Tally:
             first,
             (min(self.bounds[0], other.bounds[0]), max(self.bounds[1], other.bounds[1])),
         )
+
+    def beside(self, other: Tally) -> Tally:
+        """The tally of the same samples and more frames."""
+        joined = replace(self, by_frame=()) + replace(other, by_frame=())
+        return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
         """The disagreement that `percent` of the results stay below, to a histogram bin (26 %)."""
