@@ -84,13 +84,23 @@ class Tally:
 
     def percentile(self, percent: float) -> float:
         """The disagreement that `percent` of the results stay below, to a histogram bin (26 %)."""
-        counts = np.cumsum(self.histogram)
-        if not counts[-1]:
-            return 0.0
-        bin_ = int(np.searchsorted(counts, counts[-1] * percent / 100.0))
-        if bin_ == 0:
-            return 0.0
-        return float(min(HISTOGRAM_EDGES[min(bin_, len(HISTOGRAM_EDGES) - 1)], self.worst))
+        return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
+
+
+def percentile(
+    histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
+) -> float:
+    """The disagreement that `percent` of a histogram's results stay below, to a bin."""
+    counts = np.cumsum(histogram)
+    if not counts[-1]:
+        return 0.0
+    bin_ = int(np.searchsorted(counts, counts[-1] * percent / 100.0))
+    return float(min(edges[min(bin_, len(edges) - 1)], worst)) if bin_ else 0.0
+
+
+def histogram_bin(units: float, edges: Sequence[float] | FloatArray) -> int:
+    """Which place of a histogram counts a disagreement."""
+    return int(np.searchsorted(edges, units, side="right"))
 
 
 def _before(case: WorstCase, other: WorstCase) -> bool:
