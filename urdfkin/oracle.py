@@ -11,6 +11,7 @@ from __future__ import annotations
 import importlib.metadata
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -144,7 +145,7 @@ class Oracle:
         return enumerate(self.configurations(q, base) if self._model.nv else ())
 
     def _frame(self, name: str) -> int:
-        """Pinocchio's index of a frame; it answers `nframes` for a name it does not know."""
+        """Pinocchio's index of a frame."""
         types, tree = self._pin.FrameType, self._tree
         link = tree.frame_link(name)
         own, kind = tree.links[link], types.BODY
@@ -153,10 +154,15 @@ class Oracle:
         if link > 0 and name not in (own, f"link:{own}"):
             joint = tree.joints[link - 1]
             own, kind = joint.name, types.JOINT if joint.kind.nv else types.FIXED_JOINT
-        index = int(self._model.getFrameId(own, kind))
-        if index == self._model.nframes:
+        if (index := self._frame_ids.get((own, kind))) is None:
             raise OracleError("Pinocchio has no such frame", where=tree.name, found=repr(name))
         return index
+
+    @cached_property
+    def _frame_ids(self) -> dict[tuple[str, Any], int]:
+        """Pinocchio's frames by name and type; `getFrameId` looks at each of them every time it is asked."""
+        frames = list(enumerate(self._model.frames))
+        return {(frame.name, frame.type): i for i, frame in reversed(frames)}
 
     # -- quantities ----------------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ from urdfkin.origin import Origin
 from urdfkin.recursion.announcing import load_kernels
 from urdfkin.robot import Robot
 from urdfkin.sources import Source, as_word, is_xacro, read_source
+from urdfkin.validation import memory
 from urdfkin.validation.answer import Failure, failure, traced, unforeseen
 from urdfkin.validation.chunk import Subject, chunks
 from urdfkin.validation.engine import Engine, Here, OnExecutor, Task
@@ -70,7 +71,10 @@ def validate(
     many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started, begin = datetime.datetime.now(datetime.UTC), time.perf_counter()
     subjects, unread = _subjects(many, mimic, root_joint, xacro_args)
-    tasks = [Task(i, chunk) for i, subject in enumerate(subjects) for chunk in chunks(subject, samples, seed)]
+    most = memory.share(jobs) if executor is None else None  # an executor's machines know their own
+    tasks = [
+        Task(i, chunk) for i, subject in enumerate(subjects) for chunk in chunks(subject, samples, seed, most)
+    ]
     gathering, interrupted = Gathering(subjects, tasks, progress), False
     for task in tasks:
         if task.robot in unread and task.chunk.index == 0:

@@ -9,8 +9,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from urdfkin.oracle import Oracle, OracleError
 from urdfkin.origin import Origin
 from urdfkin.robot import Robot
 from urdfkin.tree import KinematicTree
+from urdfkin.validation import memory
 from urdfkin.validation.clock import Clock
 from urdfkin.validation.comparing import tallies
 from urdfkin.validation.portrait import Portrait
@@ -80,12 +80,21 @@ class Subject:
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Which samples of which robot."""
+    """Which samples of which robot.
+
+    Attributes:
+        subject: The robot.
+        seed: What samples are drawn from, with the index.
+        index: The chunk's place among the robot's.
+        samples: Random configurations.
+        memory: Bytes that the robot may take where it is run; None: half of what is free there.
+    """
 
     subject: Subject
     seed: int
     index: int
     samples: int
+    memory: int | None = field(default=None, compare=False)
 
     @property
     def configurations(self) -> int:
@@ -116,23 +125,33 @@ class ChunkResult:
     portrait: Portrait | None
 
 
-def chunks(subject: Subject, samples: int, seed: int) -> Iterator[Chunk]:
+def chunks(subject: Subject, samples: int, seed: int, most: int | None = None) -> Iterator[Chunk]:
     """The chunks of one robot; at least one, for the special configurations."""
     for index in range(max(1, -(-samples // CHUNK_SAMPLES))):
-        yield Chunk(subject, seed, index, min(CHUNK_SAMPLES, samples - index * CHUNK_SAMPLES))
+        yield Chunk(subject, seed, index, min(CHUNK_SAMPLES, samples - index * CHUNK_SAMPLES), most)
 
 
-@lru_cache(maxsize=2)
-def _loaded(subject: Subject) -> tuple[Robot, Oracle]:
-    # The chunks of a robot come one after another; a worker need not read it again for each.
-    robot = subject.load()
-    return robot, Oracle(robot.urdf, robot.tree, root_joint=robot.root_joint)
+#: The robot that was checked last. The chunks of a robot come one after another; a worker need not read it
+#: again for each, and two large ones at a time would be too much.
+_kept: dict[Subject, tuple[Robot, Oracle]] = {}
+
+
+def _loaded(chunk: Chunk) -> tuple[Robot, Oracle]:
+    if (found := _kept.get(chunk.subject)) is not None:
+        return found
+    _kept.clear()
+    robot = chunk.subject.load()
+    most = memory.share() if chunk.memory is None else chunk.memory
+    memory.demand(robot.tree, CHUNK_SAMPLES + SPECIAL, most)
+    found = robot, Oracle(robot.urdf, robot.tree, root_joint=robot.root_joint)
+    _kept[chunk.subject] = found
+    return found
 
 
 def run_chunk(chunk: Chunk) -> ChunkResult:
     """Compute every quantity of every frame in all references, and compare."""
     begin, clock = time.perf_counter(), Clock()
-    robot, oracle = _loaded(chunk.subject)
+    robot, oracle = _loaded(chunk)
     portrait = Portrait.of(robot, oracle) if chunk.index == 0 else None
     clock.read = time.perf_counter() - begin
     found = tallies(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, clock)

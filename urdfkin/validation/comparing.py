@@ -28,7 +28,7 @@ from urdfkin.verification.bounds import Bound, Quantity
 from urdfkin.verification.magnitudes import magnitudes
 from urdfkin.verification.sampling import Samples
 
-#: How large a block's Jacobians may be, bytes; some ten arrays of this size are there at a time.
+#: How large an array of a block may be, bytes; some ten arrays of this size are there at a time.
 BLOCK_BYTES = 32 * 2**20
 
 
@@ -44,11 +44,16 @@ def tallies(robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: 
     """
     found: dict[Key, Tally] = {}
     work = robot, oracle, x, first_sample, clock
-    for frames in blocks(len(robot.all_frames), len(x.q) * 48 * max(1, robot.nv)):
+    for frames in blocks(len(robot.all_frames), frame_bytes(len(x.q), robot.nv)):
         for key, part in _Block(*work, frames).tallies():
             found[key] = found[key].beside(part) if key in found else part
     screws = reduce(Tally.beside, _Screws(*work).tallies())
     return found | {(Quantity.SCREWS, Reference.WORLD.name.lower()): screws}
+
+
+def frame_bytes(samples: int, rates: int) -> int:
+    """The size of the largest array of a frame: its Jacobians, or its placements where few rates move it."""
+    return samples * 8 * max(16, 6 * rates)
 
 
 def blocks(count: int, size: int) -> Iterator[slice]:
@@ -149,7 +154,7 @@ class _Screws(_Work):
         theirs = self.clock.theirs(self.oracle.screws, x.q).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
-        for block in blocks(len(moving), len(x.q) * 48 * max(1, tree.nv)):
+        for block in blocks(len(moving), frame_bytes(len(x.q), tree.nv)):
             joints = moving[block]
             width = sum(tree.joints[i].kind.nv for i in joints)
             yield self._block(tree, q_free, joints, theirs[:, column : column + width])
