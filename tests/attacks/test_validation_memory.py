@@ -20,7 +20,7 @@ from urdfkin.validation import chunk as chunk_module
 from urdfkin.validation import comparing, memory
 from urdfkin.validation.campaign import _subject, validate
 from urdfkin.validation.chunk import chunks, run_chunk
-from urdfkin.validation.report import Verdict
+from urdfkin.validation.outcome import Verdict
 
 GB = 10**9
 

@@ -18,7 +18,7 @@ from tests.validation import raising_worker
 from urdfkin.errors import UrdfkinError
 from urdfkin.validation import answer, campaign, engine, workers
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
+from urdfkin.validation.chunk import Chunk, ChunkResult, chunks, run_chunk
 from urdfkin.validation.engine import Here, OnExecutor, Task
 from urdfkin.validation.outcome import Verdict, outcome
 from urdfkin.validation.report import ValidationReport
@@ -227,7 +227,7 @@ def test_an_interrupt_keeps_what_had_finished_and_drops_what_waits(
 
     monkeypatch.setattr(engine, "IN_FLIGHT", 1)
     monkeypatch.setattr(answer, "run_chunk", interrupted)
-    report = validate(ROBOTS, samples=60, **({} if way == "here" else {"executor": Now()}))
+    report = validate(ROBOTS, samples=60, executor=None if way == "here" else Now())
     assert ran[-1] == ("ur5", 1)
     assert report.interrupted
     first, second, third = report.robots
@@ -249,7 +249,7 @@ def test_an_executors_waiting_chunks_are_cancelled_on_an_interrupt() -> None:
                 raise KeyboardInterrupt
             return made[-1]
 
-    tasks = [Task(0, chunk) for chunk in campaign.chunks(campaign._subject("ur5", None, None), 100, 0)]
+    tasks = [Task(0, chunk) for chunk in chunks(campaign._subject("ur5", None, None), 100, 0)]
     with pytest.raises(KeyboardInterrupt):
         OnExecutor(Never()).run(tasks, lambda *_: None)
     assert [future.cancelled() for future in made] == [True, True, False]

@@ -184,8 +184,8 @@ def test_junit_tells_a_failure_from_an_error(monkeypatch: pytest.MonkeyPatch) ->
         root = read(CASES[name][0](monkeypatch))
         case = root.xpath("//testcase[@name='verdict']")
         assert isinstance(case, list)
+        assert isinstance(case[0], etree._Element)
         (outcome,) = case[0]
-        assert isinstance(outcome, etree._Element)
         assert (outcome.tag, outcome.get("type")) == (kind, type_)
     checks = read(CASES["results outside"][0](monkeypatch)).xpath("//failure[@type='disagreement']")
     assert isinstance(checks, list)

@@ -87,7 +87,7 @@ def test_a_run_that_passed_and_does_not_is_a_regression_with_the_reason() -> Non
 
 
 def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_and_is_no_regression() -> None:
-    new = arms()
+    new: Any = arms()
     joint = new["robots"][1]["model"]["joints"][2]
     axis = joint["axis"]
     joint["axis"] = [-x for x in axis]
@@ -102,16 +102,17 @@ def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_and_is_no_regressio
 
 
 def test_a_joint_that_is_gone_or_new_is_told_by_its_name() -> None:
-    new = arms()
+    old: Any = arms()
+    new: Any = arms()
     new["robots"][1]["model"]["joints"][2]["name"] = "other"
-    name = arms()["robots"][1]["model"]["joints"][2]["name"]
+    name = old["robots"][1]["model"]["joints"][2]["name"]
     lines = words(arms(), new)
     assert (False, f"ur5: joint {name}: revolute -> nothing") in lines
     assert (False, "ur5: joint other: nothing -> revolute") in lines
 
 
 def test_a_bound_that_is_wider_for_the_same_joints_is_a_regression() -> None:
-    new = arms()
+    new: Any = arms()
     check = new["robots"][0]["checks"][1]
     check["bound"][1] *= 3.0
     old_words, new_words = (f"{d['robots'][0]['checks'][1]['bound'][1]:g} eps*scale" for d in (arms(), new))

@@ -7,9 +7,7 @@ import signal
 from pathlib import Path
 
 from urdfkin.validation import answer, worker
-from urdfkin.validation.chunk import Chunk, ChunkResult
-
-_run_chunk = answer.run_chunk
+from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 
 
 def _deadly(chunk: Chunk) -> ChunkResult:
@@ -17,7 +15,7 @@ def _deadly(chunk: Chunk) -> ChunkResult:
     if chunk.subject.source == "ur5" and (left := int(path.read_text())):
         path.write_text(str(left - 1))
         os.kill(os.getpid(), signal.SIGSEGV)
-    return _run_chunk(chunk)
+    return run_chunk(chunk)
 
 
 def serve(pipe: int, parent: int) -> None:

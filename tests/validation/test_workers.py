@@ -9,11 +9,11 @@ import pytest
 
 from urdfkin.validation import workers
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.report import Verdict
+from urdfkin.validation.outcome import Verdict
 
 DEADLY = "ur5"
 ROBOTS = ["double_pendulum", DEADLY, "iris_simple"]
-HOW = [{"jobs": 2}, {"jobs": 2, "isolate": True}, {"isolate": True}]
+HOW: list[dict[str, Any]] = [{"jobs": 2}, {"jobs": 2, "isolate": True}, {"isolate": True}]
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from urdfkin.cli.stopping import stoppable
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
-    from urdfkin.validation.campaign import Progress
+    from urdfkin.validation.gathering import Progress
 
 EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 

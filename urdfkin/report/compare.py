@@ -163,8 +163,8 @@ def _tables(source: str, old: Robot, new: Robot) -> Iterator[Change]:
     for base, tip in dict.fromkeys([*before, *after]):
         ends = [compared.get((base, tip), False) for compared in (before, after)]
         if ends[0] != ends[1]:
-            words = ["compared" if end else "" for end in ends]
-            yield Change(source, f"tables from {base} to {tip}", *words, regression=ends[0])
+            was, now = ("compared" if end else "" for end in ends)
+            yield Change(source, f"tables from {base} to {tip}", was, now, regression=ends[0])
 
 
 def _check(
@@ -184,9 +184,9 @@ def _check(
     if grew or _grew(new["worst"], old["worst"], factor):
         yield change(lambda c: f"{units(c['worst'])} eps*scale", grew)
 
-    shares = old["share_of_bound"], new["share_of_bound"]
-    grew = _grew(*shares, factor, _SHARE_FLOOR)
-    if grew or _grew(*reversed(shares), factor, _SHARE_FLOOR):
+    was, now = old["share_of_bound"], new["share_of_bound"]
+    grew = _grew(was, now, factor, _SHARE_FLOOR)
+    if grew or _grew(now, was, factor, _SHARE_FLOOR):
         yield change(lambda c: f"{percent(c['share_of_bound'])} of the bound", grew)
 
 

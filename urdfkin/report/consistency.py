@@ -85,18 +85,18 @@ def _subjects(robot: Robot) -> dict[str, list[str]]:
 
 def _verdict(robot: Robot, samples: int) -> Iterator[str]:
     """The verdict follows from what was compared; what is not verified needs a reason."""
-    verdict, reason = robot["verdict"], robot["reason"]
+    verdict, reason = Verdict(robot["verdict"]), robot["reason"]
     outside = robot["failed"] > 0 or any(chain_disagreement(chain) for chain in robot["chains"])
-    if outside != (verdict == Verdict.DISAGREES):
+    if outside != (verdict is Verdict.DISAGREES):
         yield f"verdict: {verdict}, but {'something lies' if outside else 'nothing lies'} outside its bound"
-    if verdict == Verdict.VERIFIED:
+    if verdict is Verdict.VERIFIED:
         if not robot["results"]:
             yield "verdict: verified, but nothing was compared"
         if reason is not None:
             yield f"verdict: verified, but the reason says {reason}"
         if robot["samples"] != samples:
             yield f"verdict: verified, but on {robot['samples']} of {samples} samples"
-    elif verdict != Verdict.DISAGREES and not reason:
+    elif verdict is not Verdict.DISAGREES and not reason:
         yield f"verdict: {verdict}, but no reason"
     if robot["samples"] > samples:
         yield f"samples: {robot['samples']}, but {samples} were asked for"
