@@ -78,3 +78,79 @@ def test_what_cannot_be_read_is_reported_as_without_processes() -> None:
     assert plain.exit_code == 2
     for how in HOW:
         assert numbers(validate(robots, samples=60, **how)) == numbers(plain)
+
+
+@pytest.mark.slow
+def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A library's process lives on after an interrupt; what hangs in compiled code must not."""
+    monkeypatch.setattr(workers, "WORKER", "tests.validation.sleeping_worker")
+    started: list[Any] = []
+    right = workers._interpreter
+
+    def kept(pipe: int) -> Any:
+        started.append(right(pipe))
+        if len(started) == 2:
+            raise KeyboardInterrupt
+        return started[-1]
+
+    monkeypatch.setattr(workers, "_interpreter", kept)
+    report = validate(["ur5", "panda"], samples=0, isolate=True, jobs=2)
+    assert report.interrupted
+    assert started[0].poll() == -9
+    started[1].kill()
+    started[1].wait()
+
+
+def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(_: int) -> None:
+        raise OSError(24, "Too many open files")
+
+    monkeypatch.setattr(workers, "_interpreter", none)
+    for how in HOW:
+        report = validate(["ur5", "planar_two_link"], samples=60, **how)
+        assert [robot.verdict for robot in report.robots] == [Verdict.NOT_VERIFIED] * 2
+        reason = "no process could be started for it: OSError: [Errno 24] Too many open files"
+        assert {robot.reason for robot in report.robots} == {reason}
+        assert not report.passed
+
+
+@pytest.mark.slow
+def test_what_does_not_start_any_more_is_done_by_those_that_are_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    right, asked = workers._interpreter, 0
+
+    def one(pipe: int) -> Any:
+        nonlocal asked
+        asked += 1
+        if asked == 2:
+            raise OSError(24, "Too many open files")
+        return right(pipe)
+
+    monkeypatch.setattr(workers, "_interpreter", one)
+    for how in HOW[:2]:
+        asked = 0
+        assert validate(["double_pendulum", "planar_two_link"], samples=60, **how).passed
+        assert asked >= 2
+
+
+def test_a_worker_runs_nothing_of_the_current_folder(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    codes: list[list[str]] = []
+
+    class RecordedError(Exception):
+        pass
+
+    def started(command: list[str], **_: object) -> None:
+        codes.append(command)
+        raise RecordedError
+
+    monkeypatch.setattr(workers.subprocess, "Popen", started)
+    monkeypatch.syspath_prepend("")
+    with pytest.raises(RecordedError):
+        workers._interpreter(3)
+    assert codes[0][1] == "-P"
+    path = codes[0][3].partition("sys.path[:] = ")[2].partition("; from")[0]
+    assert "''" not in path
+    assert "site-packages" in path
