@@ -146,7 +146,7 @@ def test_a_worker_runs_nothing_of_the_current_folder(
         codes.append(command)
         raise RecordedError
 
-    monkeypatch.setattr(workers.subprocess, "Popen", started)
+    monkeypatch.setattr("subprocess.Popen", started)
     monkeypatch.syspath_prepend("")
     with pytest.raises(RecordedError):
         workers._interpreter(3)
