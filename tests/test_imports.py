@@ -14,16 +14,16 @@ PACKAGE = Path(__file__).parent.parent / "urdfkin"
 #: Every part of the package, in the order in which they may build on one another: a module imports what
 #: stands in its own row or above it. Imports inside functions count; those for types alone do not.
 LAYERS = (
-    ("errors",),
-    ("rotation", "motion", "equations", "resources", "keeping", "figure"),
+    ("errors", "nearest", "frame_names"),
+    ("rotation", "motion", "equations", "resources", "keeping", "figure", "plain_xml"),
     ("tree", "reference"),
     ("coupling", "followers", "configuration", "chain"),
     ("recursion",),
     ("diagnostics", "urdf"),
     ("dh",),
     ("catalogue", "sources", "origin", "deep_stack"),
-    ("oracle", "verification"),
-    ("checks", "call", "prepared", "manipulator", "tables", "robot"),
+    ("oracle_frames", "oracle_layout", "oracle_base", "oracle", "verification"),
+    ("asked", "checks", "call", "prepared", "manipulator", "tables", "robot"),
     ("loading", "from_table", "checking", "description", "trajectory", "frame_motion"),
     ("judge", "validation"),
     ("plot", "report", "view"),

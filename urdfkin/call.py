@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.checks import Part, bound_of, pinocchios
+from urdfkin.asked import Question
+from urdfkin.checks import Part, axes_of, held_against
 from urdfkin.errors import InputError, NotFiniteError, RangeError
 from urdfkin.recursion.base import STILL_STATE, BaseMotion
 from urdfkin.recursion.plan import IntArray
@@ -28,29 +28,63 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+#: The commands that compute a quantity again.
+_COMMANDS = {
+    Quantity.PLACEMENT: "placement",
+    Quantity.VELOCITY: "velocity",
+    Quantity.JACOBIAN: "jacobian",
+    Quantity.JACOBIAN_RATE: "jacobian-rate",
+    Quantity.ACCELERATION: "acceleration",
+    Quantity.ACCELERATION_BREAKDOWN: "acceleration --explain",
+}
+
 
 class NotVerifiedWarning(UserWarning):
     """Results are handed out that Pinocchio could not check; the message says why."""
 
 
+def _named(frames: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(frames, str):
+        raise InputError("frames are a list of names", found=repr(frames), remedy=f"write [{frames!r}]")
+    return tuple(frames)
+
+
+def _every_link(robot: Robot) -> tuple[str, ...]:
+    return tuple(robot.tree.frame_name(link) for link in range(len(robot.tree.links)))
+
+
 class Call:
-    """One call's inputs as flat batches, and the way back to the caller's shape."""
+    """One call's inputs as flat batches, and the way back to the caller's shape.
+
+    Args:
+        robot: Who is asked.
+        frames: Names; None means every link.
+        reference: A member or its name.
+        base: How the root link moves; None if it stands still.
+        inputs: q, v and a, as far as the quantity needs them.
+        options: What else the call was given, by the method's names for it.
+    """
 
     def __init__(
         self,
         robot: Robot,
-        frames: Sequence[str],
+        frames: Sequence[str] | None,
         reference: Reference | str,
         base: BaseMotion | None,
         *inputs: ArrayLike,
+        **options: object,
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
             raise InputError("base is a BaseMotion or None", found=type(base).__name__)
-        self.robot, self.frames, self.base = robot, tuple(frames), base
+        self.robot, self.base = robot, base
+        self.question = Question(
+            robot.tree.link_frames if frames is None else frames, reference, base, inputs
+        )
+        self.frames = _every_link(robot) if frames is None else _named(frames)
         self.reference = Reference.of(reference)
         self.links = tuple(robot.tree.frame_link(frame) for frame in self.frames)
         self.plan = robot.plan(self.links)
-        self.inputs = inputs
+        self.inputs, self.options = inputs, options
         given = [robot.shaped(x, name) for x, name in zip(inputs, "qva", strict=False)]
         self.shape = self._batch_shape(given)
         self.n = math.prod(self.shape)
@@ -81,19 +115,6 @@ class Call:
         """How many results the call hands out."""
         return self.n * len(self.links)
 
-    @cached_property
-    def flat_base(self) -> BaseMotion | None:
-        """The base with one flat batch axis, for the oracle."""
-        if self.base is None or not self.base.batch_shape:
-            return self.base
-        fields = (self.base.placement, 2), (self.base.velocity, 1), (self.base.acceleration, 1)
-        return BaseMotion(
-            *(
-                np.broadcast_to(x, (*self.shape, *x.shape[-own:])).reshape(self.n, *x.shape[-own:])
-                for x, own in fields
-            )
-        )
-
     def flat(self, out: FloatArray | None, *own: int, every: bool = False) -> FloatArray | None:
         """`out`, for one frame or for every one, as the kernels write it: (n, frames, ...)."""
         if out is None:
@@ -105,7 +126,7 @@ class Call:
                 f"out must be a writable C-contiguous float64 array of shape {wanted}",
                 found=f"{getattr(out, 'dtype', type(out).__name__)} {getattr(out, 'shape', '')}",
             )
-        if any(np.may_share_memory(out, array) for array in (self.q, *self.rates)):
+        if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a: they are read again for the check")
         return out.reshape(self.n, len(self.links), *own)
 
@@ -126,10 +147,18 @@ class Call:
                 self.robot.checked(x, name)
             raise
 
-    def verify(self, quantity: Quantity, results: FloatArray, verify: Verify | None) -> None:
-        """Have (n, frames, ...) results checked and entered in the ledger, or raise VerificationError."""
-        robot, ledger = self.robot, self.robot.ledger
-        wanted = checked_choice(robot.verify if verify is None else verify)
+    def wanted(self, verify: Verify | None) -> Verify:
+        """Which results are to be checked; None leaves it to the robot."""
+        return checked_choice(self.robot.verify if verify is None else verify)
+
+    def verify(self, quantity: Quantity, handed_out: FloatArray, verify: Verify | None) -> None:
+        """Have results checked, in the shape in which the user gets them, and entered in the ledger.
+
+        Raises:
+            VerificationError: Pinocchio computes something else.
+            OracleError: they have another shape than what was asked.
+        """
+        robot, ledger, wanted = self.robot, self.robot.ledger, self.wanted(verify)
         if wanted is False:
             ledger.unchecked(quantity, self.results)
             return
@@ -137,6 +166,7 @@ class Call:
             warnings.warn(f"not verified: {reason}", NotVerifiedWarning, stacklevel=3)
             ledger.unchecked(quantity, self.results, reason)
             return
+        results = self.question.flat(handed_out, axes_of(quantity))
         total, worst = Comparison.of_nothing(), None
         for part in parts(wanted, self.n, results[:1].size):
             comparison, failure = self._compare(quantity, results[part], part)
@@ -151,20 +181,18 @@ class Call:
 
     def part(self, part: slice | IntArray) -> Part:
         """Some of its configurations, for the check."""
-        base = self.flat_base
-        if base is not None and base.batch_shape:
-            base = BaseMotion(base.placement[part], base.velocity[part], base.acceleration[part])
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
-        return Part(self.plan, self.frames, self.reference, self.q[part], rates, base, state)
+        representation = str(self.options.get("representation", ""))
+        asked = self.question.rows(part)
+        return Part(self.plan, self.reference, self.q[part], rates, state, asked, representation)
 
     def _compare(
         self, quantity: Quantity, ours: FloatArray, part: slice | IntArray
     ) -> tuple[Comparison, VerificationError | None]:
         """Hold some of the results against Pinocchio's; the worst of them, if it disagrees."""
         x = self.part(part)
-        theirs = pinocchios(quantity, self.robot.oracle(self.base), x)
-        bound = bound_of(quantity, x)
+        theirs, bound = held_against(quantity, self.robot.oracle(self.base), x, ours)
         comparison = compare(ours, theirs, bound, 2)
         if comparison.agrees:
             return comparison, None
@@ -180,7 +208,7 @@ class Call:
         return comparison, VerificationError(
             quantity,
             self.frames[f],
-            self.reference.name,
+            x.representation or self.reference.name,
             index=self._index(k),
             ours=ours[i, f],
             theirs=theirs[i, f],
@@ -194,17 +222,15 @@ class Call:
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
     def _replay(self, quantity: Quantity, k: int, frame: str) -> str:
-        reference = None if quantity is Quantity.PLACEMENT else self.reference.name.lower()
         values = {name: array[k].tolist() for name, array in zip("qva", (self.q, *self.rates), strict=False)}
-        if self.base is None:
-            command = str(quantity).replace(" ", "-")
-            return replay_line(self.robot.origin, command, frame, reference, values)
-        # The command line has no words for a moving base.
-        base = self.flat_base or self.base
-        arguments = [*map(repr, values.values()), repr(frame), *([repr(reference)] if reference else [])]
-        fields = ((base.placement, 2), (base.velocity, 1), (base.acceleration, 1))
-        motion = (repr((x if x.ndim == own else x[k]).tolist()) for x, own in fields)
-        return (
-            f"{self.robot.origin.python}.{str(quantity).replace(' ', '_')}({', '.join(arguments)},"
-            f" base=urdfkin.BaseMotion({', '.join(motion)}))"
-        )
+        without = quantity in (Quantity.PLACEMENT, Quantity.ANALYTICAL_JACOBIAN)
+        reference = None if without else self.reference.name.lower()
+        if self.base is None and quantity in _COMMANDS:
+            return replay_line(self.robot.origin, _COMMANDS[quantity], frame, reference, values)
+        options = self.options if reference is None else {"reference": reference, **self.options}
+        # The command line has no words for a moving base, and none for the rest.
+        words = [*map(repr, values.values()), repr(frame), *(f"{x}={y!r}" for x, y in options.items())]
+        if (asked := self.question.rows(np.array([k])).base) is not None:
+            fields = asked.placement, asked.velocity, asked.acceleration
+            words.append(f"base=urdfkin.BaseMotion({', '.join(repr(x[0].tolist()) for x in fields)})")
+        return f"{self.robot.origin.python}.{str(quantity).replace(' ', '_')}({', '.join(words)})"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.call import Call
-from urdfkin.errors import InputError
+from urdfkin.errors import RangeError
 from urdfkin.motion.representation import analytical_jacobian
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import BaseMotion
@@ -20,7 +20,7 @@ from urdfkin.recursion.breakdown import AccelerationBreakdown, acceleration_brea
 from urdfkin.reference import Reference
 from urdfkin.rotation.euler_rates import NEAREST
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import Quantity
+from urdfkin.verification.bounds import Quantity, nearest_singularity
 from urdfkin.verification.choosing import Verify
 
 if TYPE_CHECKING:
@@ -59,13 +59,14 @@ class Manipulator:
             VerificationError: Pinocchio computes something else.
         """
         robot = _robot(self)
-        call = Call(robot, _names(robot, frames), _ALIGNED, base, q)
+        call = Call(robot, frames, _ALIGNED, base, q)
         to = call.flat(out, 4, 4, every=True)
         result = call.compute(
             evaluate.placements, call.plan, call.q, base=call.state, out=to, threads=threads
         )
-        call.verify(Quantity.PLACEMENT, result, verify)
-        return call.every(result, out)
+        handed_out = call.every(result, out)
+        call.verify(Quantity.PLACEMENT, handed_out, verify)
+        return handed_out
 
     def velocities(
         self,
@@ -84,12 +85,13 @@ class Manipulator:
         Arguments and errors as `placements`.
         """
         robot = _robot(self)
-        call = Call(robot, _names(robot, frames), reference, base, q, v)
+        call = Call(robot, frames, reference, base, q, v)
         to = call.flat(out, 6, every=True)
         walk = call.plan, call.q, *call.rates, call.reference
         result = call.compute(evaluate.velocities, *walk, base=call.state, out=to, threads=threads)
-        call.verify(Quantity.VELOCITY, result, verify)
-        return call.every(result, out)
+        handed_out = call.every(result, out)
+        call.verify(Quantity.VELOCITY, handed_out, verify)
+        return handed_out
 
     def jacobians(
         self,
@@ -107,13 +109,14 @@ class Manipulator:
         Arguments and errors as `placements`.
         """
         robot = _robot(self)
-        call = Call(robot, _names(robot, frames), reference, base, q)
+        call = Call(robot, frames, reference, base, q)
         to = call.flat(out, 6, robot.nv, every=True)
         result = call.compute(
             evaluate.jacobians, call.plan, call.q, call.reference, base=call.state, out=to, threads=threads
         )
-        call.verify(Quantity.JACOBIAN, result, verify)
-        return call.every(result, out)
+        handed_out = call.every(result, out)
+        call.verify(Quantity.JACOBIAN, handed_out, verify)
+        return handed_out
 
     def accelerations(
         self,
@@ -133,7 +136,7 @@ class Manipulator:
         Arguments and errors as `placements`.
         """
         robot = _robot(self)
-        call = Call(robot, _names(robot, frames), reference, base, q, v, a)
+        call = Call(robot, frames, reference, base, q, v, a)
         to = call.flat(out, 6, every=True)
         result = call.compute(
             evaluate.accelerations,
@@ -145,8 +148,9 @@ class Manipulator:
             out=to,
             threads=threads,
         )
-        call.verify(Quantity.ACCELERATION, result, verify)
-        return call.every(result, out)
+        handed_out = call.every(result, out)
+        call.verify(Quantity.ACCELERATION, handed_out, verify)
+        return handed_out
 
     def jacobian_rate(
         self,
@@ -193,8 +197,9 @@ class Manipulator:
             out=call.flat(out, 6, robot.nv),
             threads=threads,
         )
-        call.verify(Quantity.JACOBIAN_RATE, result, verify)
-        return call.one(result, out)
+        handed_out = call.one(result, out)
+        call.verify(Quantity.JACOBIAN_RATE, handed_out, verify)
+        return handed_out
 
     def analytical_jacobian(
         self,
@@ -208,8 +213,9 @@ class Manipulator:
     ) -> FloatArray:
         """The manipulator Jacobian J = C^-1 J_v (7.122): derivatives of position and orientation by q.
 
-        J_v and the orientation are checked against Pinocchio; C^-1 is the closed form of
-        `urdfkin.motion.representation_inverse`.
+        It is checked against Pinocchio's rotation and Jacobian, with the rates of the orientation's numbers
+        by a way of their own (`urdfkin.verification.line_of_nodes`). The bound grows as 1 / s^2, s being the
+        sine or cosine of the middle angle: near the singularity that many digits are lost.
 
         Args:
             q: (..., nq) rad, m.
@@ -224,16 +230,26 @@ class Manipulator:
             (..., 6, nv), or (..., 7, nv) for a quaternion.
 
         Raises:
-            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`; the
-                error says how near. A quaternion has none.
+            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`, or, when it
+                is to be checked, than rounding can tell (some 1e-13 rad); the error says how near. A
+                quaternion has none.
             UnknownNameError: no such frame or representation.
             InputError: as `placements`.
             VerificationError: Pinocchio computes something else.
         """
         robot = _robot(self)
-        T_world_frame = robot.placement(q, frame, base=base, verify=verify)
-        J_v = robot.jacobian(q, frame, base=base, verify=verify)
-        return analytical_jacobian(representation, T_world_frame[..., :3, :3], J_v, nearest)
+        call = Call(robot, (frame,), _ALIGNED, base, q, representation=representation, nearest=nearest)
+        poses = call.compute(evaluate.placements, call.plan, call.q, base=call.state)
+        J_v = call.compute(evaluate.jacobians, call.plan, call.q, base=call.state)
+        if call.wanted(verify):
+            nearest = max(nearest, nearest_singularity(call.plan))
+        R = call.one(poses, None)[..., :3, :3]
+        with np.errstate(over="ignore", invalid="ignore"):
+            J = analytical_jacobian(representation, R, call.one(J_v, None), nearest)
+        if not np.isfinite(J).all():
+            raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
+        call.verify(Quantity.ANALYTICAL_JACOBIAN, J, verify)
+        return J
 
     def acceleration_breakdown(
         self,
@@ -264,16 +280,11 @@ class Manipulator:
             call.reference,
             call.state,
         )
-        call.verify(Quantity.ACCELERATION, parts.total[:, np.newaxis], verify)
-        return AccelerationBreakdown(parts.joints, call.every(parts.base), call.every(parts.terms))
+        breakdown = AccelerationBreakdown(parts.joints, call.every(parts.base), call.every(parts.terms))
+        call.verify(Quantity.ACCELERATION_BREAKDOWN, breakdown.total, verify)
+        return breakdown
 
 
 def _robot(manipulator: Manipulator) -> Robot:
     # The only subclass is Robot, which lives below and cannot be imported here.
     return cast("Robot", manipulator)
-
-
-def _names(robot: Robot, frames: Sequence[str] | None) -> Sequence[str]:
-    if isinstance(frames, str):
-        raise InputError("frames are a list of names", found=repr(frames), remedy=f"write [{frames!r}]")
-    return robot.link_names if frames is None else frames

@@ -45,6 +45,11 @@ _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "b
 @click.option("--max-bytes", type=click.IntRange(1), default=DEFAULT_LIMITS.bytes, show_default=True)
 @click.option("--max-depth", type=click.IntRange(1), default=DEFAULT_LIMITS.depth, show_default=True)
 @click.option("--max-elements", type=click.IntRange(1), default=DEFAULT_LIMITS.elements, show_default=True)
+@click.option(
+    "--max-attributes", type=click.IntRange(1), default=DEFAULT_LIMITS.attributes, show_default=True
+)
+@click.option("--max-name", type=click.IntRange(1), default=DEFAULT_LIMITS.name, show_default=True)
+@click.option("--max-number", type=click.IntRange(1), default=DEFAULT_LIMITS.number, show_default=True)
 def command(
     files: Sequence[str],
     style: str,
@@ -57,6 +62,9 @@ def command(
     max_bytes: int,
     max_depth: int,
     max_elements: int,
+    max_attributes: int,
+    max_name: int,
+    max_number: int,
 ) -> None:
     """Check URDFs and print what is wrong with them: code, place, what was found, what to do.
 
@@ -70,7 +78,7 @@ def command(
       urdfkin explain URDF502
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
     ignored = _codes(ignore)
-    limits = Limits(max_bytes, max_depth, max_elements)
+    limits = Limits(max_bytes, max_depth, max_elements, max_attributes, max_name, max_number)
     fold = style == "terminal" and not each
     findings: list[Finding] = []
     unreadable: list[UrdfkinError] = []

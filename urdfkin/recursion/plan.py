@@ -24,6 +24,11 @@ from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree
 IntArray = NDArray[np.int64]
 
 
+#: Where coordinates, rates, lengths and multipliers are smaller than this, no result overflows: with N joints
+#: a rate is less than LARGE^2, the path N LARGE^2, and so w^2 d, the largest product, N^3 LARGE^6.
+LARGE = 1e45
+
+
 class Step(IntEnum):
     """Columns of `Plan.steps` (whole numbers)."""
 
@@ -140,6 +145,7 @@ class Plan:
         lengths: (steps + frames,) metres: the sum of the lengths of all URDF offsets, fixed joints' too,
             from a step's parent to it, then from a frame's step to the frame (in the order of `frames`).
         depth: (frames,) in output order, how many URDF joints lie between a frame and the root.
+        tilts: (frames,) likewise, rad: their `Joint.tilt` added up.
     """
 
     nq: int
@@ -159,6 +165,7 @@ class Plan:
     parents: IntArray
     lengths: FloatArray
     depth: IntArray
+    tilts: FloatArray
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -172,6 +179,12 @@ class Plan:
     def areas(self) -> rows.Areas:
         """Where the rows of scratch begin that depend on the plan."""
         return rows.areas(self.nq, self.nv, self.slots, len(self.columns))
+
+    @cached_property
+    def is_large(self) -> bool:
+        """Whether results may overflow although coordinates and rates are ordinary."""
+        numbers = self.geometry, self.offsets, self.lengths
+        return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
     @cached_property
     def packed(self) -> IntArray:
@@ -201,6 +214,10 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
         links: Indices into `tree.links`, in the order in which results are wanted.
     """
     depths = _depths(tree, links)
+    tilts = {0: 0.0}
+    for link in depths:
+        if link:
+            tilts[link] = tilts[tree.joints[link - 1].parent] + tree.joints[link - 1].tilt
     needed = [link - 1 for link in depths if link and tree.joints[link - 1].kind.nv]
     step_of_joint = {joint: step for step, joint in enumerate(needed)}
     anchors = _anchors(tree, step_of_joint, [link - 1 for link in depths if link])
@@ -236,6 +253,7 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
             + [end.length for end in ends]
         ),
         depth=np.array([depths[link] for link in links], dtype=np.int64),
+        tilts=np.array([tilts[link] for link in links]),
     )
 
 

@@ -143,7 +143,7 @@ def _loaded(chunk: Chunk) -> tuple[Robot, Oracle]:
     robot = chunk.subject.load()
     most = memory.share() if chunk.memory is None else chunk.memory
     memory.demand(robot.tree, CHUNK_SAMPLES + SPECIAL, most)
-    found = robot, Oracle(robot.urdf, robot.tree, root_joint=robot.root_joint)
+    found = robot, robot.oracle(None)
     _kept[chunk.subject] = found
     return found
 

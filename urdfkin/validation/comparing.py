@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -162,13 +161,11 @@ class _Screws(_Work):
 
     def _block(self, tree: KinematicTree, q: FloatArray, joints: Sequence[int], theirs: FloatArray) -> Tally:
         links = [i + 1 for i in joints]
-        plan, coupled = make_plan(tree, links), make_plan(self.robot.tree, links)
+        plan = make_plan(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
         size = magnitudes(plan, q, *still, STILL_STATE)
-        # Followers' angles were rounded all the same.
-        counted = magnitudes(coupled, self.x.q, None, None, STILL_STATE).joints
         J = self.clock.ours(evaluate.jacobians, plan, q, Reference.WORLD)
-        bound = bounds.jacobian_bound(plan, replace(size, joints=counted), Reference.WORLD)
+        bound = bounds.jacobian_bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
         ours = J[:, frame, :, column].swapaxes(0, 1)
