@@ -39,6 +39,8 @@ _SHALLOW = 100
 #: Pinocchio's workspace takes about 64 bytes times the cube of the rates (4.1.0 measured): at most 2 GB.
 MOST_RATES = 315
 
+_ALL = slice(None)
+
 #: What carries a robot whose base moves.
 _BASE = "base"
 
@@ -271,16 +273,22 @@ class Oracle:
         return self._layout.couple(self._collected(inputs, compute, get, frames, references))
 
     def jacobian_rates_of_all(
-        self, q: FloatArray, v: FloatArray, frames: Sequence[str], reference: Reference
+        self,
+        q: FloatArray,
+        v: FloatArray,
+        frames: Sequence[str],
+        reference: Reference,
+        among: slice = _ALL,
     ) -> tuple[FloatArray, FloatArray]:
         """(n, frames, 6, nv) of frames, (n, joints, 6, nv) by `getJointJacobianTimeVariation`.
 
-        Both come from one `computeJointJacobiansTimeVariation`; joints are the moving ones, in order.
+        Both come from one `computeJointJacobiansTimeVariation`; joints are the moving ones, in order,
+        or those `among` them.
         """
         pin, model, data = self._pin, self._model, self._data
         ids, joints, wanted = (
             [self._frame(f) for f in frames],
-            self._layout.joint_ids,
+            self._layout.joint_ids[among],
             self._reference(reference),
         )
         of_frames = np.empty((len(q), len(ids), 6, model.nv))
@@ -294,11 +302,13 @@ class Oracle:
                 of_joints[k, j] = _columns(pin.getJointJacobianTimeVariation(model, data, joint, wanted))
         return self._layout.couple(of_frames), self._layout.couple(of_joints)
 
-    def joint_jacobians(self, q: FloatArray, references: Sequence[Reference]) -> FloatArray:
-        """(n, joints, references, 6, nv): `getJointJacobian` of every moving joint, in the tree's order."""
+    def joint_jacobians(
+        self, q: FloatArray, references: Sequence[Reference], among: slice = _ALL
+    ) -> FloatArray:
+        """(n, joints, references, 6, nv): `getJointJacobian` of moving joints, in the tree's order."""
         pin, model, data = self._pin, self._model, self._data
         wanted = [self._reference(reference) for reference in references]
-        joints = self._layout.joint_ids
+        joints = self._layout.joint_ids[among]
         full = np.empty((len(q), len(joints), len(wanted), 6, model.nv))
         for k, q_k in self._moving(q, None):
             pin.computeJointJacobians(model, data, q_k)

@@ -78,6 +78,78 @@ def test_what_got_worse_is_a_regression_and_its_return_is_not(
     assert len(back.changes) >= (0 if spoil is _fewer_results else 1)
 
 
+def test_a_run_that_passed_and_does_not_is_a_regression_with_the_reason() -> None:
+    new = arms()
+    new["asked"] = 3
+    line = "outcome: passed -> not passed, 1 of 3 robots without a report"
+    assert (True, line) in words(arms(), new)
+    assert compare(new, arms()).exit_code == 0
+
+
+def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_and_is_no_regression() -> None:
+    new: Any = arms()
+    joint = new["robots"][1]["model"]["joints"][2]
+    axis = joint["axis"]
+    joint["axis"] = [-x for x in axis]
+    joint["placement"][0][3] += 0.25
+    joint["limit"]["upper"] = 1.0
+    changed = {change.what: change for change in compare(arms(), new).changes}
+    start = f"joint {joint['name']}, "
+    assert set(changed) == {start + "axis", start + "placement", start + "limits"}
+    assert not any(change.regression for change in changed.values())
+    assert changed[start + "axis"].robot == "ur5"
+    assert changed[start + "axis"].new == str(joint["axis"]).replace(",", "")
+
+
+def test_a_joint_that_is_gone_or_new_is_told_by_its_name() -> None:
+    old: Any = arms()
+    new: Any = arms()
+    new["robots"][1]["model"]["joints"][2]["name"] = "other"
+    name = old["robots"][1]["model"]["joints"][2]["name"]
+    lines = words(arms(), new)
+    assert (False, f"ur5: joint {name}: revolute -> nothing") in lines
+    assert (False, "ur5: joint other: nothing -> revolute") in lines
+
+
+def test_a_bound_that_is_wider_for_the_same_joints_is_a_regression() -> None:
+    new: Any = arms()
+    check = new["robots"][0]["checks"][1]
+    check["bound"][1] *= 3.0
+    old_words, new_words = (f"{d['robots'][0]['checks'][1]['bound'][1]:g} eps*scale" for d in (arms(), new))
+    found = [str(change) for change in compare(arms(), new).regressions]
+    assert len(found) == 1
+    assert old_words in found[0]
+    assert found[0].endswith(new_words)
+    assert compare(new, arms()).exit_code == 0
+    new["robots"][0]["joints"].append("another")
+    assert not any("bound" in str(change) for change in compare(arms(), new).regressions)
+
+
+def test_tables_that_are_compared_no_more_are_a_regression() -> None:
+    new = arms()
+    chain = new["robots"][0]["chains"][0]
+    chain["samples"] = 0
+    what = f"panda: tables from {chain['base']} to {chain['tip']}: compared -> nothing"
+    assert (True, what) in words(arms(), new)
+    del new["robots"][0]["chains"][0]
+    assert (True, what) in words(arms(), new)
+    assert compare(new, arms()).exit_code == 0
+
+
+def test_a_share_of_the_bound_counts_from_the_factor_on_and_from_a_tenth() -> None:
+    for share_old, share_new, regression in (
+        (0.2, 0.39, False),
+        (0.2, 0.41, True),
+        (0.01, 0.099, False),
+        (0.04, 0.11, True),
+        (0.2, None, True),
+    ):
+        old, new = arms(), arms()
+        old["robots"][0]["checks"][0]["share_of_bound"] = share_old
+        new["robots"][0]["checks"][0]["share_of_bound"] = share_new
+        assert bool(compare(old, new).regressions) is regression, (share_old, share_new)
+
+
 def test_versions_settings_and_new_robots_are_changes_and_no_regressions() -> None:
     new = arms()
     new["versions"]["pin"] = "4.2.0"
@@ -91,11 +163,11 @@ def test_versions_settings_and_new_robots_are_changes_and_no_regressions() -> No
     assert compare(old, new).exit_code == 0
 
 
-def test_fewer_samples_asked_for_are_a_setting() -> None:
+def test_fewer_samples_are_a_regression_and_more_are_none() -> None:
     new = arms()
     new["samples"] = 2
-    _fewer_results(new)
-    assert compare(arms(), new).exit_code == 0
+    assert (True, "samples: 6 -> 2") in words(arms(), new)
+    assert (False, "samples: 2 -> 6") in words(new, arms())
 
 
 def test_growth_counts_from_the_factor_on_and_above_a_single_rounding() -> None:

@@ -15,7 +15,8 @@ from tests.report.documents import arms, failing, hostile
 from urdfkin.errors import InputError, SourceError
 from urdfkin.judge import judge
 from urdfkin.loading import load
-from urdfkin.report.document import Document, checked, read_document, schema
+from urdfkin.report.document import Document, schema
+from urdfkin.report.reading import checked, read_document
 from urdfkin.validation.campaign import validate
 
 REFUSED = b'<?xml version="1.0"?><robot name="r"><link name="a"/><joint name="j" type="bent"/></robot>'

@@ -33,17 +33,18 @@ def test_there_is_a_case_for_each_robot_quantity_and_reference() -> None:
     assert [suite.get("name") for suite in suites] == ["panda", "ur5"]
     for suite, robot in zip(suites, document["robots"], strict=True):
         names = [case.get("name") for case in suite.findall("testcase")]
-        assert len(names) == len(set(names)) == len(robot["checks"])
+        assert len(names) == len(set(names)) == len(robot["checks"]) + 1
+        assert names[-1] == "verdict"
         assert "acceleration, local" in names
         assert suite.get("tests") == str(len(names))
-    assert root.get("tests") == str(sum(len(robot["checks"]) for robot in document["robots"]))
+    assert root.get("tests") == str(sum(len(robot["checks"]) + 1 for robot in document["robots"]))
 
 
 def test_a_failure_says_everything_in_its_text() -> None:
     root = read(failing())
-    found = root.findall(".//failure")
-    assert len(found) == 1
-    text = found[0].text or ""
+    found, verdict = root.findall(".//failure")
+    assert "disagrees: 3 of" in (verdict.text or "")
+    text = found.text or ""
     for words in (
         "velocity, local of panda",
         "outside their bound: 3",
@@ -51,7 +52,7 @@ def test_a_failure_says_everything_in_its_text() -> None:
         "replay: urdfkin velocity",
     ):
         assert words in text
-    assert root.get("failures") == "1"
+    assert root.get("failures") == "2"
 
 
 def test_a_robot_that_could_not_be_read_is_an_error_with_its_reason() -> None:

@@ -16,7 +16,7 @@ from urdfkin.reference import Reference
 from urdfkin.resources import example_robots_dir
 from urdfkin.robot import Robot
 from urdfkin.tree import JointKind
-from urdfkin.validation.report import Verdict
+from urdfkin.validation.outcome import Verdict
 from urdfkin.verification.bounds import Quantity
 
 #: Pinocchio 4.1 builds no model with mimic=True of these: it does not find their leaders.

@@ -13,7 +13,8 @@ from tests.robots.odd_urdfs import NAMES, random_tree, urdf_of
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
-from urdfkin.validation.report import RobotReport, Verdict
+from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.report import RobotReport
 from urdfkin.verification.bounds import Quantity
 
 pytestmark = pytest.mark.slow

@@ -12,7 +12,8 @@ from typing import cast
 
 import click
 
-from urdfkin.errors import UnknownNameError, UrdfkinError
+from urdfkin.cli.crash import run
+from urdfkin.errors import UnknownNameError
 
 #: Command name -> (module that holds `command`, one-line summary), in the order of the help page.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -91,11 +92,8 @@ def main() -> None:
     """Entry point of the `urdfkin` command.
 
     Exit 0: verified. 1: a disagreement. 2: bad input or usage. 3: computed, but Pinocchio did not check it.
+    70: a defect of urdfkin. 128 and its number: ended by a signal.
     """
     # The line under a result says that it was not verified, and why; once is enough.
     warnings.filterwarnings("ignore", message="not verified")
-    try:
-        cli(prog_name="urdfkin")
-    except UrdfkinError as error:
-        click.echo(f"urdfkin: error: {error}", err=True)
-        sys.exit(1 if error.is_disagreement else 2)
+    sys.exit(run(cli, "urdfkin"))

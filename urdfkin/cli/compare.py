@@ -31,13 +31,15 @@ def command(
 ) -> None:
     """Say what changed between two reports: versions, robots, verdicts, figures.
 
-    A regression is a robot that is gone or worse off, results outside their bound that were inside, something
-    that is compared no more, or a worst disagreement that grew by more than the factor and above 2 eps*scale.
+    A regression is a run that passed and does not, a robot that is gone or worse off, results outside their
+    bound that were inside, something that is compared no more or on fewer samples, a wider bound, or a worst
+    disagreement that grew by more than the factor and above 2 eps*scale. A report that contradicts itself is
+    refused.
     Exit 0: none. 1: a regression. 2: a file that cannot be used.
     """
     from urdfkin.report.compare import compare  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.comparison import markdown_of, print_comparison  # noqa: PLC0415
-    from urdfkin.report.document import read_document  # noqa: PLC0415
+    from urdfkin.report.reading import read_document  # noqa: PLC0415
 
     before, after = read_document(old), read_document(new)
     check_writable(markdown)

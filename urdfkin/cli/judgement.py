@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+import click
 
 if TYPE_CHECKING:
     from urdfkin.judge import Judgement
@@ -14,8 +17,10 @@ if TYPE_CHECKING:
 
 def judge_all(
     report: ValidationReport, given: Sequence[Robot | str], samples: int, seed: int, **how: Any
-) -> tuple[Judgement, ...]:
-    """Judge every robot that was validated; one that could not be read has nothing to judge.
+) -> ValidationReport:
+    """The report with a judgement of every robot that was compared.
+
+    One that cannot be judged costs its judgement and a line on stderr; an interrupt costs those to come.
 
     Args:
         report: What `validate` found about the robots given, in their order.
@@ -24,16 +29,27 @@ def judge_all(
         seed: What they are drawn from.
         **how: `mimic`, `root_joint` and `xacro_args`, as in `load`.
     """
+    found: list[Judgement | None] = []
+    try:
+        for robot, source in zip(report.robots, given, strict=True):
+            if robot.tallies:
+                found.append(_judged(source, samples, seed, how))
+    except KeyboardInterrupt:
+        report = replace(report, interrupted=True)
+    return replace(report, judgements=tuple(found))
+
+
+def _judged(source: Robot | str, samples: int, seed: int, how: dict[str, Any]) -> Judgement | None:
     from urdfkin.diagnostics import UrdfWarning  # noqa: PLC0415  keeps --help fast
     from urdfkin.judge import judge  # noqa: PLC0415
     from urdfkin.loading import load  # noqa: PLC0415
 
-    judgements = []
-    # An interrupted run reports on fewer robots than were given.
-    for robot, source in zip(report.robots, given, strict=False):
-        if robot.tallies:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UrdfWarning)  # said already
-                loaded = load(source, **how) if isinstance(source, str) else source
-            judgements.append(judge(loaded, samples=samples, seed=seed))
-    return tuple(judgements)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UrdfWarning)  # said already
+            loaded = load(source, **how) if isinstance(source, str) else source
+        return judge(loaded, samples=samples, seed=seed)
+    except Exception as error:
+        name = source if isinstance(source, str) else source.source
+        click.echo(f"urdfkin: {name}: not judged: {type(error).__name__}: {error}", err=True)
+        return None

@@ -29,9 +29,11 @@ def command(
 ) -> None:
     """Show or write the report of an earlier `urdfkin validate ... --json RESULTS.json`.
 
-    Exit 0: the run had verified everything. 1: it had not. 2: the file cannot be used.
+    Exit as the run did: 0 when it had verified everything, 1 for a disagreement, 3 for a robot not verified,
+    130 when it was interrupted. 2: a robot could not be read, or the file cannot be used.
     """
-    from urdfkin.report.document import asset, read_document  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.document import asset, outcome_of  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.reading import read_document  # noqa: PLC0415
 
     if schema:
         click.echo(asset("validation-1.schema.json"), nl=False)
@@ -40,11 +42,12 @@ def command(
         raise click.UsageError("name the file that `urdfkin validate ... --json FILE` wrote")
     document = read_document(results)
     check_writable(html, junit, markdown)
-    write_reports(document, html=html, junit=junit, markdown=markdown)
-    if written := [str(path) for path in (html, junit, markdown) if path]:
-        click.echo(f"wrote {', '.join(written)}")
+    failed = write_reports(document, html=html, junit=junit, markdown=markdown)
+    if paths := [str(path) for path in (html, junit, markdown) if path]:
+        if not failed:
+            click.echo(f"wrote {', '.join(paths)}")
     else:
         from urdfkin.report.terminal import print_report  # noqa: PLC0415
 
         print_report(document, console(), cases=cases)
-    context.exit(0 if document["passed"] else 1)
+    context.exit(outcome_of(document).exit_code or failed)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from urdfkin.cli.arguments import together
+from urdfkin.cli.crash import crash, refuse
 from urdfkin.cli.output import write_file
-from urdfkin.errors import SourceError
+from urdfkin.errors import SourceError, UrdfkinError
 
 if TYPE_CHECKING:
     from urdfkin.report.document import Document
@@ -49,19 +51,44 @@ def write_reports(
     html: Path | None = None,
     junit: Path | None = None,
     markdown: Path | None = None,
-) -> None:
-    """Write the forms that were asked for."""
-    if json_ is not None:
-        write_file(json_, (json.dumps(document, allow_nan=False) + "\n").encode())
-    if html is not None:
-        from urdfkin.report.html import as_html  # noqa: PLC0415  draws plots
+) -> int:
+    """Write the forms that were asked for, each whatever becomes of the others.
 
-        write_file(html, as_html(document).encode())
-    if junit is not None:
-        from urdfkin.report.junit import as_junit  # noqa: PLC0415
+    Returns:
+        0, or the exit code of the first that could not be written; what was wrong has been said.
+    """
+    forms = ((json_, _json), (html, _html), (junit, _junit), (markdown, _markdown))
+    codes = (_written(path, form, document) for path, form in forms if path is not None)
+    return next(filter(None, list(codes)), 0)
 
-        write_file(junit, as_junit(document))
-    if markdown is not None:
-        from urdfkin.report.markdown import as_markdown  # noqa: PLC0415
 
-        write_file(markdown, as_markdown(document).encode())
+def _written(path: Path, form: Callable[[Document], bytes], document: Document) -> int:
+    try:
+        write_file(path, form(document))
+    except UrdfkinError as error:
+        return refuse(error)
+    except Exception as error:
+        return crash(error)
+    return 0
+
+
+def _json(document: Document) -> bytes:
+    return (json.dumps(document, allow_nan=False) + "\n").encode()
+
+
+def _html(document: Document) -> bytes:
+    from urdfkin.report.html import as_html  # noqa: PLC0415  draws plots
+
+    return as_html(document).encode()
+
+
+def _junit(document: Document) -> bytes:
+    from urdfkin.report.junit import as_junit  # noqa: PLC0415
+
+    return as_junit(document)
+
+
+def _markdown(document: Document) -> bytes:
+    from urdfkin.report.markdown import as_markdown  # noqa: PLC0415
+
+    return as_markdown(document).encode()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -15,10 +14,11 @@ from urdfkin.cli.arguments import xacro_args, xacro_option
 from urdfkin.cli.judgement import judge_all
 from urdfkin.cli.output import compiling, console
 from urdfkin.cli.reports import check_writable, report_options, write_reports
+from urdfkin.cli.stopping import stoppable
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
-    from urdfkin.validation.campaign import Progress
+    from urdfkin.validation.gathering import Progress
 
 EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 
@@ -67,7 +67,8 @@ def command(
 
     Configurations are drawn within limits; the neutral one and the ends of the limits are added, and every
     eighth sample has rates a hundred times larger. Disagreement is given in multiples of eps * scale: 1 to
-    10 is what rounding gives. Exit 0: verified. 1: a disagreement. 2: a robot that cannot be read.
+    10 is what rounding gives. Exit 0: verified. 1: a disagreement. 2: a robot that cannot be read. 3: a robot
+    that was not verified. 128 and the signal's number: ended by it; what had finished is written.
     """
     if bool(robots) == all_:
         raise click.UsageError("name robots, or say --all for the whole catalogue")
@@ -78,7 +79,7 @@ def command(
     check_writable(json_, html, junit, markdown)
     how: dict[str, Any] = {"mimic": mimic, "root_joint": root_joint, "xacro_args": xacro_args()}
     given = [_once(robot, how) if judged else robot for robot in robots or examples()]
-    with compiling(), _progress() as progress:
+    with stoppable() as stop, compiling(), _progress() as progress:
         report = validate(
             given,
             samples=samples,
@@ -88,13 +89,12 @@ def command(
             progress=progress,
             **how,
         )
-    if judged:
-        found = judge_all(report, given, judge_samples, seed, **how)
-        report = replace(report, judgements=found)
+        if judged:
+            report = judge_all(report, given, judge_samples, seed, **how)
     document = cast("Document", report.as_dict())
-    write_reports(document, json_=json_, html=html, junit=junit, markdown=markdown)
+    written = write_reports(document, json_=json_, html=html, junit=junit, markdown=markdown)
     print_report(document, console(), cases=cases)
-    context.exit(report.exit_code)
+    context.exit(stop.exit_code(report.exit_code) or written)
 
 
 def _once(source: str, how: dict[str, Any]) -> Robot | str:

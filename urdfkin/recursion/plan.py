@@ -213,16 +213,19 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
         tree: The robot.
         links: Indices into `tree.links`, in the order in which results are wanted.
     """
-    paths = [tree.path(link) for link in links]
-    needed = sorted({i for path in paths for i in path if tree.joints[i].kind.nv})
+    depths = _depths(tree, links)
+    tilts = {0: 0.0}
+    for link in depths:
+        if link:
+            tilts[link] = tilts[tree.joints[link - 1].parent] + tree.joints[link - 1].tilt
+    needed = [link - 1 for link in depths if link and tree.joints[link - 1].kind.nv]
     step_of_joint = {joint: step for step, joint in enumerate(needed)}
-    anchors = _anchors(tree, step_of_joint, {i for path in paths for i in path})
+    anchors = _anchors(tree, step_of_joint, [link - 1 for link in depths if link])
     steps, geometry = _steps(tree, needed, anchors)
     parents = [anchors[tree.joints[i].parent].step for i in needed]
     slots = _slots(steps, parents)
     columns, multipliers = _columns(steps, geometry)
-    ancestors = [{step_of_joint[i] for i in path if i in step_of_joint} for path in paths]
-    leaders = _leaders(columns, ancestors)
+    leaders = _leaders(columns, parents, [anchors[link].step for link in links])
     places = zip(steps[:, Step.Q].tolist(), needed, strict=True)
     layout = rows.areas(tree.nq, tree.nv, slots, len(columns))
     order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)
@@ -249,9 +252,26 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
             [anchors[tree.joints[i].parent].length + _length(tree.joints[i]) for i in needed]
             + [end.length for end in ends]
         ),
-        depth=np.array([len(path) for path in paths], dtype=np.int64),
-        tilts=np.array([math.fsum(tree.joints[i].tilt for i in path) for path in paths]),
+        depth=np.array([depths[link] for link in links], dtype=np.int64),
+        tilts=np.array([tilts[link] for link in links]),
     )
+
+
+def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
+    """Every link on the way to the given ones, root outwards, and how many joints lie before it.
+
+    Each joint is met once: the paths themselves, one for each link, would be as long as the tree's depth.
+    """
+    met = {0}
+    for end in links:
+        link = end
+        while link not in met:
+            met.add(link)
+            link = tree.joints[link - 1].parent
+    depths = {0: 0}
+    for link in sorted(met - {0}):
+        depths[link] = depths[tree.joints[link - 1].parent] + 1
+    return depths
 
 
 class _Anchor(NamedTuple):
@@ -262,9 +282,9 @@ class _Anchor(NamedTuple):
     length: float
 
 
-def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: set[int]) -> dict[int, _Anchor]:
+def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterable[int]) -> dict[int, _Anchor]:
     anchors = {0: _Anchor(-1, np.eye(4), 0.0)}
-    for i in sorted(wanted):
+    for i in wanted:
         joint = tree.joints[i]
         if i in step_of_joint:
             anchors[i + 1] = _Anchor(step_of_joint[i], turned(joint).T, 0.0)
@@ -333,12 +353,18 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
     return columns, geometry[columns[:, Column.STEP], Geometry.MULTIPLIER].copy()
 
 
-def _leaders(columns: IntArray, ancestors: Sequence[set[int]]) -> IntArray:
-    leaders = np.full((len(ancestors), len(columns)), -1, dtype=np.int64)
-    for frame, steps in enumerate(ancestors):
+def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
+    """For each frame, known by its last step: the columns of the steps it hangs from, and their leaders."""
+    leaders = np.full((len(ends), len(columns)), -1, dtype=np.int64)
+    rows = columns.tolist()
+    for frame, end in enumerate(ends):
+        ancestors, step = set[int](), end
+        while step >= 0:
+            ancestors.add(step)
+            step = parents[step]
         first: dict[int, int] = {}
-        for c, column in enumerate(columns.tolist()):
-            if column[Column.STEP] in steps:
+        for c, column in enumerate(rows):
+            if column[Column.STEP] in ancestors:
                 leaders[frame, c] = first.setdefault(column[Column.V], c)
     return leaders
 

@@ -1,8 +1,10 @@
 """What changed between two reports: versions, robots, verdicts, figures; and which changes are regressions.
 
-A change is a regression when something that held no longer does: a robot is gone or its verdict worse, more
-results lie outside their bound, a quantity or results are compared no more, or the worst disagreement grew by
-more than a factor and past what rounding of a single operation gives.
+A change is a regression when something that held no longer does: the run passed and does not, a robot is gone
+or its verdict worse, more results lie outside their bound, a quantity, a table, samples or results are
+compared no more, a bound is wider for the same joints, or the worst disagreement or its share of the bound
+grew by more than a factor and past what rounding of a single operation gives. A robot that moves otherwise is
+a change.
 """
 
 from __future__ import annotations
@@ -11,13 +13,16 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from urdfkin.report.document import Check, Document, Robot, Units
-from urdfkin.report.words import VERDICTS, check_name, units, worst
+from urdfkin.report.document import Check, Document, Robot, Units, outcome_of
+from urdfkin.report.model_changes import model_changes
+from urdfkin.report.words import VERDICTS, check_name, percent, units, worst
 
 #: A worst disagreement may grow by this factor before it counts: the largest of many samples is a lottery.
 FACTOR = 2.0
 #: Below this many eps * scale nothing is a regression: a single rounding gives as much.
 FLOOR = 2.0
+#: Below this share of its bound a result is far from it.
+_SHARE_FLOOR = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +86,16 @@ def compare(old: Document, new: Document, factor: float = FACTOR) -> Comparison:
 
 
 def _run(old: Document, new: Document) -> Iterator[Change]:
-    """Versions and settings; a run that was cut short where the other was not."""
+    """Versions and settings; how the runs ended; a run that was cut short where the other was not."""
     yield from _mapping("version of ", old["versions"], new["versions"])
-    settings = [{"seed": str(d["seed"]), "samples": str(d["samples"])} for d in (old, new)]
-    yield from _mapping("", *settings)
+    yield from _mapping("", *({"seed": str(d["seed"])} for d in (old, new)))
+    if old["samples"] != new["samples"]:
+        fewer = new["samples"] < old["samples"]
+        yield Change(None, "samples", f"{old['samples']:,}", f"{new['samples']:,}", regression=fewer)
+    ends = [outcome_of(d) for d in (old, new)]
+    if ends[0] != ends[1]:
+        before, after = (f"not passed, {end.reason}" if end.reason else "passed" for end in ends)
+        yield Change(None, "outcome", before, after, regression=ends[0].passed)
     if old["interrupted"] != new["interrupted"]:
         before, after = ("interrupted" if d["interrupted"] else "finished" for d in (old, new))
         yield Change(None, "run", before, after, regression=new["interrupted"])
@@ -105,7 +116,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[Change]:
             verdict = after[source]["verdict"]
             yield Change(source, "robot", "", verdict, regression=verdict != "verified")
         else:
-            yield from _robot(source, before[source], after[source], factor, _as_many(old, new))
+            yield from _robot(source, before[source], after[source], factor)
 
 
 def _by_source(document: Document) -> dict[str, Robot]:
@@ -120,12 +131,7 @@ def _by_source(document: Document) -> dict[str, Robot]:
     return named
 
 
-def _as_many(old: Document, new: Document) -> bool:
-    """Whether the new run was asked for at least as many samples."""
-    return new["samples"] >= old["samples"]
-
-
-def _robot(source: str, old: Robot, new: Robot, factor: float, as_many: bool) -> Iterator[Change]:
+def _robot(source: str, old: Robot, new: Robot, factor: float) -> Iterator[Change]:
     if old["verdict"] != new["verdict"]:
         worse = VERDICTS.index(new["verdict"]) < VERDICTS.index(old["verdict"])
         yield Change(source, "verdict", old["verdict"], new["verdict"], regression=worse)
@@ -135,7 +141,11 @@ def _robot(source: str, old: Robot, new: Robot, factor: float, as_many: bool) ->
     ):
         if n_old != n_new:
             yield Change(source, what, str(n_old), str(n_new))
+    for what, was, now in model_changes(old["model"], new["model"]):
+        yield Change(source, what, was, now)
+    yield from _tables(source, old, new)
     yield from _findings(source, old, new)
+    same = old["joints"] == new["joints"]
     before = {check_name(check): check for check in old["checks"]}
     after = {check_name(check): check for check in new["checks"]}
     for name in dict.fromkeys([*before, *after]):
@@ -144,27 +154,50 @@ def _robot(source: str, old: Robot, new: Robot, factor: float, as_many: bool) ->
         elif name not in before:
             yield Change(source, name, "", "compared", regression=bool(after[name]["failed"]))
         else:
-            yield from _check(source, name, before[name], after[name], factor, as_many)
+            yield from _check(source, name, before[name], after[name], factor, same_joints=same)
 
 
-def _check(source: str, name: str, old: Check, new: Check, factor: float, as_many: bool) -> Iterator[Change]:
+def _tables(source: str, old: Robot, new: Robot) -> Iterator[Change]:
+    """Denavit-Hartenberg tables that are compared no more, or were not before."""
+    before, after = ({(c["base"], c["tip"]): bool(c["samples"]) for c in r["chains"]} for r in (old, new))
+    for base, tip in dict.fromkeys([*before, *after]):
+        ends = [compared.get((base, tip), False) for compared in (before, after)]
+        if ends[0] != ends[1]:
+            was, now = ("compared" if end else "" for end in ends)
+            yield Change(source, f"tables from {base} to {tip}", was, now, regression=ends[0])
+
+
+def _check(
+    source: str, name: str, old: Check, new: Check, factor: float, *, same_joints: bool
+) -> Iterator[Change]:
     def change(words: Callable[[Check], str], regression: bool) -> Change:
         return Change(source, name, words(old), words(new), regression)
 
     if old["failed"] != new["failed"]:
         yield change(lambda c: f"{c['failed']:,} outside the bound", new["failed"] > old["failed"])
-    if new["results"] < old["results"] and as_many:
-        # Fewer samples asked for is a setting, and was said; fewer results from as many samples is a loss.
+    if new["results"] < old["results"]:
         yield change(lambda c: f"{c['results']:,} results", True)
+    if old["bound"] != new["bound"]:
+        wider = any((b or 0.0) > (a or 0.0) for a, b in zip(old["bound"], new["bound"], strict=True))
+        yield change(lambda c: f"bound {_ends(c)} eps*scale", same_joints and wider)
     grew = _grew(old["worst"], new["worst"], factor)
     if grew or _grew(new["worst"], old["worst"], factor):
         yield change(lambda c: f"{units(c['worst'])} eps*scale", grew)
 
+    was, now = old["share_of_bound"], new["share_of_bound"]
+    grew = _grew(was, now, factor, _SHARE_FLOOR)
+    if grew or _grew(now, was, factor, _SHARE_FLOOR):
+        yield change(lambda c: f"{percent(c['share_of_bound'])} of the bound", grew)
 
-def _grew(old: Units, new: Units, factor: float) -> bool:
+
+def _ends(check: Check) -> str:
+    return " to ".join("none" if end is None else f"{end:g}" for end in check["bound"])
+
+
+def _grew(old: Units, new: Units, factor: float, floor: float = FLOOR) -> bool:
     if old is None:
         return False
-    return new is None or (new > FLOOR and new > factor * old)
+    return new is None or (new > floor and new > factor * old)
 
 
 def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:

@@ -1,15 +1,13 @@
-"""The JSON document of a validation: its types, reading it, and holding it to its published schema."""
+"""The JSON document of a validation: its types and its published schema."""
 
 from __future__ import annotations
 
 import json
 from functools import cache
 from importlib import resources
-from pathlib import Path
-from typing import Any, Literal, TypedDict, cast
+from typing import Any, Literal, NotRequired, TypedDict, cast
 
-from urdfkin.errors import InputError, SourceError
-from urdfkin.validation.report import SCHEMA
+from urdfkin.validation.outcome import Outcome, outcome
 
 #: A disagreement in eps * scale; None is no number, or what must agree exactly and does not.
 Units = float | None
@@ -190,6 +188,7 @@ class Robot(TypedDict):
     name: str
     verdict: Verdict
     reason: str | None
+    error: NotRequired[str | None]
     joints: list[str]
     frames: list[str]
     samples: int
@@ -214,10 +213,18 @@ class Document(TypedDict):
     seed: int
     samples: int
     histogram_edges: list[float]
+    asked: NotRequired[int]
     interrupted: bool
     passed: bool
+    reason: NotRequired[str | None]
     command: str
     robots: list[Robot]
+
+
+def outcome_of(document: Document) -> Outcome:
+    """How the run ended, from what is reported of its robots."""
+    verdicts = [robot["verdict"] for robot in document["robots"]]
+    return outcome(verdicts, document.get("asked", len(verdicts)), document["interrupted"])
 
 
 def asset(name: str) -> str:
@@ -229,40 +236,3 @@ def asset(name: str) -> str:
 def schema() -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of the document."""
     return cast("dict[str, Any]", json.loads(asset("validation-1.schema.json")))
-
-
-def read_document(path: Path) -> Document:
-    """A document from a file.
-
-    Raises:
-        SourceError: the file cannot be read.
-        InputError: it is not JSON, not a validation report, of another version, or breaks the schema.
-    """
-    try:
-        data = json.loads(path.read_bytes())
-    except OSError as error:
-        raise SourceError("cannot be read", where=str(path), found=error.strerror or str(error)) from error
-    except ValueError as error:
-        raise InputError("not a JSON file", where=str(path), found=str(error)) from error
-    return checked(data, str(path))
-
-
-def checked(data: object, where: str) -> Document:
-    """`data` as a document; raises InputError as `read_document` does."""
-    found = data.get("schema") if isinstance(data, dict) else None
-    if found != SCHEMA:
-        raise InputError(
-            f"not a report with the layout {SCHEMA}",
-            where=where,
-            found=repr(found) if found else "no 'schema' entry",
-            remedy="write one with: urdfkin validate ROBOT --json FILE",
-        )
-    from jsonschema import Draft202012Validator  # noqa: PLC0415  only who reads files needs it
-    from jsonschema.exceptions import best_match  # noqa: PLC0415
-
-    error = best_match(Draft202012Validator(schema()).iter_errors(data))
-    if error is not None:
-        raise InputError(
-            f"breaks the layout {SCHEMA}", where=where, found=f"{error.json_path}: {error.message}"
-        )
-    return cast("Document", data)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from urdfkin.figure import installed
 from urdfkin.report import pages
 from urdfkin.report.distributions import distributions
-from urdfkin.report.document import Document, Robot, asset
+from urdfkin.report.document import Document, Robot, asset, outcome_of
 from urdfkin.report.scene import scene
 from urdfkin.report.words import (
     columns,
@@ -22,6 +22,7 @@ from urdfkin.report.words import (
     verdict_counts,
     worst,
 )
+from urdfkin.validation.portrait import chain_disagreement
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -57,6 +58,7 @@ def as_html(document: Document) -> str:
         .get_template("report.html.j2")
         .render(
             document=document,
+            outcome=outcome_of(document),
             summary=summary(document),
             when=_when(document["started"]),
             pinocchio=pinocchio(document),
@@ -106,7 +108,7 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
                 "data": chain,
                 "beta": pages.has_beta(chain),
                 "tables": {kind: pages.chain_rows(chain, kind) for kind in ("standard", "modified")},
-                "agrees": (chain["share_of_bound"] or 0.0) <= 1.0,
+                "agrees": chain_disagreement(chain) is None,
                 "metres": f"{chain['metres'] or 0.0:.2g}",
                 "worst": units(chain["worst"]),
                 "share": percent(chain["share_of_bound"]),

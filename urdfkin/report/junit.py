@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from xml.etree import ElementTree as ET
 
-from urdfkin.report.document import Case, Check, Document, Robot
+from urdfkin.report.document import Case, Check, Document, Robot, outcome_of
 from urdfkin.report.words import check_name, in_order, percent, units
 
 #: What XML 1.0 cannot hold, not even escaped.
@@ -19,6 +19,8 @@ _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 def as_junit(document: Document) -> bytes:
     """The report as a JUnit XML file."""
     suites = [_suite(robot, document) for robot in document["robots"]]
+    if _incomplete(document):
+        suites.insert(0, _whole_run(document))
     counts = {name: str(sum(int(suite.get(name, "0")) for suite in suites)) for name in _COUNTS}
     root = ET.Element("testsuites", {"name": "urdfkin validate", "time": _time(document["seconds"])} | counts)
     root.extend(suites)
@@ -33,7 +35,14 @@ _COUNTS = ("tests", "failures", "errors")
 
 def _suite(robot: Robot, document: Document) -> ET.Element:
     name = _clean(robot["source"])
-    cases = [_case(check, robot) for check in in_order(robot)] or [_unchecked(robot)]
+    cases = [*(_case(check, robot) for check in in_order(robot)), _verdict(robot)]
+    facts = {"robot": robot["name"], "verdict": robot["verdict"], "seed": str(document["seed"])}
+    return _made(name, cases, facts | document["versions"], robot["seconds"], document)
+
+
+def _made(
+    name: str, cases: list[ET.Element], facts: dict[str, str], seconds: float, document: Document
+) -> ET.Element:
     suite = ET.Element(
         "testsuite",
         {
@@ -42,16 +51,29 @@ def _suite(robot: Robot, document: Document) -> ET.Element:
             "failures": str(sum(case.find("failure") is not None for case in cases)),
             "errors": str(sum(case.find("error") is not None for case in cases)),
             "skipped": "0",
-            "time": _time(robot["seconds"]),
+            "time": _time(seconds),
             "timestamp": document["started"],
         },
     )
     properties = ET.SubElement(suite, "properties")
-    facts = {"robot": robot["name"], "verdict": robot["verdict"], "seed": str(document["seed"])}
-    for key, value in (facts | document["versions"]).items():
+    for key, value in facts.items():
         ET.SubElement(properties, "property", {"name": key, "value": _clean(value)})
     suite.extend(cases)
     return suite
+
+
+def _incomplete(document: Document) -> bool:
+    """Whether something is wrong that no robot's suite can tell."""
+    robots = document["robots"]
+    return document["interrupted"] or not robots or len(robots) != document.get("asked", len(robots))
+
+
+def _whole_run(document: Document) -> ET.Element:
+    """A suite for what is nobody's in particular: an interrupt, robots that are missing, or none at all."""
+    reason = outcome_of(document).reason or ""
+    case = ET.Element("testcase", {"name": "every robot was compared in full", "classname": "urdfkin"})
+    ET.SubElement(case, "error", {"type": "not passed", "message": reason}).text = reason
+    return _made("the whole run", [case], document["versions"], document["seconds"], document)
 
 
 def _case(check: Check, robot: Robot) -> ET.Element:
@@ -70,17 +92,17 @@ def _case(check: Check, robot: Robot) -> ET.Element:
     return case
 
 
-def _unchecked(robot: Robot) -> ET.Element:
-    """A robot of which nothing was compared: why, and what was found in its file."""
-    case = ET.Element("testcase", {"name": "load", "classname": f"urdfkin.{_clean(robot['source'])}"})
-    reason = _clean(robot["reason"] or "nothing was compared")
+def _verdict(robot: Robot) -> ET.Element:
+    """A robot's verdict, which more than its results may have to do with: why, in full."""
+    case = ET.Element("testcase", {"name": "verdict", "classname": f"urdfkin.{_clean(robot['source'])}"})
+    reason = _clean(robot["reason"] or f"{robot['results']:,} results compared")
+    text = f"{robot['verdict']}: {reason}" + (f"\n{_clean(error)}" if (error := robot.get("error")) else "")
     if robot["verdict"] == "verified":
-        ET.SubElement(case, "system-out").text = reason
-        return case
-    kind = "failure" if robot["verdict"] == "not verified" else "error"
-    ET.SubElement(
-        case, kind, {"type": robot["verdict"], "message": reason.splitlines()[0]}
-    ).text = f"{robot['verdict']}: {reason}"
+        ET.SubElement(case, "system-out").text = text
+    else:
+        kind = "error" if robot["verdict"] == "bad input" else "failure"
+        facts = {"type": robot["verdict"], "message": reason.splitlines()[0]}
+        ET.SubElement(case, kind, facts).text = text
     return case
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from urdfkin.report.document import Document, Robot
+from urdfkin.report.document import Document, Robot, outcome_of
 from urdfkin.report.words import (
     VERDICTS,
     check_name,
@@ -26,13 +26,14 @@ _SHOWN = 3
 
 def as_markdown(document: Document, limit: int = LIMIT) -> str:
     """The report as a comment; robots that failed come first, and a line says what did not fit."""
-    passed = document["passed"]
+    found = outcome_of(document)
     head = [
-        f"## {'✅ Verified against' if passed else '❌ Not verified against'} Pinocchio"
+        f"## {'✅ Verified against' if found.passed else '❌ Not verified against'} Pinocchio"
         f" {text(document['versions'].get('pin', '?'))}",
         "",
         text(summary(document)),
         "",
+        *([f"Not passed: {text(found.reason)}", ""] if found.reason else []),
     ]
     foot = [
         "",
@@ -84,10 +85,10 @@ def _cells(robot: Robot, quantities: list[tuple[str, ...]]) -> list[str]:
 
 def _details(robot: Robot) -> list[str]:
     """What went wrong with one robot."""
-    if robot["reason"]:
-        return ["", f"**{text(robot['source'])}**: {text(shortened(robot['reason'], 600))}"]
-    failed = [check for check in robot["checks"] if check["failed"]]
     lines: list[str] = []
+    if robot["reason"]:
+        lines += ["", f"**{text(robot['source'])}**: {text(shortened(robot['reason'], 600))}"]
+    failed = [check for check in robot["checks"] if check["failed"]]
     for check in failed[:_SHOWN]:
         lines += [
             "",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from urdfkin.report.document import Check, Document, Judgement, Robot
+from urdfkin.report.document import Check, Document, Judgement, Robot, outcome_of
 from urdfkin.report.words import (
     SIDES,
     check_name,
@@ -56,7 +56,10 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
         out.print(_quantities(robots))
     for robot in robots:
         _print_robot(robot, out, cases=cases)
-    out.print(summary(document), style="bold green" if document["passed"] else "bold red")
+    found = outcome_of(document)
+    out.print(summary(document), style="bold green" if found.passed else "bold red")
+    if found.reason:
+        out.print(f"not passed: {found.reason}", style="bold red")
 
 
 def plain_table(heads: Sequence[str], rows: Iterable[Sequence[str]], words: Sequence[int]) -> Table:
@@ -109,9 +112,12 @@ def _quantities(robots: Sequence[Robot]) -> Table:
     rows = []
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name)]
-        by_robot = {robot["source"]: of_quantity(robot, name) for robot in robots}
         largest = worst(check["worst"] for check in checks)
-        where = next(s for s, own in by_robot.items() if any(c["worst"] == largest for c in own))
+        where = next(
+            robot["source"]
+            for robot in robots
+            if any(check["worst"] == largest for check in of_quantity(robot, name))
+        )
         rows.append([quantity_name(name), *_figures(checks), where])
     return plain_table(["quantity", "results", "worst", "of bound", "robot"], rows, words=(0, 4))
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Literal
 
 from urdfkin.report.document import Check, Document, Judged, Robot, Units
+from urdfkin.validation.outcome import Verdict
 
 #: Quantities as a reader knows them, in the order of a report.
 QUANTITIES = {
@@ -29,7 +30,7 @@ COLUMNS = {
 }
 SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
 #: Worse verdicts first.
-VERDICTS = ("bad input", "not verified", "disagrees", "verified")
+VERDICTS = tuple(verdict.value for verdict in Verdict)
 
 
 def quantity_name(quantity: str) -> str:

@@ -5,7 +5,7 @@ Plain data from the start, so that it can come back from another process and go 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,9 +36,19 @@ class Portrait:
         return cls(describe(robot), as_data(robot.findings), chains_of(robot, oracle))
 
     @property
-    def chains_agree(self) -> bool:
-        """Whether no table that was checked lies outside its bound."""
-        return all((chain["share_of_bound"] or 0.0) <= 1.0 for chain in self.chains)
+    def disagreements(self) -> tuple[str, ...]:
+        """What is said of each chain whose tables lie outside their bound."""
+        return tuple(said for chain in self.chains if (said := chain_disagreement(chain)) is not None)
+
+
+def chain_disagreement(chain: Mapping[str, Any]) -> str | None:
+    """How a chain's tables disagree with Pinocchio; None if they do not, or were not compared."""
+    share = chain["share_of_bound"]
+    if not chain["samples"] or (share is not None and share <= 1.0):
+        return None
+    how = "beyond all numbers" if share is None else f"{share:.3g} times the bound"
+    off = "" if chain["metres"] is None else f", tip {chain['metres']:.2g} m off"
+    return f"the Denavit-Hartenberg tables from {chain['base']} to {chain['tip']} disagree: {how}{off}"
 
 
 #: Of a robot nothing is known about.

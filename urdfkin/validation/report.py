@@ -11,13 +11,13 @@ import shlex
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.catalogue import examples
 from urdfkin.origin import Origin
 from urdfkin.validation.clock import Clock
+from urdfkin.validation.outcome import Outcome, Verdict, outcome
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
 from urdfkin.validation.tally import HISTOGRAM_EDGES, Key, Tally, WorstCase
 from urdfkin.verification.bounds import Quantity
@@ -30,15 +30,6 @@ if TYPE_CHECKING:
 SCHEMA = "urdfkin-validation/1"
 
 
-class Verdict(StrEnum):
-    """What a robot's validation comes to."""
-
-    VERIFIED = "verified"
-    DISAGREES = "disagrees"
-    NOT_VERIFIED = "not verified"
-    BAD_INPUT = "bad input"
-
-
 @dataclass(frozen=True, slots=True)
 class RobotReport:
     """One robot.
@@ -47,7 +38,7 @@ class RobotReport:
         origin: Where it comes from and how it was asked for.
         name: The robot's name in the URDF.
         verdict: What it comes to.
-        reason: Why it was not verified or could not be read; None otherwise.
+        reason: Why it is not verified, in words; None where it is.
         joints: Moving joints, followers too.
         frames: Names of the frames that were compared: every link and every joint.
         tallies: What was compared.
@@ -55,6 +46,7 @@ class RobotReport:
         seconds: Time spent computing and comparing.
         portrait: What it is made of and what was found in its file.
         clock: Where the time went; None if nothing was computed.
+        error: The traceback of an error that nobody foresaw, to be reported; None otherwise.
     """
 
     origin: Origin
@@ -68,6 +60,7 @@ class RobotReport:
     seconds: float
     portrait: Portrait = NO_PORTRAIT
     clock: Clock | None = None
+    error: str | None = None
 
     @property
     def source(self) -> str:
@@ -105,6 +98,7 @@ class RobotReport:
             "name": self.name,
             "verdict": self.verdict.value,
             "reason": self.reason,
+            "error": self.error,
             "joints": list(self.joints),
             "frames": list(self.frames),
             "samples": self.samples,
@@ -186,21 +180,24 @@ class ValidationReport:
 
     Attributes:
         robots: One report a robot, in the order asked for.
+        asked: How many robots were to be validated.
         samples: Random configurations for each robot.
         seed: What they were drawn from.
         started: When, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run was stopped; what had finished is kept.
-        judgements: The true errors of both sides, where the judge was asked for.
+        judgements: The true errors of both sides, where the judge was asked for: one for each robot that was
+            compared, None where it could not be had.
     """
 
     robots: tuple[RobotReport, ...]
+    asked: int
     samples: int
     seed: int
     started: str
     seconds: float
     interrupted: bool = False
-    judgements: tuple[Judgement, ...] = ()
+    judgements: tuple[Judgement | None, ...] = ()
 
     @property
     def command(self) -> str:
@@ -216,17 +213,19 @@ class ValidationReport:
         )
 
     @property
+    def outcome(self) -> Outcome:
+        """How the run ended, and why it has not passed if it has not."""
+        return outcome((robot.verdict for robot in self.robots), self.asked, self.interrupted)
+
+    @property
     def passed(self) -> bool:
-        """Whether every robot was verified and the run was finished."""
-        return not self.interrupted and all(robot.verdict is Verdict.VERIFIED for robot in self.robots)
+        """Whether every robot that was asked for was verified, and there was one."""
+        return self.outcome.passed
 
     @property
     def exit_code(self) -> int:
-        """0 verified, 1 disagreement, unverified or unfinished, 2 a robot that cannot be read."""
-        verdicts = {robot.verdict for robot in self.robots}
-        if verdicts & {Verdict.DISAGREES, Verdict.NOT_VERIFIED} or self.interrupted:
-            return 1
-        return 2 if Verdict.BAD_INPUT in verdicts else 0
+        """0 verified, 1 a disagreement, 130 interrupted, 2 bad input, 3 a robot not verified."""
+        return self.outcome.exit_code
 
     def as_dict(self) -> dict[str, Any]:
         """The JSON document."""
@@ -238,8 +237,10 @@ class ValidationReport:
             "seed": self.seed,
             "samples": self.samples,
             "histogram_edges": HISTOGRAM_EDGES.tolist(),
+            "asked": self.asked,
             "interrupted": self.interrupted,
             "passed": self.passed,
+            "reason": self.outcome.reason,
             "command": self.command,
             "robots": self._robots(),
         }

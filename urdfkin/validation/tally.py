@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,15 +77,30 @@ class Tally:
             (min(self.bounds[0], other.bounds[0]), max(self.bounds[1], other.bounds[1])),
         )
 
+    def beside(self, other: Tally) -> Tally:
+        """The tally of the same samples and more frames."""
+        joined = replace(self, by_frame=()) + replace(other, by_frame=())
+        return replace(joined, by_frame=self.by_frame + other.by_frame)
+
     def percentile(self, percent: float) -> float:
         """The disagreement that `percent` of the results stay below, to a histogram bin (26 %)."""
-        counts = np.cumsum(self.histogram)
-        if not counts[-1]:
-            return 0.0
-        bin_ = int(np.searchsorted(counts, counts[-1] * percent / 100.0))
-        if bin_ == 0:
-            return 0.0
-        return float(min(HISTOGRAM_EDGES[min(bin_, len(HISTOGRAM_EDGES) - 1)], self.worst))
+        return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
+
+
+def percentile(
+    histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
+) -> float:
+    """The disagreement that `percent` of a histogram's results stay below, to a bin."""
+    counts = np.cumsum(histogram)
+    if not counts[-1]:
+        return 0.0
+    bin_ = int(np.searchsorted(counts, counts[-1] * percent / 100.0))
+    return float(min(edges[min(bin_, len(edges) - 1)], worst)) if bin_ else 0.0
+
+
+def histogram_bin(units: float, edges: Sequence[float] | FloatArray) -> int:
+    """Which place of a histogram counts a disagreement."""
+    return int(np.searchsorted(edges, units, side="right"))
 
 
 def _before(case: WorstCase, other: WorstCase) -> bool:

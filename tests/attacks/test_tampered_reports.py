@@ -1,0 +1,208 @@
+"""A report that was edited is refused with what contradicts, or told by `compare`: never a traceback."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.running import Done, urdfkin
+from tests.report.documents import arms, failing, hostile
+from tests.robots import odd_urdfs
+from urdfkin.report.consistency import contradictions
+from urdfkin.validation.campaign import validate
+
+
+def _first(d: Any) -> Any:
+    return d["robots"][0]
+
+
+def _check(d: Any) -> Any:
+    return _first(d)["checks"][1]
+
+
+def _joint(d: Any) -> Any:
+    return _first(d)["model"]["joints"][0]
+
+
+def _set(entry: Callable[[Any], Any], **values: Any) -> Callable[[Any], None]:
+    return lambda d: entry(d).update(values)
+
+
+def _less(entry: Callable[[Any], Any], key: str) -> Callable[[Any], None]:
+    return lambda d: entry(d).update({key: entry(d)[key] - 1})
+
+
+def _delete(entry: Callable[[Any], Any], key: Any) -> Callable[[Any], None]:
+    return lambda d: entry(d).__delitem__(key)
+
+
+#: How a report of a run that passed is edited, and what is said against it.
+EDITED: dict[str, tuple[Callable[[Any], None], str]] = {
+    "passed": (_set(lambda d: d, passed=False), "passed: False, but every robot was verified"),
+    "interrupted": (_set(lambda d: d, interrupted=True), "passed: True, but interrupted"),
+    "verdict": (_set(_first, verdict="not verified"), "no reason"),
+    "disagrees": (_set(_first, verdict="disagrees"), "nothing lies outside its bound"),
+    "reason": (_set(_first, reason="a reason"), "verified, but the reason says"),
+    "asked": (_set(lambda d: d, asked=5), "passed: True, but 3 of 5 robots without a report"),
+    "asked for fewer": (_set(lambda d: d, asked=1), "asked: 1, but 2 robots"),
+    "reason of the run": (_set(lambda d: d, reason="none"), "reason: none, but the run has passed"),
+    "results": (_less(_check, "results"), "samples of"),
+    "results of the robot": (_less(_first, "results"), "results: not the"),
+    "failed": (_set(_check, failed=1), "failed: 1 of"),
+    "failed of the robot": (_set(_first, failed=1), "failed: not the 0"),
+    "samples": (_less(lambda d: d, "samples"), "samples: 9, but 8 were asked for"),
+    "samples of the robot": (_less(_first, "samples"), "on 8 of 9 samples"),
+    "worst": (_set(_check, worst=0.5), "worst: 0.5, but"),
+    "share, smaller": (_set(_check, share_of_bound=1e-9), "share_of_bound: 1e-09, but the worst is"),
+    "share, larger": (_set(_check, share_of_bound=0.99), "share_of_bound: 0.99, but the worst is"),
+    "share beyond": (_set(_check, share_of_bound=1.4), "but the largest share is 1.4"),
+    "share, no number": (_set(_check, share_of_bound=None), "but the largest share is inf"),
+    "bound": (_set(_check, bound=[1e9, 2e9]), "the bound 1e+09 to 2e+09"),
+    "median": (_set(_check, median=1e9), "median: 1000000000.0, but"),
+    "p99": (_set(_check, p99=0.0), "p99: 0.0, but"),
+    "histogram": (lambda d: _check(d)["histogram"].reverse(), "the histogram ends elsewhere"),
+    "histogram, shorter": (_delete(lambda d: _check(d)["histogram"], 0), "histogram: not of"),
+    "edges": (lambda d: d["histogram_edges"].reverse(), "histogram_edges: not in ascending order"),
+    "no edges": (_set(lambda d: d, histogram_edges=[]), "histogram_edges: not in ascending order"),
+    "worst by frame": (_delete(lambda d: _check(d)["worst_by_subject"], 0), "not one for each of"),
+    "frame of the case": (
+        _set(lambda d: _check(d)["worst_case"], frame="link:none"),
+        "is none of its frames",
+    ),
+    "disagreement of the case": (
+        _set(lambda d: _check(d)["worst_case"], disagreement=1e6),
+        "worst_case: 1000000.0 at",
+    ),
+    "smaller case": (_set(lambda d: _check(d)["worst_case"], disagreement=0.0), "worst_case: 0 is not"),
+    "q of the case": (_delete(lambda d: _check(d)["worst_case"]["q"], 0), "q, v or a has another length"),
+    "sample of the case": (_set(lambda d: _check(d)["worst_case"], sample=99), "sample 99 of 9"),
+    "no case": (_set(_check, worst_case=None), "worst_case: none, but something disagrees"),
+    "a check twice": (lambda d: _first(d)["checks"].append(_check(d)), "a quantity is there twice"),
+    "no model": (_set(_first, model=None), "model: none, but something was compared"),
+    "a frame less": (_delete(lambda d: _first(d)["frames"], 0), "joints or frames: not the model's"),
+    "a joint less": (_delete(lambda d: _first(d)["joints"], 0), "joints or frames: not the model's"),
+    "a joint of the model less": (_delete(lambda d: _first(d)["model"]["joints"], 0), "links are not"),
+    "a parent that is none": (_set(_joint, parent="nowhere"), "parent nowhere does not stand before it"),
+    "a parent that comes later": (
+        lambda d: _joint(d).update(parent=_first(d)["model"]["links"][3]),
+        "does not stand before it",
+    ),
+    "a name twice": (
+        lambda d: _joint(d).update(name=_first(d)["model"]["joints"][1]["name"]),
+        "a name is there twice",
+    ),
+    "a long axis": (_set(_joint, axis=[0.0, 0.0, 2.0]), "is not of length 1"),
+    "no axis": (_set(_joint, axis=None), "without an axis"),
+    "kind": (_set(_joint, kind="fixed", axis=None), "joints or frames: not the model's"),
+    "sheared placement": (lambda d: _joint(d)["placement"][0].__setitem__(0, 3.0), "its placement is none"),
+    "q index": (_set(_joint, q=4), "its coordinates begin elsewhere"),
+    "v index": (_set(_joint, v=None), "its coordinates begin elsewhere"),
+    "nq": (_set(lambda d: _first(d)["model"], nq=3), "coordinates and"),
+    "coordinates": (_delete(lambda d: _first(d)["model"]["coordinates"], 0), "coordinates and"),
+    "leader": (
+        _set(_joint, mimic={"leader": "nobody", "multiplier": 1.0, "offset": 0.0}),
+        "it cannot follow nobody",
+    ),
+    "tip": (_set(lambda d: _first(d)["model"], tip="nowhere"), "there is no frame nowhere"),
+    "base of a table": (_set(lambda d: _first(d)["chains"][0], base="nowhere"), "there is no frame nowhere"),
+    "joint of a table": (
+        _set(lambda d: _first(d)["chains"][0]["standard"]["rows"][0], joint="none"),
+        "no revolute joint none",
+    ),
+    "share of a table": (
+        _set(lambda d: _first(d)["chains"][0], share_of_bound=3.0),
+        "verified, but something lies outside its bound",
+    ),
+    "a table not compared": (_set(lambda d: _first(d)["chains"][0], samples=0), "not compared, but with"),
+}
+
+
+def written(document: Any, path: Path) -> Path:
+    path.write_text(json.dumps(document))
+    return path
+
+
+def run(*words: str | Path) -> Done:
+    done = urdfkin(*map(str, words))
+    assert "Traceback" not in done.err, done.err
+    return done
+
+
+@pytest.mark.parametrize("name", EDITED)
+def test_a_report_that_contradicts_itself_is_refused_with_what_contradicts(name: str, tmp_path: Path) -> None:
+    edit, words = EDITED[name]
+    document = arms()
+    edit(document)
+    assert any(words in said for said in contradictions(document)), list(contradictions(document))
+    path, good = written(document, tmp_path / "edited.json"), written(arms(), tmp_path / "good.json")
+    for command in (("report", path), ("compare", good, path), ("compare", path, good)):
+        done = run(*command)
+        assert done.code == 2, done.text
+        assert f"{path}: the report contradicts itself: found " in done.err
+    assert words in done.err or len(list(contradictions(document))) > 3
+
+
+@pytest.mark.parametrize("make", [arms, hostile, failing])
+def test_what_validate_writes_does_not_contradict_itself(make: Callable[[], Any]) -> None:
+    assert list(contradictions(make())) == []
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+def test_no_odd_robots_report_contradicts_itself() -> None:
+    texts = [odd_urdfs.urdf_of(name) for name in odd_urdfs.NAMES]
+    report = validate([*texts, "nonsense", "talos"], samples=30)
+    assert list(contradictions(json.loads(json.dumps(report.as_dict())))) == []
+
+
+def _turned(d: Any) -> None:
+    joint = _joint(d)
+    joint["axis"] = [-x for x in joint["axis"]]
+
+
+def _moved(d: Any) -> None:
+    _joint(d)["placement"][0][3] += 0.1
+
+
+@pytest.mark.parametrize(("edit", "what"), [(_turned, "axis"), (_moved, "placement")])
+def test_another_axis_or_place_is_told_as_a_change_of_the_robot(
+    edit: Callable[[Any], None], what: str, tmp_path: Path
+) -> None:
+    document = arms()
+    edit(document)
+    done = run("compare", written(arms(), tmp_path / "a.json"), written(document, tmp_path / "b.json"))
+    assert done.code == 0
+    assert f"panda: joint {_joint(arms())['name']}, {what}: " in done.text
+
+
+@pytest.mark.parametrize(
+    "text", ["NaN", "Infinity", "-Infinity", "1e999", "[" * 100_000, '{"seed": 1' + "0" * 5000]
+)
+@pytest.mark.parametrize("command", ["report", "compare"])
+def test_json_that_no_document_can_be_is_refused(text: str, command: str, tmp_path: Path) -> None:
+    path = tmp_path / "odd.json"
+    path.write_text(json.dumps(arms()).replace('"seconds": ', f'"seconds": {text}, "other": ', 1))
+    done = run(command, *([path] if command == "report" else [path, path]))
+    assert done.code == 2
+    assert "not a JSON file" in done.err
+
+
+@pytest.mark.parametrize("source", ["ur5", "panda"])
+def test_a_robot_that_was_validated_twice_is_reported_twice(source: str, tmp_path: Path) -> None:
+    document = arms()
+    for robot in document["robots"]:
+        robot["source"] = source
+    done = run("report", written(document, tmp_path / "twice.json"))
+    assert done.code == 0, done.err
+
+
+def test_a_report_from_before_the_outcome_was_written_is_read(tmp_path: Path) -> None:
+    document: Any = arms()
+    del document["asked"], document["reason"]
+    for robot in document["robots"]:
+        del robot["error"]
+    assert run("report", written(document, tmp_path / "old.json")).code == 0

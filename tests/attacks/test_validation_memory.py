@@ -1,0 +1,222 @@
+"""Memory is asked for before it is taken, bounded, and grows with the robot's size, not with its square."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import urdfkin
+from urdfkin.oracle import Oracle, OracleError
+from urdfkin.recursion import evaluate
+from urdfkin.recursion.plan import make_plan
+from urdfkin.validation import chunk as chunk_module
+from urdfkin.validation import comparing, memory
+from urdfkin.validation.campaign import _subject, validate
+from urdfkin.validation.chunk import chunks, run_chunk
+from urdfkin.validation.outcome import Verdict
+
+GB = 10**9
+
+
+def chain(joints: int, kind: str, leaves: int = 0) -> str:
+    """A chain of joints, and fixed leaves at its end."""
+    moves = '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    parts = ['<robot name="r"><link name="l0"/>']
+    for i in range(joints + leaves):
+        parent, type_ = (i, kind) if i < joints else (joints, "fixed")
+        parts.append(
+            f'<link name="l{i + 1}"/><joint name="j{i}" type="{type_}"><parent link="l{parent}"/>'
+            f'<child link="l{i + 1}"/><origin xyz="0.1 0 0"/>{moves if type_ != "fixed" else ""}</joint>'
+        )
+    return "".join(parts) + "</robot>"
+
+
+def test_blocks_cover_everything_once_and_keep_to_their_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(comparing, "BLOCK_BYTES", 1000)
+    for count, size, most in ((10, 300, 3), (9, 300, 3), (1, 300, 1), (5, 2000, 1), (0, 300, 0)):
+        found = list(comparing.blocks(count, size))
+        assert [i for block in found for i in range(count)[block]] == list(range(count))
+        assert max(block.stop - block.start for block in found) == most
+
+
+@pytest.mark.parametrize("source", ["talos", "double_pendulum", "planar_two_link"])
+@pytest.mark.parametrize("root_joint", [None, "planar"])
+def test_comparing_in_blocks_changes_no_number(
+    source: str, root_joint: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (chunk,) = chunks(_subject(source, None, root_joint), 5, 3)
+    whole = run_chunk(chunk)
+    monkeypatch.setattr(comparing, "BLOCK_BYTES", 2 * comparing.frame_bytes(8, len(whole.joints)))
+    parts = run_chunk(chunk)
+    assert parts.tallies == whole.tallies
+    assert list(parts.tallies) == list(whole.tallies)
+
+
+def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes: list[int] = []
+
+    def seen(function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*args: Any, **kwargs: Any) -> Any:
+            result = function(*args, **kwargs)
+            sizes.extend(part.nbytes for part in (result if isinstance(result, tuple) else (result,)))
+            return result
+
+        return call
+
+    for name in ("placements", "velocities", "accelerations", "jacobians", "jacobian_rates"):
+        monkeypatch.setattr(evaluate, name, seen(getattr(evaluate, name)))
+    for name in ("placements", "velocities", "accelerations", "jacobians", "jacobian_rates_of_all"):
+        monkeypatch.setattr(Oracle, name, seen(getattr(Oracle, name)))
+    monkeypatch.setattr(Oracle, "joint_jacobians", seen(Oracle.joint_jacobians))
+    monkeypatch.setattr(comparing, "BLOCK_BYTES", 100_000)
+    (chunk,) = chunks(_subject("talos", None, None), 5, 3)
+    run_chunk(chunk)
+    assert len(sizes) > 100
+    assert 50_000 < max(sizes) <= 100_000
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+def test_a_plan_of_all_frames_grows_with_the_links_not_with_their_square() -> None:
+    peaks = []
+    for links in (500, 2000):
+        tree = urdfkin.load(chain(links, "fixed")).tree
+        tracemalloc.start()
+        make_plan(tree, range(len(tree.links)))
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 6 * peaks[0]
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+def test_a_plan_knows_its_frames_as_their_paths_do() -> None:
+    robot = urdfkin.load("talos")
+    links = [5, 40, 0, 17, 40]
+    plan = make_plan(robot.tree, links)
+    paths = [robot.tree.path(link) for link in links]
+    assert plan.depth.tolist() == [len(path) for path in paths]
+    wanted = sorted({i for path in paths for i in path if robot.tree.joints[i].kind.nv})
+    assert list(plan.joints) == wanted
+    for (_, place), leaders in zip(plan.frames, plan.leaders, strict=True):
+        own = {wanted.index(i) for i in paths[place] if i in wanted}
+        assert {int(plan.columns[c, 0]) for c in range(len(plan.columns)) if leaders[c] >= 0} == own
+
+
+def test_a_robot_that_does_not_fit_is_not_verified_and_pinocchio_is_not_asked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def asked(*_: object, **__: object) -> None:
+        raise AssertionError("Pinocchio was asked")
+
+    monkeypatch.setattr(memory, "share", lambda processes=1: 2_000_000 // processes)
+    monkeypatch.setattr(Oracle, "__init__", asked)
+    monkeypatch.setattr(chunk_module, "_kept", {})
+    robot = validate("talos", samples=1).robots[0]
+    assert robot.verdict is Verdict.NOT_VERIFIED
+    assert robot.reason is not None
+    assert (
+        "checking it would take more memory than a validation keeps to (50% of what is free" in robot.reason
+    )
+    assert "GB, where 0.002 GB are left to each process" in robot.reason
+    assert robot.portrait.model is not None
+
+
+def test_processes_share_what_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "_free", lambda: iter([12 * GB, 8 * GB]))
+    assert memory.share() == 4 * GB
+    assert memory.share(4) == GB
+    monkeypatch.setattr(memory, "_free", lambda: iter([]))
+    assert memory.share() is None
+
+
+def test_what_a_robot_needs_grows_with_the_cube_of_its_rates_and_with_its_links() -> None:
+    trees = [urdfkin.load(chain(n, "revolute")).tree for n in (100, 200)]
+    needs = [memory.needed(tree, 28) for tree in trees]
+    assert needs[1] - needs[0] >= 64 * (200**3 - 100**3)
+    assert needs[0] == 64 * 100**3 + 24_000 * 101 + 12 * min(32 * 2**20, 2 * 101 * 28 * 8 * 600)
+    alone = urdfkin.load(chain(0, "fixed")).tree
+    assert memory.needed(alone, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
+    wide = urdfkin.load(chain(100, "revolute", leaves=1000)).tree
+    assert memory.needed(wide, 28) > needs[0] + 1000 * 16_000
+    memory.demand(trees[0], 28, needs[0])
+    memory.demand(trees[0], 28, None)
+    with pytest.raises(OracleError, match="more memory"):
+        memory.demand(trees[0], 28, needs[0] - 1)
+
+
+@pytest.fixture
+def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str], None]:
+    """Files of a system: /proc and /sys/fs/cgroup."""
+    monkeypatch.setattr(memory, "_PROC", tmp_path / "proc")
+    monkeypatch.setattr(memory, "_GROUPS", tmp_path / "cgroup")
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+
+    def write(name: str, text: str) -> None:
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+    write("proc/meminfo", "MemTotal: 9000000 kB\nMemAvailable:  8000000 kB\n")
+    return write
+
+
+def test_the_machines_memory_counts(system: Callable[[str, str], None]) -> None:
+    assert memory.share() == 8_000_000 * 1024 // 2
+
+
+def test_the_control_groups_limits_count_less_what_they_would_give_back(
+    system: Callable[[str, str], None],
+) -> None:
+    system("proc/self/cgroup", "0::/outer/inner\n")
+    system("cgroup/outer/memory.max", "6000000000\n")
+    system("cgroup/outer/memory.current", "5000000000\n")
+    system("cgroup/outer/memory.stat", "anon 1\ninactive_file 2000000000\n")
+    system("cgroup/outer/inner/memory.max", "max\n")
+    system("cgroup/outer/inner/memory.current", "1000000000\n")
+    assert memory.share() == 1_500_000_000
+    system("cgroup/outer/inner/memory.max", "1500000000\n")
+    assert memory.share() == 250_000_000
+
+
+def test_a_container_that_sees_its_own_group_as_the_topmost_counts(
+    system: Callable[[str, str], None],
+) -> None:
+    system("proc/self/cgroup", "4:memory:/docker/abc\n2:cpu:/docker/abc\n")
+    system("cgroup/memory/memory.limit_in_bytes", "3000000000\n")
+    system("cgroup/memory/memory.usage_in_bytes", "1000000000\n")
+    assert memory.share() == 1_000_000_000
+
+
+@pytest.mark.slow
+def test_a_limit_of_the_process_counts() -> None:
+    """`ulimit -v`: what does not fit is told, and not found out by a MemoryError."""
+    code = (
+        "import resource; resource.setrlimit(resource.RLIMIT_AS, (3 * 10**9,) * 2)\n"
+        "from urdfkin.validation import memory; print(memory.share())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert 0 < int(done.stdout) < 1.5 * GB
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+def test_many_fixed_links_are_checked_in_little_memory() -> None:
+    """In a process of its own, whose peak is its own."""
+    code = (
+        "import resource, sys, warnings; warnings.simplefilter('ignore')\n"
+        "from tests.attacks.test_validation_memory import chain\n"
+        "from urdfkin.validation.campaign import validate\n"
+        "def peak(): return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024\n"
+        "assert validate(chain(300, 'fixed'), samples=1).passed\n"
+        "before = peak()\n"
+        "assert validate(chain(5000, 'fixed'), samples=1).passed\n"
+        "print(peak() - before)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert int(done.stdout) < 400  # MB; paths of all frames alone took 1 GB

@@ -1,0 +1,309 @@
+"""No robot takes a validation with it, whatever it raises; none is passed over in silence."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.validation import raising_worker
+from urdfkin.errors import UrdfkinError
+from urdfkin.validation import answer, campaign, engine, workers
+from urdfkin.validation.campaign import validate
+from urdfkin.validation.chunk import Chunk, ChunkResult, chunks, run_chunk
+from urdfkin.validation.engine import Here, OnExecutor, Task
+from urdfkin.validation.outcome import Verdict, outcome
+from urdfkin.validation.report import ValidationReport
+
+ROBOTS = ["double_pendulum", "ur5", "planar_two_link"]
+ROOT = Path(__file__).parents[2]
+
+
+#: The ways of running; what crosses the border between processes is odd enough.
+WAYS: dict[str, tuple[Callable[[], Any], Sequence[str]]] = {
+    "here": (dict, tuple(raising_worker.ERRORS)),
+    "executor": (lambda: {"executor": ThreadPoolExecutor(2)}, ["memory"]),
+    "jobs": (lambda: {"jobs": 2}, ["unpicklable", "pinocchio"]),
+    "isolate": (lambda: {"jobs": 2, "isolate": True}, ["unpicklable", "recursion"]),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("way", "error"), [(way, error) for way, (_, errors) in WAYS.items() for error in errors]
+)
+def test_whatever_a_robot_raises_is_its_result_and_the_others_are_verified(
+    way: str, error: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("URDFKIN_TEST_ERROR", error)
+    monkeypatch.setattr(workers, "WORKER", "tests.validation.raising_worker")
+    monkeypatch.setattr(answer, "run_chunk", raising_worker.raising)
+    report = validate(ROBOTS, samples=60, **WAYS[way][0]())
+    assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "verified"]
+    robot = report.robots[1]
+    assert robot.reason is not None
+    assert robot.reason.startswith("an unforeseen error in urdfkin, please report it: ")
+    assert raising_worker.WORDS[error] in robot.reason
+    assert robot.error is not None
+    assert "in raising" in robot.error
+    assert report.as_dict()["robots"][1]["error"] == robot.error
+    assert (report.passed, report.exit_code) == (False, 3)
+
+
+class Refusing(Executor):
+    """An executor that breaks down after some chunks."""
+
+    def __init__(self, takes: int, *, when_asked: bool) -> None:
+        self._left, self._when_asked = takes, when_asked
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future = Future[Any]()
+        self._left -= 1
+        if self._left >= 0:
+            future.set_result(fn(*args, **kwargs))
+        elif self._when_asked:
+            future.set_exception(BrokenExecutor("a worker died"))
+        else:
+            raise BrokenExecutor("a worker died")
+        return future
+
+
+@pytest.mark.parametrize("when_asked", [True, False])
+def test_an_executor_that_breaks_costs_what_it_did_not_do(when_asked: bool) -> None:
+    report = validate(ROBOTS, samples=30, executor=Refusing(2, when_asked=when_asked))
+    assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "not verified"]
+    for robot in report.robots[1:]:
+        assert "BrokenExecutor: a worker died" in str(robot.reason)
+    assert report.asked == 3
+
+
+def test_a_process_pool_of_someone_elses_can_run_the_chunks() -> None:
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        report = validate(["ur5", "no such robot"], samples=30, executor=pool)
+    assert [robot.verdict for robot in report.robots] == ["verified", "bad input"]
+
+
+def test_an_executor_has_a_bounded_number_of_chunks_at_a_time_and_all_of_them_in_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    flying, most = 0, 0
+
+    class Counting(Executor):
+        def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+            nonlocal flying, most
+            flying += 1
+            most = max(most, flying)
+            future = Future[Any]()
+            future.set_result(fn(*args, **kwargs))
+            wait = future.result
+
+            def result(timeout: float | None = None) -> Any:
+                nonlocal flying
+                flying -= 1
+                return wait(timeout)
+
+            setattr(future, "result", result)  # noqa: B010
+            return future
+
+    monkeypatch.setattr(engine, "IN_FLIGHT", 3)
+    report = validate(["planar_two_link", "double_pendulum"], samples=200, executor=Counting())
+    assert report.passed
+    assert (most, flying) == (3, 0)
+    assert {robot.samples for robot in report.robots} == {203}
+
+
+@pytest.mark.parametrize("how", [{}, {"executor": ThreadPoolExecutor(1)}], ids=["here", "executor"])
+def test_the_chunks_of_a_robot_that_failed_are_not_run(how: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine, "IN_FLIGHT", 1)
+    ran: list[int] = []
+
+    def failing(chunk: Chunk) -> ChunkResult:
+        ran.append(chunk.index)
+        if chunk.index == 1:
+            raise UrdfkinError("no")
+        return run_chunk(chunk)
+
+    monkeypatch.setattr(answer, "run_chunk", failing)
+    robot = validate("planar_two_link", samples=100, **how).robots[0]
+    assert ran == [0, 1]
+    assert (robot.verdict, robot.reason, robot.samples) == (Verdict.BAD_INPUT, "no", 28)
+
+
+def test_a_disagreement_stays_one_whatever_else_goes_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    from dataclasses import replace  # noqa: PLC0415
+
+    def failing(chunk: Chunk) -> ChunkResult:
+        if chunk.index == 1:
+            raise MemoryError
+        result = run_chunk(chunk)
+        return replace(result, tallies={k: replace(t, failed=1) for k, t in result.tallies.items()})
+
+    monkeypatch.setattr(answer, "run_chunk", failing)
+    report = validate("planar_two_link", samples=50)
+    robot = report.robots[0]
+    assert robot.verdict is Verdict.DISAGREES
+    assert str(robot.reason).startswith("20 of ")
+    assert "results lie outside their bound; an unforeseen error" in str(robot.reason)
+    assert "MemoryError: no message" in str(robot.reason)
+    assert report.exit_code == 1
+
+
+def test_what_the_machinery_itself_raises_is_every_unfinished_robots_result(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    right = Here.run
+
+    def breaks(self: Here, tasks: Sequence[Task], enter: engine.Enter) -> None:
+        right(self, [task for task in tasks if task.robot == 0], enter)
+        raise OSError("no more of anything")
+
+    monkeypatch.setattr(Here, "run", breaks)
+    report = validate(ROBOTS, samples=1)
+    assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "not verified"]
+    assert "OSError: no more of anything" in str(report.robots[2].reason)
+    assert "Traceback" in str(report.robots[2].error)
+
+
+def test_a_run_that_reports_on_fewer_robots_than_it_was_asked_for_has_not_passed() -> None:
+    whole = validate(["planar_two_link", "double_pendulum"], samples=0)
+    part = ValidationReport(whole.robots[:1], 2, 0, 0, whole.started, 1.0)
+    assert whole.passed
+    assert (part.passed, part.exit_code) == (False, 3)
+    assert part.outcome.reason == "1 of 2 robots without a report"
+
+
+def test_a_run_over_no_robot_has_not_passed() -> None:
+    report = validate([])
+    assert (report.passed, report.exit_code) == (False, 3)
+    assert report.as_dict()["reason"] == "no robot was validated"
+
+
+def test_an_interrupted_run_has_not_passed_even_where_every_robot_is_verified() -> None:
+    found = outcome(["verified", "verified"], asked=2, interrupted=True)
+    assert (found.passed, found.exit_code) == (False, 130)
+    assert outcome(["verified"], asked=1, interrupted=False).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "interrupted", "code"),
+    [
+        (["verified", "disagrees", "bad input", "not verified"], True, 1),
+        (["verified", "bad input", "not verified"], True, 130),
+        (["verified", "bad input", "not verified"], False, 2),
+        (["verified", "not verified"], False, 3),
+    ],
+)
+def test_exit_1_is_a_disagreement_and_nothing_else(verdicts: list[str], interrupted: bool, code: int) -> None:
+    found = outcome(verdicts, asked=len(verdicts), interrupted=interrupted)
+    assert found.exit_code == code
+    assert not found.passed
+
+
+@pytest.mark.parametrize("way", ["here", "executor"])
+def test_an_interrupt_keeps_what_had_finished_and_drops_what_waits(
+    way: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ran: list[tuple[str, int]] = []
+
+    def interrupted(chunk: Chunk) -> ChunkResult:
+        ran.append((chunk.subject.label, chunk.index))
+        if ran[-1] == ("ur5", 1):
+            raise KeyboardInterrupt
+        return run_chunk(chunk)
+
+    class Now(Executor):
+        def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+            future = Future[Any]()
+            future.set_result(fn(*args, **kwargs))
+            return future
+
+    monkeypatch.setattr(engine, "IN_FLIGHT", 1)
+    monkeypatch.setattr(answer, "run_chunk", interrupted)
+    report = validate(ROBOTS, samples=60, executor=None if way == "here" else Now())
+    assert ran[-1] == ("ur5", 1)
+    assert report.interrupted
+    first, second, third = report.robots
+    assert first.verdict is Verdict.VERIFIED
+    assert (second.samples, second.verdict) == (28, Verdict.NOT_VERIFIED)
+    assert second.reason == "interrupted: 28 of 63 samples were compared"
+    assert (third.samples, third.results) == (0, 0)
+    assert third.reason == "interrupted: 0 of 63 samples were compared"
+    assert report.exit_code == 130
+
+
+def test_an_executors_waiting_chunks_are_cancelled_on_an_interrupt() -> None:
+    made: list[Future[Any]] = []
+
+    class Never(Executor):
+        def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+            made.append(Future())
+            if len(made) == 3:
+                raise KeyboardInterrupt
+            return made[-1]
+
+    tasks = [Task(0, chunk) for chunk in chunks(campaign._subject("ur5", None, None), 100, 0)]
+    with pytest.raises(KeyboardInterrupt):
+        OnExecutor(Never()).run(tasks, lambda *_: None)
+    assert [future.cancelled() for future in made] == [True, True, False]
+
+
+def _limited(descriptors: int) -> Callable[[], None]:
+    return lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors))
+
+
+def _command(*words: str, **how: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "urdfkin", *words], capture_output=True, text=True, check=False, **how
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("descriptors", [6, 7, 8, 9, 12])
+def test_without_descriptors_a_robot_is_verified_or_said_not_to_be(descriptors: int, tmp_path: Path) -> None:
+    done = _command(
+        "validate", "double_pendulum", "ur5", "--isolate", "--jobs", "2", "--samples", "2",
+        preexec_fn=_limited(descriptors),
+    )  # fmt: skip
+    verified = sum(line.endswith("verified ") and "not" not in line for line in done.stdout.splitlines())
+    assert (done.returncode == 0) == (verified == 2), done.stdout + done.stderr
+    assert done.returncode in (0, 2, 3, 70)
+
+
+@pytest.mark.slow
+def test_robots_are_checked_from_a_folder_that_is_gone(tmp_path: Path) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    script = (
+        f"cd {gone} && rmdir {gone} && exec {sys.executable} -m urdfkin validate ur5 --isolate --samples 2"
+    )
+    path = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(["sh", "-c", script], capture_output=True, text=True, check=False, env=path)
+    assert done.returncode == 0, done.stderr
+    assert "1 robot, " in done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["jobs=2", "isolate=True"])
+def test_a_script_needs_no_guard_and_nothing_of_the_current_folder_is_run(how: str, tmp_path: Path) -> None:
+    for planted in ("urdfkin", "multiprocessing", "json", "pickle", "queue"):
+        (tmp_path / f"{planted}.py").write_text("print('planted')\nraise SystemExit(9)\n")
+    scripts = tmp_path / "scripts"
+    scripts.mkdir()
+    script = scripts / "script.py"
+    script.write_text(
+        "print('once')\nfrom urdfkin.validation.campaign import validate\n"
+        f"report = validate(['double_pendulum', 'planar_two_link'], samples=30, {how})\n"
+        "print(report.passed, len(report.robots))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.splitlines() == ["once", "True 2"], done.stderr

@@ -1,0 +1,208 @@
+"""Every form of a report tells every verdict with its reason, and how the whole run ended."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from lxml import etree
+from rich.console import Console
+
+from tests.report.documents import arms, failing
+from tests.report.test_junit import read
+from urdfkin.report.consistency import contradictions
+from urdfkin.report.document import Document, outcome_of
+from urdfkin.report.html import as_html
+from urdfkin.report.markdown import as_markdown
+from urdfkin.report.terminal import print_report
+from urdfkin.validation import chains as chains_module
+from urdfkin.validation.campaign import validate
+from urdfkin.verification.tables import TableCheck
+
+
+def _outside(_: pytest.MonkeyPatch) -> Document:
+    document = failing()
+    del document["robots"][1:]
+    document |= {"asked": 1, "reason": "1 of 1 robot disagrees"}
+    return document
+
+
+def _tables(monkeypatch: pytest.MonkeyPatch) -> Document:
+    found = TableCheck(13, 0.0021, 0.0, {"placement": 5e9}, {"placement": 2.5e7}, False)
+    monkeypatch.setattr(chains_module, "check_table", lambda *_: found)
+    return _made("ur5")
+
+
+def _tables_without_numbers(monkeypatch: pytest.MonkeyPatch) -> Document:
+    right = chains_module.chains_of
+    monkeypatch.setattr(
+        "urdfkin.validation.portrait.chains_of",
+        lambda *args: tuple(chain | {"share_of_bound": None, "worst": None} for chain in right(*args)),
+    )
+    return _made("ur5")
+
+
+def _refused(_: pytest.MonkeyPatch) -> Document:
+    huge = "".join(
+        f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'
+        f'<child link="l{i + 1}"/><axis xyz="0 0 1"/></joint>'
+        for i in range(320)
+    )
+    return _made(f'<robot name="huge"><link name="l0"/>{huge}</robot>')
+
+
+def _broken(_: pytest.MonkeyPatch) -> Document:
+    return _made('<robot name="r"><link name="a"/><link name="b"/></robot>')
+
+
+def _crashed(monkeypatch: pytest.MonkeyPatch) -> Document:
+    def crash(_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("urdfkin.validation.answer.run_chunk", crash)
+    return _made("ur5")
+
+
+def _interrupted(_: pytest.MonkeyPatch) -> Document:
+    def stop(done: int, *_: object) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    return _made(["planar_two_link", "double_pendulum", "ur5"], samples=50, progress=stop)
+
+
+def _none(_: pytest.MonkeyPatch) -> Document:
+    return _made([])
+
+
+def _missing(_: pytest.MonkeyPatch) -> Document:
+    document = arms()
+    document |= {"asked": 3, "passed": False, "reason": "1 of 3 robots without a report"}
+    return document
+
+
+def _made(robots: Any, **how: Any) -> Document:
+    document: Document = json.loads(json.dumps(validate(robots, **{"samples": 2} | how).as_dict()))
+    return document
+
+
+#: What went wrong, the verdicts, what is said of the last robot that is not verified, the exit code, and what
+#: JUnit counts: (failures, errors).
+CASES: dict[str, tuple[Callable[[pytest.MonkeyPatch], Document], list[str], str, int, tuple[int, int]]] = {
+    "results outside": (_outside, ["disagrees"], "3 of 8,000 results lie outside their bound", 1, (2, 0)),
+    "tables": (
+        _tables,
+        ["disagrees"],
+        "the Denavit-Hartenberg tables from base_link to tool0 disagree: 2.5e+07 times the bound,"
+        " tip 0.0021 m off",
+        1,
+        (1, 0),
+    ),
+    "tables, no number": (_tables_without_numbers, ["disagrees"], "disagree: beyond all numbers", 1, (1, 0)),
+    "refused": (_refused, ["not verified"], "memory grows with the cube of the rates", 3, (1, 0)),
+    "bad input": (_broken, ["bad input"], "URDF", 2, (0, 1)),
+    "crash": (_crashed, ["not verified"], "please report it: MemoryError: no message", 3, (1, 0)),
+    "interrupt": (
+        _interrupted,
+        ["verified", "not verified", "not verified"],
+        "interrupted: 0 of 53 samples were compared",
+        130,
+        (2, 1),
+    ),
+    "nothing": (_none, [], "", 3, (0, 1)),
+    "missing": (_missing, ["verified", "verified"], "", 3, (0, 1)),
+}
+
+
+def terminal(document: Document) -> str:
+    stream = io.StringIO()
+    print_report(document, Console(file=stream, width=400))
+    return stream.getvalue()
+
+
+def unescaped(text: str) -> str:
+    """HTML's and Markdown's escapes undone."""
+    for escaped, plain in (("&#39;", "'"), ("&lt;", "<"), ("&gt;", ">"), ("&amp;", "&"), ("\\", "")):
+        text = text.replace(escaped, plain)
+    return text
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+@pytest.mark.parametrize("name", CASES)
+def test_every_form_tells_the_verdict_and_its_reason(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    make, verdicts, reason, code, junit = CASES[name]
+    document = make(monkeypatch)
+    found = outcome_of(document)
+    assert list(contradictions(document)) == []
+    assert [robot["verdict"] for robot in document["robots"]] == verdicts
+    assert (found.exit_code, found.passed, document["passed"]) == (code, False, False)
+    assert document["reason"] == found.reason
+    assert found.reason
+    root = read(document)
+    forms = {
+        "terminal": terminal(document),
+        "markdown": unescaped(as_markdown(document)),
+        "html": unescaped(as_html(document)),
+        "junit": " ".join(text for case in root.iter() for text in (*case.attrib.values(), case.text or "")),
+    }
+    told = {robot["reason"] for robot in document["robots"] if robot["verdict"] != "verified"}
+    assert reason == "" or any(reason in (each or "") for each in told)
+    for form, text in forms.items():
+        if form != "junit" or name in ("interrupt", "nothing", "missing"):
+            assert found.reason in text, form
+        if reason:
+            assert reason in text, form
+        for verdict in verdicts:
+            assert verdict in text, form
+    assert (int(root.get("failures", "0")), int(root.get("errors", "0"))) == junit
+    assert "✅ Verified" not in forms["markdown"]
+    assert ">Verified against" not in forms["html"].replace("\n", "")
+
+
+def test_a_run_that_passed_says_nothing_else_in_any_form() -> None:
+    document = arms()
+    assert (document["passed"], document["reason"], outcome_of(document).exit_code) == (True, None, 0)
+    assert [robot["reason"] for robot in document["robots"]] == [None, None]
+    for text in (terminal(document), as_markdown(document), as_html(document)):
+        assert "ot passed" not in text
+    root = read(document)
+    assert (root.get("failures"), root.get("errors")) == ("0", "0")
+    assert len(root.findall("testsuite")) == 2
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+def test_junit_tells_a_failure_from_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A failure: it was compared, or could not be. An error: there was nothing to compare with."""
+    for name, kind, type_ in (
+        ("results outside", "failure", "disagrees"),
+        ("refused", "failure", "not verified"),
+        ("bad input", "error", "bad input"),
+    ):
+        root = read(CASES[name][0](monkeypatch))
+        case = root.xpath("//testcase[@name='verdict']")
+        assert isinstance(case, list)
+        assert isinstance(case[0], etree._Element)
+        (outcome,) = case[0]
+        assert (outcome.tag, outcome.get("type")) == (kind, type_)
+    checks = read(CASES["results outside"][0](monkeypatch)).xpath("//failure[@type='disagreement']")
+    assert isinstance(checks, list)
+    assert len(checks) == 1
+
+
+def test_the_traceback_of_a_crash_is_in_the_data_and_in_junit(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = _crashed(monkeypatch)
+    error = document["robots"][0].get("error")
+    assert error is not None
+    assert error.startswith("Traceback (most recent call last)")
+    assert "in crash" in (read(document).findtext(".//failure") or "")
+
+
+def test_a_partly_compared_robot_says_how_many_samples_and_keeps_its_figures(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = _interrupted(monkeypatch)["robots"][1]
+    assert (robot["samples"], robot["results"] > 0) == (28, True)
+    assert robot["reason"] == "interrupted: 28 of 53 samples were compared"

@@ -1,0 +1,94 @@
+"""A tally counts what lies outside its bound, adds up in any cut, and knows the worst case."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from urdfkin.validation.tally import HISTOGRAM_EDGES, Inputs, Tally, histogram_bin, percentile, tally
+from urdfkin.verification.bounds import EPS, Bound
+
+FRAMES = ("a", "b", "c")
+
+
+def made(units: np.ndarray, first: int = 0, names: tuple[str, ...] = FRAMES) -> Tally:
+    """The tally of results that are off by so many eps, where 10 eps are allowed."""
+    ours = np.ones((*units.shape, 6))
+    ours[..., 2] += units * EPS
+    bound = Bound(np.ones_like(ours), np.full((*units.shape, 1), 10.0))
+    inputs: list[Inputs] = [([float(i)], [0.0], [0.0]) for i in range(first, first + len(units))]
+    return tally(ours, np.ones_like(ours), bound, names, first, inputs)
+
+
+@pytest.mark.parametrize(
+    ("units", "failed"), [(9.0, 0), (10.0, 0), (11.0, 1), (14.0, 1), (math.inf, 1), (math.nan, 1)]
+)
+def test_a_result_outside_its_bound_is_counted_however_little_it_lies_outside(
+    units: float, failed: int
+) -> None:
+    found = made(np.array([[1.0, units, 2.0]]))
+    assert (found.results, found.failed) == (3, failed)
+    assert (found.share > 1.0) == bool(failed)
+    assert found.case is not None
+    assert found.case.frame == "b"
+
+
+@pytest.mark.parametrize("cut", [1, 3, 7])
+def test_samples_and_frames_can_be_cut_anywhere(cut: int) -> None:
+    units = np.round(np.random.default_rng(5).uniform(0.0, 12.0, (8, 3)))
+    whole = made(units)
+    assert made(units[:cut]) + made(units[cut:], cut) == whole
+    assert made(units[cut:], cut) + made(units[:cut]) == whole
+    for at in (1, 2):
+        left, right = made(units[:, :at], 0, FRAMES[:at]), made(units[:, at:], 0, FRAMES[at:])
+        assert left.beside(right) == whole
+    nothing = made(units[:, :0], 0, ())
+    assert nothing.beside(whole) == whole == whole.beside(nothing)
+
+
+def test_of_equal_cases_the_earlier_sample_wins_and_then_the_earlier_frame() -> None:
+    same = np.full((4, 3), 3.0)
+    found = made(same[2:], 2) + made(same[:2])
+    assert found.case is not None
+    assert (found.case.sample, found.case.frame, found.case.q) == (0, "a", (0.0,))
+    parts = made(same[:, :1], 0, ("a",)).beside(made(same[:, 1:], 0, ("b", "c")))
+    assert parts.case is not None
+    assert (parts.case.sample, parts.case.frame) == (0, "a")
+
+
+def test_a_percentile_is_the_upper_edge_of_its_bin_and_never_above_the_worst() -> None:
+    edges = [1.0, 2.0, 4.0]
+    histogram = [5, 3, 1, 1]
+    assert percentile(histogram, edges, 9.0, 50.0) == 0.0
+    assert percentile(histogram, edges, 9.0, 80.0) == 2.0
+    assert percentile(histogram, edges, 3.0, 90.0) == 3.0
+    assert percentile(histogram, edges, 9.0, 100.0) == 4.0
+    assert percentile([0, 0, 0, 0], edges, 0.0, 50.0) == 0.0
+
+
+def test_what_lies_on_an_edge_is_counted_above_it() -> None:
+    edge = float(HISTOGRAM_EDGES[30])
+    assert histogram_bin(edge, HISTOGRAM_EDGES) == 31
+    assert histogram_bin(math.nextafter(edge, 0.0), HISTOGRAM_EDGES) == 30
+    assert histogram_bin(math.inf, HISTOGRAM_EDGES) == len(HISTOGRAM_EDGES)
+    assert histogram_bin(0.0, HISTOGRAM_EDGES) == 0
+
+
+def test_the_histogram_has_ten_bins_a_decade_from_a_thousandth_to_a_hundred_thousand() -> None:
+    assert len(HISTOGRAM_EDGES) == 81
+    np.testing.assert_allclose(HISTOGRAM_EDGES[[0, 10, 30, 80]], [1e-3, 1e-2, 1.0, 1e5])
+
+
+def test_results_without_numbers_agree_and_have_no_bound() -> None:
+    """The Jacobian of a robot that does not move."""
+    nothing = np.zeros((4, 3, 6, 0))
+    bound = Bound(nothing, np.ones((4, 3, 1, 1)))
+    found = tally(nothing, nothing, bound, FRAMES, 0, [([], [], [])] * 4)
+    assert found == Tally(12, 0, 0.0, 0.0, (12, *([0] * 81)), (0.0,) * 3, None, (math.inf, 0.0))
+
+
+def test_tallies_of_other_frames_do_not_add_up() -> None:
+    with pytest.raises(ValueError, match=r"shorter|longer"):
+        _ = made(np.ones((1, 3))) + made(np.ones((1, 2)), 0, FRAMES[:2])

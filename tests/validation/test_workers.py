@@ -1,0 +1,156 @@
+"""A process that dies costs its robot and nothing else; everything else is as in one process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from urdfkin.validation import workers
+from urdfkin.validation.campaign import validate
+from urdfkin.validation.outcome import Verdict
+
+DEADLY = "ur5"
+ROBOTS = ["double_pendulum", DEADLY, "iris_simple"]
+HOW: list[dict[str, Any]] = [{"jobs": 2}, {"jobs": 2, "isolate": True}, {"isolate": True}]
+
+
+@pytest.fixture
+def deaths(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Workers that die over a robot: as often as the file says."""
+    monkeypatch.setattr(workers, "WORKER", "tests.validation.deadly_worker")
+    path = tmp_path / "deaths"
+    monkeypatch.setenv("URDFKIN_TEST_DEATHS", str(path))
+    return path
+
+
+def numbers(report: Any) -> Any:
+    return [
+        {key: value for key, value in robot.items() if key not in ("seconds", "timings")}
+        for robot in report.as_dict()["robots"]
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", HOW, ids=str)
+def test_processes_change_no_number(how: dict[str, Any]) -> None:
+    with_them = validate(["ur5", "double_pendulum"], samples=60, **how)
+    without = validate(["ur5", "double_pendulum"], samples=60)
+    assert with_them.passed
+    assert numbers(with_them) == numbers(without)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("how", "words"), [(HOW[0], "died twice, then alone"), (HOW[1], "died"), (HOW[2], "died")]
+)
+def test_a_death_is_that_robots_result_and_the_others_go_on(
+    how: dict[str, Any], words: str, deaths: Path
+) -> None:
+    deaths.write_text("99")
+    report = validate(ROBOTS, samples=60, **how)
+    assert [robot.verdict for robot in report.robots] == [
+        Verdict.VERIFIED,
+        Verdict.NOT_VERIFIED,
+        Verdict.VERIFIED,
+    ]
+    reason = f"ur5: the process that checked it {words}: found signal SIGSEGV"
+    assert report.robots[1].reason == reason
+    assert not report.passed
+    assert report.exit_code == 3
+
+
+@pytest.mark.slow
+def test_a_robot_over_which_one_worker_died_is_tried_again_and_verified_in_full(deaths: Path) -> None:
+    deaths.write_text("1")
+    report = validate(ROBOTS, samples=60, jobs=2)
+    assert report.passed
+    assert deaths.read_text() == "0"
+    assert numbers(report) == numbers(validate(ROBOTS, samples=60))
+
+
+@pytest.mark.slow
+def test_what_cannot_be_read_is_reported_as_without_processes() -> None:
+    robots = ["<robot/>", "no such robot"]
+    plain = validate(robots, samples=60)
+    assert {robot.verdict for robot in plain.robots} == {Verdict.BAD_INPUT}
+    assert plain.exit_code == 2
+    for how in HOW:
+        assert numbers(validate(robots, samples=60, **how)) == numbers(plain)
+
+
+@pytest.mark.slow
+def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A library's process lives on after an interrupt; what hangs in compiled code must not."""
+    monkeypatch.setattr(workers, "WORKER", "tests.validation.sleeping_worker")
+    started: list[Any] = []
+    right = workers._interpreter
+
+    def kept(pipe: int) -> Any:
+        started.append(right(pipe))
+        if len(started) == 2:
+            raise KeyboardInterrupt
+        return started[-1]
+
+    monkeypatch.setattr(workers, "_interpreter", kept)
+    report = validate(["ur5", "panda"], samples=0, isolate=True, jobs=2)
+    assert report.interrupted
+    assert started[0].poll() == -9
+    started[1].kill()
+    started[1].wait()
+
+
+def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(_: int) -> None:
+        raise OSError(24, "Too many open files")
+
+    monkeypatch.setattr(workers, "_interpreter", none)
+    for how in HOW:
+        report = validate(["ur5", "planar_two_link"], samples=60, **how)
+        assert [robot.verdict for robot in report.robots] == [Verdict.NOT_VERIFIED] * 2
+        reason = "no process could be started for it: OSError: [Errno 24] Too many open files"
+        assert {robot.reason for robot in report.robots} == {reason}
+        assert not report.passed
+
+
+@pytest.mark.slow
+def test_what_does_not_start_any_more_is_done_by_those_that_are_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    right, asked = workers._interpreter, 0
+
+    def one(pipe: int) -> Any:
+        nonlocal asked
+        asked += 1
+        if asked == 2:
+            raise OSError(24, "Too many open files")
+        return right(pipe)
+
+    monkeypatch.setattr(workers, "_interpreter", one)
+    for how in HOW[:2]:
+        asked = 0
+        assert validate(["double_pendulum", "planar_two_link"], samples=60, **how).passed
+        assert asked >= 2
+
+
+def test_a_worker_runs_nothing_of_the_current_folder(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    codes: list[list[str]] = []
+
+    class RecordedError(Exception):
+        pass
+
+    def started(command: list[str], **_: object) -> None:
+        codes.append(command)
+        raise RecordedError
+
+    monkeypatch.setattr("subprocess.Popen", started)
+    monkeypatch.syspath_prepend("")
+    with pytest.raises(RecordedError):
+        workers._interpreter(3)
+    assert codes[0][1] == "-P"
+    path = codes[0][3].partition("sys.path[:] = ")[2].partition("; from")[0]
+    assert "''" not in path
+    assert "site-packages" in path

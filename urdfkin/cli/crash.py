@@ -1,0 +1,63 @@
+"""How the command ends: what everybody may raise, in words and exit codes; a crash is one of its own.
+
+Exit 1 is a disagreement and nothing else; Python's own exit code of an uncaught exception is 1 as well.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+
+import click
+
+from urdfkin.errors import UrdfkinError
+
+#: EX_SOFTWARE of sysexits.h.
+CRASH = 70
+#: 128 and SIGINT's number, as shells have it.
+_INTERRUPTED = 130
+#: 128 and SIGPIPE's number.
+_NOBODY_READS = 141
+
+
+def run(command: click.Command, name: str) -> int:
+    """Run a command; its exit code.
+
+    0: done, and verified where it could be. 1: a disagreement. 2: bad input or usage. 3: computed, but
+    Pinocchio did not check it. 70: a defect of urdfkin. 130: interrupted.
+    """
+    try:
+        # click's own way out gives 1 to an interrupt.
+        code = command.main(prog_name=name, standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except click.Abort:
+        click.echo("urdfkin: interrupted", err=True)
+        return _INTERRUPTED
+    except UrdfkinError as error:
+        return refuse(error)
+    except BrokenPipeError:  # whoever read the output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return _NOBODY_READS
+    except Exception as error:
+        return crash(error)
+    return code if isinstance(code, int) else 0
+
+
+def refuse(error: UrdfkinError) -> int:
+    """Say an error that was raised on purpose; its exit code."""
+    click.echo(f"urdfkin: error: {error}", err=True)
+    return 1 if error.is_disagreement else 2
+
+
+def crash(error: Exception) -> int:
+    """Say an error that nobody foresaw, and what to do about it; its exit code."""
+    click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+    click.echo(
+        f"urdfkin: this is a defect of urdfkin, not of what it was given: {type(error).__name__}."
+        f" Please report it, with the lines above and the command, in urdfkin's repository (exit {CRASH}).",
+        err=True,
+    )
+    return CRASH

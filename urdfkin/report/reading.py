@@ -1,0 +1,72 @@
+"""Reading a report's document: JSON that keeps to its published schema and agrees with itself."""
+
+from __future__ import annotations
+
+import json
+import math
+from itertools import islice
+from pathlib import Path
+from typing import cast
+
+from urdfkin.errors import InputError, SourceError
+from urdfkin.report.consistency import contradictions
+from urdfkin.report.document import Document, schema
+from urdfkin.validation.report import SCHEMA
+
+#: How many contradictions of a report are told.
+_SHOWN = 3
+
+
+def read_document(path: Path) -> Document:
+    """A document from a file.
+
+    Raises:
+        SourceError: the file cannot be read.
+        InputError: it is not JSON, not a validation report, of another version, breaks the schema, or
+            contradicts itself.
+    """
+    try:
+        data = json.loads(path.read_bytes(), parse_constant=_number, parse_float=_number)
+    except OSError as error:
+        raise SourceError("cannot be read", where=str(path), found=error.strerror or str(error)) from error
+    except (ValueError, RecursionError) as error:
+        raise InputError("not a JSON file", where=str(path), found=str(error)) from error
+    return checked(data, str(path))
+
+
+def _number(word: str) -> float:
+    """JSON has no infinity and no NaN, and a number too large for a double would become one."""
+    number = float(word)
+    if not math.isfinite(number):
+        raise ValueError(f"{word[:20]} is no number")
+    return number
+
+
+def checked(data: object, where: str) -> Document:
+    """`data` as a document; raises InputError as `read_document` does."""
+    found = data.get("schema") if isinstance(data, dict) else None
+    if found != SCHEMA:
+        raise InputError(
+            f"not a report with the layout {SCHEMA}",
+            where=where,
+            found=repr(found) if found else "no 'schema' entry",
+            remedy="write one with: urdfkin validate ROBOT --json FILE",
+        )
+    from jsonschema import Draft202012Validator  # noqa: PLC0415  only who reads files needs it
+    from jsonschema.exceptions import best_match  # noqa: PLC0415
+
+    error = best_match(Draft202012Validator(schema()).iter_errors(data))
+    if error is not None:
+        raise InputError(
+            f"breaks the layout {SCHEMA}", where=where, found=f"{error.json_path}: {error.message}"
+        )
+    document = cast("Document", data)
+    if against := list(islice(contradictions(document), _SHOWN + 1)):
+        more = " ..." if len(against) > _SHOWN else ""
+        raise InputError(
+            "the report contradicts itself",
+            where=where,
+            found="; ".join(against[:_SHOWN]) + more,
+            remedy="have it made again: urdfkin validate ROBOT --json FILE",
+        )
+    return document

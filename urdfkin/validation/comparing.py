@@ -1,0 +1,185 @@
+"""Every quantity of every frame of a robot, ours against Pinocchio's, for some samples.
+
+Frames are compared in blocks, so that memory is bounded whatever the robot: it is the Jacobians' arrays,
+samples * frames * 6 * rates, that grow. A frame's numbers do not depend on its neighbours, and tallies of
+blocks join to the tally of all frames: nothing that is reported depends on the blocks.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from functools import reduce
+
+import numpy as np
+
+from urdfkin.oracle import Oracle
+from urdfkin.recursion import evaluate
+from urdfkin.recursion.base import STILL_STATE
+from urdfkin.recursion.plan import make_plan
+from urdfkin.reference import Reference
+from urdfkin.robot import Robot
+from urdfkin.tree import FloatArray, KinematicTree, freed
+from urdfkin.validation.clock import Clock
+from urdfkin.validation.tally import Inputs, Key, Tally, tally
+from urdfkin.verification import bounds
+from urdfkin.verification.bounds import Bound, Quantity
+from urdfkin.verification.magnitudes import magnitudes
+from urdfkin.verification.sampling import Samples
+
+#: How large an array of a block may be, bytes; some ten arrays of this size are there at a time.
+BLOCK_BYTES = 32 * 2**20
+
+
+def tallies(robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock) -> dict[Key, Tally]:
+    """Compare all frames, joints and columns of a robot.
+
+    Args:
+        robot: The robot.
+        oracle: Pinocchio's model of it.
+        x: What to compare at.
+        first_sample: The number of the first sample.
+        clock: Told whose work took how long.
+    """
+    found: dict[Key, Tally] = {}
+    work = robot, oracle, x, first_sample, clock
+    for frames in blocks(len(robot.all_frames), frame_bytes(len(x.q), robot.nv)):
+        for key, part in _Block(*work, frames).tallies():
+            found[key] = found[key].beside(part) if key in found else part
+    screws = reduce(Tally.beside, _Screws(*work).tallies())
+    return found | {(Quantity.SCREWS, Reference.WORLD.name.lower()): screws}
+
+
+def frame_bytes(samples: int, rates: int) -> int:
+    """The size of the largest array of a frame: its Jacobians, or its placements where few rates move it."""
+    return samples * 8 * max(16, 6 * rates)
+
+
+def blocks(count: int, size: int) -> Iterator[slice]:
+    """Cut so many things of a size in bytes into runs of at most `BLOCK_BYTES`; at least one run."""
+    most = max(1, BLOCK_BYTES // size)
+    for start in range(0, max(1, count), most):
+        yield slice(start, min(count, start + most))
+
+
+class _Work:
+    """Some samples of a robot, and how their comparisons are counted."""
+
+    def __init__(self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock) -> None:
+        self.robot, self.oracle, self.x, self.first, self.clock = robot, oracle, x, first_sample, clock
+        rows = zip(x.q.tolist(), x.v.tolist(), x.a.tolist(), strict=True)
+        self.inputs: list[Inputs] = list(rows)
+
+    def tally(self, ours: FloatArray, theirs: FloatArray, bound: Bound, names: tuple[str, ...]) -> Tally:
+        return tally(ours, theirs, bound, names, self.first, self.inputs)
+
+
+class _Block(_Work):
+    """The comparisons of some frames, and of the joints whose child links are among them."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        oracle: Oracle,
+        x: Samples,
+        first_sample: int,
+        clock: Clock,
+        frames: slice,
+    ) -> None:
+        super().__init__(robot, oracle, x, first_sample, clock)
+        tree = robot.tree
+        self.frames = robot.all_frames[frames]
+        links = tuple(tree.frame_link(frame) for frame in self.frames)
+        # A robot keeps the plan of all its frames for the next chunk; a block's is made when needed.
+        whole = len(links) == len(robot.all_frames)
+        self.plan = robot.plan(links) if whole else make_plan(tree, links)
+        self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
+        # A joint's Jacobian is its child link's, and links come first among the frames, root before all.
+        moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
+        self.joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
+        self.places = [link - frames.start for link in moving[self.joints]]
+        self.joint_names = robot.joint_names[self.joints]
+
+    def tallies(self) -> Iterator[tuple[Key, Tally]]:
+        x, oracle, plan, frames = self.x, self.oracle, self.plan, self.frames
+        theirs = self.clock.theirs(oracle.placements, x.q, frames)
+        ours = self.clock.ours(evaluate.placements, plan, x.q)
+        bound = bounds.placement_bound(self.size)
+        yield (Quantity.PLACEMENT, ""), self.tally(ours, theirs, bound, frames)
+        for reference in Reference:
+            name = reference.name.lower()
+            ours = self.clock.ours(evaluate.velocities, plan, x.q, x.v, reference)
+            theirs = self.clock.theirs(oracle.velocities, x.q, x.v, frames, [reference])[:, :, 0]
+            bound = bounds.velocity_bound(self.size, reference)
+            yield (Quantity.VELOCITY, name), self.tally(ours, theirs, bound, frames)
+            ours = self.clock.ours(evaluate.accelerations, plan, x.q, x.v, x.a, reference)
+            theirs = self.clock.theirs(oracle.accelerations, x.q, x.v, x.a, frames, [reference])[:, :, 0]
+            bound = bounds.acceleration_bound(self.size, reference)
+            yield (Quantity.ACCELERATION, name), self.tally(ours, theirs, bound, frames)
+            yield from self._jacobians(reference)
+            yield from self._jacobian_rates(reference)
+
+    def _jacobians(self, reference: Reference) -> Iterator[tuple[Key, Tally]]:
+        q, name = self.x.q, reference.name.lower()
+        ours = self.clock.ours(evaluate.jacobians, self.plan, q, reference)
+        theirs = self.clock.theirs(self.oracle.jacobians, q, self.frames, [reference])[:, :, 0]
+        bound = bounds.jacobian_bound(self.plan, self.size, reference)
+        yield (Quantity.JACOBIAN, name), self.tally(ours, theirs, bound, self.frames)
+        theirs = self.clock.theirs(self.oracle.joint_jacobians, q, [reference], self.joints)[:, :, 0]
+        yield (Quantity.JOINT_JACOBIAN, name), self._of_joints(ours, theirs, bound)
+
+    def _jacobian_rates(self, reference: Reference) -> Iterator[tuple[Key, Tally]]:
+        q, v, name = self.x.q, self.x.v, reference.name.lower()
+        ours = self.clock.ours(evaluate.jacobian_rates, self.plan, q, v, reference)
+        theirs, of_joints = self.clock.theirs(
+            self.oracle.jacobian_rates_of_all, q, v, self.frames, reference, self.joints
+        )
+        bound = bounds.jacobian_rate_bound(self.plan, self.size, reference)
+        yield (Quantity.JACOBIAN_RATE, name), self.tally(ours, theirs, bound, self.frames)
+        yield (Quantity.JOINT_JACOBIAN_RATE, name), self._of_joints(ours, of_joints, bound)
+
+    def _of_joints(self, ours: FloatArray, theirs: FloatArray, bound: Bound) -> Tally:
+        part = Bound(bound.scale[:, self.places], bound.k[:, self.places])
+        return self.tally(ours[:, self.places], theirs, part, self.joint_names)
+
+
+class _Screws(_Work):
+    """The whole `data.J`: each rate's column is its own joint's Jacobian column, seen from WORLD."""
+
+    def tallies(self) -> Iterator[Tally]:
+        robot, x = self.robot, self.x
+        tree = freed(robot.tree)
+        q_free = _leaders_spread(robot.tree, tree, x.q)
+        theirs = self.clock.theirs(self.oracle.screws, x.q).swapaxes(1, 2)
+        moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
+        column = 0
+        for block in blocks(len(moving), frame_bytes(len(x.q), tree.nv)):
+            joints = moving[block]
+            width = sum(tree.joints[i].kind.nv for i in joints)
+            yield self._block(tree, q_free, joints, theirs[:, column : column + width])
+            column += width
+
+    def _block(self, tree: KinematicTree, q: FloatArray, joints: Sequence[int], theirs: FloatArray) -> Tally:
+        links = [i + 1 for i in joints]
+        plan = make_plan(tree, links)
+        still = (np.zeros((len(q), tree.nv)),) * 2
+        size = magnitudes(plan, q, *still, STILL_STATE)
+        J = self.clock.ours(evaluate.jacobians, plan, q, Reference.WORLD)
+        bound = bounds.jacobian_bound(plan, size, Reference.WORLD)
+        own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
+        frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
+        ours = J[:, frame, :, column].swapaxes(0, 1)
+        scale = bound.scale[:, frame, :, column].swapaxes(0, 1)
+        names = tuple(tree.joints[joints[f]].name for f, _ in own)
+        return self.tally(ours, theirs, Bound(scale, bound.k[:, frame, 0]), names)
+
+
+def _leaders_spread(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
+    """The configuration of the freed tree in which every follower stands where its leader puts it."""
+    spread = np.empty((len(q), free.nq))
+    for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
+        own = q[:, at : at + joint.kind.nq]
+        if joint.mimic:
+            own = joint.mimic.multiplier * own + joint.mimic.offset
+        spread[:, free_at : free_at + joint.kind.nq] = own
+    return spread
