@@ -20,6 +20,7 @@ from pathlib import Path
 
 from urdfkin.diagnostics import UrdfError
 from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.interpreter import safe_spawning
 from urdfkin.oracle import OracleError
 from urdfkin.origin import Origin
 from urdfkin.recursion.announcing import load_kernels
@@ -109,7 +110,7 @@ def _spread_over_processes(run: _Run, jobs: int) -> None:
     """Workers leave an interrupt to this process, which ends the run and keeps what is there."""
     context = multiprocessing.get_context("spawn")
     ignore = (signal.SIGINT, signal.SIG_IGN)
-    with ProcessPoolExecutor(jobs, context, initializer=signal.signal, initargs=ignore) as pool:
+    with safe_spawning(), ProcessPoolExecutor(jobs, context, signal.signal, ignore) as pool:
         run.spread(pool)
 
 

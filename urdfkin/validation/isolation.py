@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection
 
 from urdfkin.errors import UrdfkinError
+from urdfkin.interpreter import safe_spawning
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 
 
@@ -33,7 +34,8 @@ def run_isolated(chunks: Sequence[Chunk], patience: float | None = None) -> Iter
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
     child = context.Process(target=_child, args=(theirs, list(chunks)), daemon=True)
-    child.start()
+    with safe_spawning():
+        child.start()
     theirs.close()  # so that the end of the child is the end of the pipe
     try:
         for chunk in chunks:
