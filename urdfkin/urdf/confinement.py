@@ -8,7 +8,6 @@ program in full control of the interpreter may find a way around events, not aro
 from __future__ import annotations
 
 import os
-import resource
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -52,7 +51,8 @@ class Ground:
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for mark in ("package.xml", ".git"):
             wide += [folder for folder in path.resolve().parents if _exists(folder / mark)][:1]
-        everything = {Path.home().resolve(), Path("/")}
+        home = os.path.expanduser("~")  # noqa: PTH111  which says nothing where there is none
+        everything = {Path(home).resolve(), Path("/")}
         real = [place.resolve() for place in wide if _exists(place)]
         return cls([*map(os.path.realpath, near), *(str(p) for p in real if p not in everything)], search)
 
@@ -88,6 +88,8 @@ def _hidden(rest: str) -> bool:
 
 def limit(seconds: int) -> None:
     """Bound this process's memory and time; it may write no file and start no process."""
+    import resource  # noqa: PLC0415  not on every system
+
     bounds = {
         resource.RLIMIT_AS: MEMORY,
         resource.RLIMIT_CPU: seconds,

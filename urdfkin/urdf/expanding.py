@@ -26,9 +26,6 @@ _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
 
-#: Encodings that files are written in; none can be imported later.
-_ENCODINGS = ("latin-1", "iso8859-15", "cp1252", "utf-16", "utf-16-le", "utf-16-be", "ascii", "idna")
-
 
 def serve() -> None:
     """A request on standard input, an answer as the last line of standard output."""
@@ -53,8 +50,6 @@ def _expand(path: Path, arguments: dict[str, str], search: Mapping[str, str], gr
 
     _tame(path, search, ground)
     importlib.import_module("xml.dom.expatbuilder")  # which minidom imports when it first reads a file
-    for encoding in _ENCODINGS:
-        "".encode(encoding)
     confine(ground.holds)
     document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, resolve_packages=False)
     urdf: str = document.to_urdf_string()
