@@ -218,16 +218,33 @@ def test_a_repository_is_the_files_own_but_a_home_folder_is_not(
     assert not Ground.around(file, [], ["/", str(tmp_path / "home")]).holds(other)
 
 
-def test_links_in_an_installed_package_lead_to_its_sources(tmp_path: Path) -> None:
-    installed, source = tmp_path / "install" / "share" / "arm", tmp_path / "src" / "arm.xacro"
+def test_links_in_an_installed_package_lead_to_its_sources_and_to_nothing_else(tmp_path: Path) -> None:
+    installed, source, secret = tmp_path / "install/share/arm", tmp_path / "src/arm", tmp_path / "secret.yaml"
     installed.mkdir(parents=True)
-    source.parent.mkdir()
-    source.touch()
-    (installed / "arm.xacro").symlink_to(source)
-    ground = Ground([], [str(tmp_path / "install")])
+    source.mkdir(parents=True)
+    for file in (secret, source / "package.xml", source / "arm.xacro", source / ".hidden"):
+        file.touch()
+    for link in ("arm.xacro", ".hidden"):
+        (installed / link.removeprefix(".")).symlink_to(source / link)
+    (installed / "secret.yaml").symlink_to(secret)
+    (source / "secret.yaml").symlink_to(secret)
+    (installed / "by-way.yaml").symlink_to(source / "secret.yaml")
+    ground = Ground.around(tmp_path / "robot" / "r.xacro", [str(tmp_path / "install")], [])
     assert ground.holds(str(installed / "arm.xacro"))
-    assert not ground.holds(str(source))
-    assert not ground.holds(str(installed / "../../../src/arm.xacro"))
+    assert not ground.holds(str(source / "arm.xacro"))
+    for other in ("secret.yaml", "by-way.yaml", "hidden", "../../../secret.yaml"):
+        assert not ground.holds(str(installed / other)), other
+
+
+@pytest.mark.slow
+def test_a_repository_on_a_search_path_is_trusted_with_no_links(
+    expanded: Expand, secret: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "robot").mkdir()
+    (tmp_path / "robot" / "link").symlink_to(secret.parent)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "robot"))
+    for name in ("../link/secret", "$(find robot)/link/secret"):
+        refused(expanded, f'<xacro:include filename="{name}.xacro"/>')
 
 
 # -- the environment, programs, the net ---------------------------------------------------------------

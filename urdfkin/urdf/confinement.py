@@ -27,15 +27,16 @@ _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 @dataclass(slots=True)
 class Ground:
-    """The files that may be read.
+    """The files that may be read: of strangers' making, and no one else's.
 
     Attributes:
-        own: Folders and files whose contents come with the xacro file, from whoever wrote it: what links lead
-            to must lie in one of them, too. Hidden files and folders below do not count.
-        installed: Folders that the user's search paths name; links in them may lead anywhere.
+        roots: Folders and files that may be read, but nothing hidden below them. What links lead to must lie
+            in one of them, too.
+        installed: Folders in which links may lead to a package elsewhere, as where sources are installed by
+            links.
     """
 
-    own: list[str] = field(default_factory=list)
+    roots: list[str] = field(default_factory=list)
     installed: list[str] = field(default_factory=list)
 
     @classmethod
@@ -47,25 +48,38 @@ class Ground:
             search: Folders in which the user has packages.
             arguments: Values the user gave; those that are paths may be read.
         """
-        near = [path, path.parent, path.resolve().parent]
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for mark in ("package.xml", ".git"):
             wide += [folder for folder in path.resolve().parents if _exists(folder / mark)][:1]
         home = os.path.expanduser("~")  # noqa: PTH111  which says nothing where there is none
         everything = {Path(home).resolve(), Path("/")}
         real = [place.resolve() for place in wide if _exists(place)]
-        return cls([*map(os.path.realpath, near), *(str(p) for p in real if p not in everything)], search)
+        near = [path, path.parent, path.resolve().parent, *search]
+        roots = [os.path.realpath(place) for place in near]
+        return cls([*roots, *(str(place) for place in real if place not in everything)], search)
 
     def holds(self, path: str) -> bool:
         """Whether a file or folder may be read."""
-        plain = os.path.abspath(path)  # noqa: PTH100  neither follows links
-        if ".." not in Path(path).parts and any(_below(plain, root) is not None for root in self.installed):
-            return True
         real = os.path.realpath(path)
         if os.path.basename(real) == "package.xml":  # noqa: PTH119  whose name the search for packages reads
             return True
-        below = [_below(real, root) for root in self.own]
-        return any(rest is not None and not _hidden(rest) for rest in below)
+        roots = self.roots
+        if any(_lies_in(root, os.path.abspath(path)) for root in self.installed):  # noqa: PTH100  no links
+            roots = [*roots, *_package_of(real)]
+        return any(_lies_in(root, real) for root in roots)
+
+
+def _package_of(path: str) -> list[str]:
+    """The package a file lies in, if it does."""
+    return [str(folder) for folder in Path(path).parents if _exists(folder / "package.xml")][:1]
+
+
+def _lies_in(root: str, path: str) -> bool:
+    """Whether a path is a root or lies below, and nothing below the root is hidden."""
+    if path == root:
+        return True
+    above = root.rstrip(os.sep) + os.sep
+    return path.startswith(above) and not any(p.startswith(".") for p in Path(path[len(above) :]).parts)
 
 
 def _exists(path: Path) -> bool:
@@ -73,17 +87,6 @@ def _exists(path: Path) -> bool:
         return path.exists()
     except OSError:  # too long a name is no path
         return False
-
-
-def _below(path: str, root: str) -> str | None:
-    """What of a path is left below a root; None elsewhere."""
-    if path == root:
-        return ""
-    return path.removeprefix(root + os.sep) if path.startswith(root.rstrip(os.sep) + os.sep) else None
-
-
-def _hidden(rest: str) -> bool:
-    return any(part.startswith(".") for part in Path(rest).parts)
 
 
 def limit(seconds: int) -> None:

@@ -111,7 +111,7 @@ class _Finder:
         if folder is None:
             raise LookupError(f"package {name!r} is not found")
         if not self._ground.holds(str(folder)):
-            self._ground.own.append(str(folder.resolve()))
+            self._ground.roots.append(str(folder.resolve()))
         return str(folder)
 
     def _is_package(self, folder: Path) -> bool:
