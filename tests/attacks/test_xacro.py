@@ -66,11 +66,21 @@ PROGRAMS = [
 ]
 
 
+REFUSALS = (
+    "is none of the expressions|not open to expressions|is no function|no elements|'\\w+' is not defined"
+)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_an_expression_that_is_a_program_is_refused_by_name(expanded: Expand, program: str) -> None:
-    for inside in (link(f"${{{program}}}"), as_eval(program)):
-        with pytest.raises(XacroError, match=r"r\.xacro: xacro cannot expand the file: found"):
+    ways = [as_eval(program)]
+    if "}" not in program:  # which ends an expression
+        ways.append(link(f"${{{program}}}"))
+    for inside in ways:
+        with pytest.raises(
+            XacroError, match=rf"r\.xacro: xacro cannot expand the file: found .*({REFUSALS})"
+        ):
             expanded(inside)
 
 

@@ -54,9 +54,9 @@ class Ground:
         home = os.path.expanduser("~")  # noqa: PTH111  which says nothing where there is none
         everything = {Path(home).resolve(), Path("/")}
         real = [place.resolve() for place in wide if _exists(place)]
-        near = [path, path.parent, path.resolve().parent, *search]
-        roots = [os.path.realpath(place) for place in near]
-        return cls([*roots, *(str(place) for place in real if place not in everything)], search)
+        near = [path, path.parent, path.resolve().parent, *map(Path, search)]
+        roots = [*(place.resolve() for place in near), *(place for place in real if place not in everything)]
+        return cls([str(root) for root in roots], search)
 
     def holds(self, path: str) -> bool:
         """Whether a file or folder may be read."""
