@@ -64,5 +64,11 @@ def test_so_does_the_command_that_explains_what_it_found(tmp_path: Path) -> None
     assert bare("explain", "URDF411").returncode == 0
 
 
-def test_what_needs_more_does_not_come_so_far() -> None:
-    assert bare("placement", ROBOT).returncode != 0
+def test_a_command_that_needs_more_says_so() -> None:
+    done = bare("placement", ROBOT)
+    assert done.returncode == 2
+    found = re.fullmatch(
+        r"urdfkin: error: (\w+) is not installed; pip install urdfkin with all it needs\n", done.stderr
+    )
+    assert found is not None
+    assert found[1] not in installed()

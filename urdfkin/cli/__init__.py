@@ -96,6 +96,11 @@ def main() -> None:
     warnings.filterwarnings("ignore", message="not verified")
     try:
         cli(prog_name="urdfkin")
+    except ModuleNotFoundError as error:  # installed with --no-deps, as pre-commit does
+        click.echo(
+            f"urdfkin: error: {error.name} is not installed; pip install urdfkin with all it needs", err=True
+        )
+        sys.exit(2)
     except UrdfkinError as error:
         click.echo(f"urdfkin: error: {error}", err=True)
         sys.exit(1 if error.is_disagreement else 2)
