@@ -5,13 +5,16 @@ Inline SVG takes its colours from the page's style, so that one drawing serves l
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import io
 import re
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.errors import InputError
+from urdfkin.interpreter import not_reading
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,7 +45,7 @@ def new_figure(width: float, height: float) -> Figure:
     Raises:
         InputError: matplotlib is not installed.
     """
-    _needed()
+    _matplotlib()
     from matplotlib.figure import Figure  # noqa: PLC0415  keeps other commands fast
 
     return Figure(figsize=(width, height), layout="constrained")
@@ -50,10 +53,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 def style(**more: Any) -> Any:
     """The context to draw in: text stays text, and the same drawing gives the same file."""
-    _needed()
-    import matplotlib as mpl  # noqa: PLC0415
-
-    return mpl.rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
+    return _matplotlib().rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
 
 
 def installed() -> bool:
@@ -61,9 +61,13 @@ def installed() -> bool:
     return importlib.util.find_spec("matplotlib") is not None
 
 
-def _needed() -> None:
+@cache
+def _matplotlib() -> Any:
+    """The library, without the settings of a file `matplotlibrc` in the current folder."""
     if not installed():
         raise InputError("drawing needs matplotlib", remedy="pip install 'urdfkin[plots]'")
+    with not_reading("matplotlibrc"):
+        return importlib.import_module("matplotlib")
 
 
 def save(figure: Figure, path: Path) -> bytes:

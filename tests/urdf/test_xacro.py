@@ -46,6 +46,7 @@ def write(path: Path, text: str) -> Path:
 @pytest.fixture
 def arm(tmp_path: Path) -> Path:
     write(tmp_path / "ws" / "tools" / "urdf" / "tool.xacro", TOOL)
+    write(tmp_path / "ws" / "tools" / "package.xml", "<package><name>tools</name></package>")
     write(tmp_path / "ws" / "my_arm" / "urdf" / "part.xacro", PART)
     return write(tmp_path / "ws" / "my_arm" / "urdf" / "arm.urdf.xacro", ARM)
 

@@ -58,7 +58,7 @@ xacro_option = click.option(
     metavar="NAME:=VALUE",
     expose_value=False,
     callback=_remember_xacro_args,
-    help="An argument of a .xacro file; may be repeated.",
+    help="An argument of a .xacro file, which is expanded without trusting it; may be repeated.",
 )
 
 

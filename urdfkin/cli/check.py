@@ -70,8 +70,9 @@ def command(
 ) -> None:
     """Check URDFs and print what is wrong with them: code, place, what was found, what to do.
 
-    FILE is a path, or - for standard input. Exit 0 when there is no error, 1 when there is, 2 when a file
-    cannot be read or an option is wrong.
+    FILE is a path, or - for standard input. A .xacro file is expanded by a process that can compute and read
+    its package's files, no more (docs/xacro.md). Exit 0 when there is no error, 1 when there is, 2 when a
+    file cannot be read or an option is wrong.
 
     \b
     Example:

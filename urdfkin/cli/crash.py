@@ -54,6 +54,11 @@ def refuse(error: UrdfkinError) -> int:
 
 def crash(error: Exception) -> int:
     """Say an error that nobody foresaw, and what to do about it; its exit code."""
+    if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("urdfkin"):
+        # Installed with --no-deps, as pre-commit does.
+        missing = f"{error.name} is not installed; pip install urdfkin with all it needs"
+        click.echo(f"urdfkin: error: {missing}", err=True)
+        return 2
     click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     click.echo(
         f"urdfkin: this is a defect of urdfkin, not of what it was given: {type(error).__name__}."

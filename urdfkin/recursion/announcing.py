@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import importlib
-import os
 import subprocess
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 from numba.core import event
 
+from urdfkin.interpreter import own_python
 from urdfkin.recursion.compiling import cache_folder
 
 _Listener: Any = event.Listener  # numba has no types
@@ -73,8 +72,7 @@ def _compile_elsewhere(kernels: Mapping[str, str]) -> subprocess.Popen[bytes]:
     """Another interpreter that does nothing but compile; what it fails to do is done here after all."""
     code = f"from urdfkin.recursion import announcing; announcing._compile({dict(kernels)!r})"
     return subprocess.Popen(
-        [sys.executable, "-c", code],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        own_python(code),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

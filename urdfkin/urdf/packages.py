@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 #: The environment's search paths.
@@ -39,7 +39,10 @@ def split_uri(uri: str) -> tuple[str, str] | None:
 
 
 def find_package(
-    name: str, beside: Path | None = None, environ: Mapping[str, str] = os.environ
+    name: str,
+    beside: Path | None = None,
+    environ: Mapping[str, str] = os.environ,
+    accepts: Callable[[Path], bool] = lambda folder: True,
 ) -> Path | None:
     """The folder of a package, or None.
 
@@ -47,10 +50,12 @@ def find_package(
         name: The package.
         beside: The file that refers to it; its parents are searched.
         environ: The environment.
+        accepts: Whether a folder that is found may be it.
     """
     if not name or name in (".", "..") or "\0" in name:
         return None
-    return next((folder for folder in _candidates(name, beside, environ) if _is_folder(folder)), None)
+    found = filter(_is_folder, _candidates(name, beside, environ))
+    return next((folder for folder in found if accepts(folder)), None)
 
 
 def _candidates(name: str, beside: Path | None, environ: Mapping[str, str]) -> Iterator[Path]:

@@ -1,8 +1,8 @@
-"""A .xacro file to URDF text, through xacrodoc; the only module that imports it.
+"""A .xacro file to URDF text, in a process of its own that is trusted with nothing.
 
-Expanding runs the file's expressions and keeps its state in the process, so it is done in a process of its
-own, with a time limit. That process finds packages as `urdfkin.urdf.packages` does; nothing else of ROS is
-needed. xacro files are programs: expand those you trust.
+xacro files are programs, and they come with robots from anywhere. The process finds packages as
+`urdfkin.urdf.packages` does, nothing else of ROS is needed; `expanding` is its side, and docs/xacro.md says
+what a file may do.
 """
 
 from __future__ import annotations
@@ -10,17 +10,28 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
+import threading
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict
 from importlib.util import find_spec
+from math import ceil
 from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import SourceError, UrdfkinError
-from urdfkin.urdf.packages import VARIABLES, find_package
+from urdfkin.interpreter import own_python
+from urdfkin.urdf.confinement import Ground
+from urdfkin.urdf.packages import VARIABLES
 
 #: Seconds after which an expansion is given up: a macro may call itself.
 PATIENCE = 60.0
+
+#: Bytes of an answer after which it is not read on.
+MOST = 100_000_000
+
+#: What a Python may need from the environment to start at all.
+_NEEDED = ("LD_LIBRARY_PATH",)
 
 
 class XacroError(UrdfkinError):
@@ -37,7 +48,8 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
 
     Raises:
         SourceError: there is no such file.
-        XacroError: xacrodoc is not installed, or xacro cannot expand the file.
+        XacroError: xacrodoc is not installed, xacro cannot expand the file, or the file asks for what it may
+            not have: other files, programs, too much memory or time.
     """
     if not path.is_file():
         raise SourceError("no such file", where=str(path))
@@ -47,28 +59,72 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
             where=str(path),
             remedy='install it with "urdfkin[xacro]", or expand the file with: xacro FILE > robot.urdf',
         )
-    request = json.dumps({"path": str(path.absolute()), "arguments": dict(arguments)}).encode()
-    try:
-        done = subprocess.run(
-            [sys.executable, "-m", __name__],
-            input=request,
-            capture_output=True,
-            timeout=patience,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise XacroError("xacro does not come to an end", where=str(path), found=f"{patience:g} s") from None
-    answer = _answer(done.stdout)
+    command = own_python("from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8"))
+    output, status = _ask(command, _request(path.absolute(), arguments, patience), patience)
+    if status is None:
+        raise XacroError("xacro does not come to an end", where=str(path), found=f"{patience:g} s")
+    if len(output) > MOST:
+        raise XacroError("xacro makes too long a URDF", where=str(path), found=f"more than {MOST} bytes")
+    answer = _answer(output)
     if "urdf" in answer:
         return str(answer["urdf"]).encode()
-    reason = answer.get("error") or f"its process ended with status {done.returncode}"
+    reason = answer.get("error") or f"its process ended with status {status}"
     raise XacroError(
         "xacro cannot expand the file",
         where=str(path),
         found=str(reason).strip() or None,
         remedy="give arguments with --xacro-arg NAME:=VALUE; packages are found by ROS_PACKAGE_PATH,"
-        " AMENT_PREFIX_PATH and the folders above the file",
+        " AMENT_PREFIX_PATH and, if they hold a package.xml, beside the folders above the file; docs/xacro.md"
+        " says what a file may do",
     )
+
+
+def _request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes:
+    search = {name: _absolute(os.environ.get(name, "")) for name in VARIABLES}
+    installed = [entry for entries in search.values() for entry in entries.split(os.pathsep) if entry]
+    request = {
+        "path": str(path),
+        "arguments": dict(arguments),
+        "search": search,
+        "ground": asdict(Ground.around(path, installed, list(arguments.values()))),
+        "seconds": ceil(patience) + 1,
+    }
+    return json.dumps(request).encode()
+
+
+def _absolute(entries: str) -> str:
+    """A search path whose entries do not depend on the working directory."""
+    return os.pathsep.join(str(Path(entry).absolute()) for entry in entries.split(os.pathsep) if entry)
+
+
+def _ask(command: list[str], request: bytes, patience: float) -> tuple[bytes, int | None]:
+    """What a process writes, up to a limit, and its exit status; None for the status if it took too long."""
+    environ = {name: os.environ[name] for name in _NEEDED if name in os.environ}
+    pipe = subprocess.PIPE
+    late = threading.Event()
+    with subprocess.Popen(
+        command, env=environ, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL
+    ) as process:
+
+        def give_up() -> None:
+            late.set()
+            process.kill()
+
+        timer = threading.Timer(patience, give_up)
+        timer.start()
+        try:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            with suppress(BrokenPipeError), process.stdin:
+                process.stdin.write(request)
+            output = process.stdout.read(MOST + 1)
+            if len(output) > MOST:
+                process.kill()
+            status = process.wait()
+        finally:
+            timer.cancel()
+            process.kill()
+    return output, None if late.is_set() else status
 
 
 def _answer(output: bytes) -> dict[str, Any]:
@@ -78,42 +134,3 @@ def _answer(output: bytes) -> dict[str, Any]:
     except (IndexError, ValueError):
         return {}
     return answer if isinstance(answer, dict) else {}
-
-
-def _absolute(entries: str) -> str:
-    """A search path whose entries do not depend on the working directory."""
-    return os.pathsep.join(str(Path(entry).absolute()) for entry in entries.split(os.pathsep) if entry)
-
-
-def _serve() -> None:
-    """The process's side: a request on standard input, an answer as the last line of standard output."""
-    import xacrodoc.packages  # noqa: PLC0415  the border: nobody else needs it
-
-    request = json.load(sys.stdin)
-    path = Path(request["path"])
-    environ = {name: _absolute(os.environ.get(name, "")) for name in VARIABLES}
-    os.chdir(path.parent)  # what the file includes without a package is relative to it
-
-    class Finder:
-        """Finds packages for xacro's $(find name)."""
-
-        def get_path(self, name: str) -> str:
-            folder = find_package(name, path, environ)
-            if folder is None:
-                raise LookupError(f"package {name!r} is not found")
-            return str(folder)
-
-        def walk_up_from(self, path: object, priority: int = 0) -> None:
-            """Done by `find_package` already."""
-
-    xacrodoc.packages._finder = Finder()
-    try:
-        document = xacrodoc.XacroDoc.from_file(path, subargs=request["arguments"], resolve_packages=False)
-        answer = {"urdf": document.to_urdf_string()}
-    except (Exception, SystemExit) as error:
-        answer = {"error": f"{type(error).__name__}: {error}"}
-    sys.stdout.write("\n" + json.dumps(answer) + "\n")
-
-
-if __name__ == "__main__":
-    _serve()

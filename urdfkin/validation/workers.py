@@ -10,15 +10,14 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
-from pathlib import Path
 from typing import cast
 
+from urdfkin.interpreter import own_python
 from urdfkin.validation.answer import Answer, Failure
 from urdfkin.validation.engine import Enter, Task, lost
 from urdfkin.validation.outcome import Verdict
@@ -192,11 +191,8 @@ def _interpreter(pipe: int) -> subprocess.Popen[bytes]:
 
     It leaves an interrupt by the terminal to this process, which keeps what is there: hence its own group.
     """
-    path = [entry for entry in sys.path if Path(entry).is_absolute()]
-    code = f"import sys; sys.path[:] = {path!r}; from {WORKER} import serve; serve({pipe}, {os.getpid()})"
-    return subprocess.Popen(
-        [sys.executable, "-P", "-c", code], stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0
-    )
+    command = own_python(f"from {WORKER} import serve; serve({pipe}, {os.getpid()})")
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)
 
 
 def _cause(status: int) -> str:

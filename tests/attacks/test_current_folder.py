@@ -1,0 +1,152 @@
+"""urdfkin is run in a folder of strangers: nothing in it is run, nor taken for settings."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+PLANTED = [
+    *(
+        "urdfkin",
+        "multiprocessing",
+        "concurrent",
+        "subprocess",
+        "signal",
+        "threading",
+        "json",
+        "pickle",
+        "ast",
+    ),
+    *(
+        "sitecustomize",
+        "usercustomize",
+        "resource",
+        "tempfile",
+        "xacrodoc",
+        "xacro",
+        "yaml",
+        "numpy",
+        "numba",
+    ),
+    *("pinocchio", "click", "matplotlib", "platformdirs"),
+]
+#: What Python has imported from the folder already, before a line of urdfkin is run.
+BEFORE_MAIN = {"urdfkin", "threading", "ast"}
+XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="l${1 + 1}"/></robot>'
+
+Run = Callable[..., str]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a robot, and modules that leave a mark when they are imported."""
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    (folder / "r.xacro").write_text(XACRO)
+    plant(folder, PLANTED)
+    return folder
+
+
+def plant(folder: Path, names: list[str]) -> None:
+    for name in names:
+        (folder / f"{name}.py").write_text(f"open({str(folder / 'RUN')!r}, 'a').write({name!r} + '\\n')\n")
+
+
+def planted_code_ran(folder: Path) -> list[str]:
+    mark = folder / "RUN"
+    return mark.read_text().split() if mark.exists() else []
+
+
+def run(folder: Path, start: list[str], *words: str) -> str:
+    done = subprocess.run([*start, *words], cwd=folder, capture_output=True, text=True, check=False)
+    assert planted_code_ran(folder) == []
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture
+def command(tmp_path: Path) -> list[str]:
+    """What pip installs: a script in a folder of its own."""
+    script = tmp_path / "bin" / "urdfkin"
+    script.parent.mkdir()
+    script.write_text("from urdfkin.cli import main\nif __name__ == '__main__':\n    main()\n")
+    return [sys.executable, str(script)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", ["r.xacro", str(ROBOTS / "elbow.urdf")])
+def test_check_runs_nothing_there(folder: Path, command: list[str], file: str) -> None:
+    run(folder, command, "check", "--format", "json", file)
+
+
+@pytest.mark.slow
+def test_processes_of_validate_run_nothing_there(folder: Path, command: list[str]) -> None:
+    robots = [str(ROBOTS / "one_link.urdf"), "r.xacro"]
+    for how in (["--jobs", "2"], ["--isolate"]):
+        assert "2 robots" in run(folder, command, "validate", *robots, "--samples", "0", *how)
+
+
+@pytest.mark.slow
+def test_compiling_runs_nothing_there(
+    folder: Path, command: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder.parent / "cache"))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    run(folder, command, "validate", str(ROBOTS / "one_link.urdf"), "--samples", "0")
+    assert list((folder.parent / "cache").rglob("*.nbc"))
+
+
+def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from urdfkin.recursion import announcing  # noqa: PLC0415
+
+    monkeypatch.chdir(folder)
+    monkeypatch.syspath_prepend("")  # as in `python -c`
+    assert announcing._compile_elsewhere({}).wait() == 0
+    assert planted_code_ran(folder) == []
+
+
+@pytest.mark.slow
+def test_python_m_takes_nothing_from_there_once_urdfkin_is_running(tmp_path: Path) -> None:
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    (folder / "r.xacro").write_text(XACRO)
+    plant(folder, [name for name in PLANTED if name not in BEFORE_MAIN])
+    run(folder, [sys.executable, "-m", "urdfkin"], "check", "r.xacro")
+    run(folder, [sys.executable, "-m", "urdfkin"], "robots")
+
+
+# -- settings ------------------------------------------------------------------------------------------
+
+
+def test_numba_takes_no_settings_from_there(tmp_path: Path) -> None:
+    (tmp_path / ".numba_config.yaml").write_text(
+        f"cache_dir: {tmp_path}\ndisable_jit: 1\ncache_locator_classes: evil.Locator\n"
+    )
+    code = (
+        "import os; from urdfkin.recursion.compiling import _config as c; c.reload_config(); print("
+        "repr(c.CACHE_DIR), c.DISABLE_JIT, repr(getattr(c, 'CACHE_LOCATOR_CLASSES', '')), os.getcwd())"
+    )
+    environ = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=environ, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == f"'' 0 '' {tmp_path}\n"
+
+
+@pytest.mark.slow
+def test_a_drawing_takes_no_settings_from_there(tmp_path: Path, command: list[str]) -> None:
+    pytest.importorskip("matplotlib")
+    robot = str(ROBOTS / "elbow.urdf")
+    drawings = []
+    for settings in (None, "figure.facecolor: red\nsavefig.facecolor: red\n"):
+        if settings:
+            (tmp_path / "matplotlibrc").write_text(settings)
+        run(tmp_path, command, "dh", robot, "--format", "svg", "--output", "a.svg")
+        drawings.append((tmp_path / "a.svg").read_bytes())
+    assert drawings[0] == drawings[1]

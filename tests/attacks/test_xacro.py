@@ -1,0 +1,376 @@
+"""A xacro file from a stranger: it computes names and numbers, and gets at nothing."""
+
+import os
+import socket
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from urdfkin.urdf.confinement import Ground
+from urdfkin.urdf.expressions import RefusedError, evaluate
+from urdfkin.urdf.xacro import XacroError, expand
+
+NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+SECRET = "hunter2"
+
+Expand = Callable[..., str]
+
+
+@pytest.fixture
+def expanded(tmp_path: Path) -> Expand:
+    """Expands a robot with this inside."""
+
+    def expanded(inside: str, patience: float = 60.0, **arguments: str) -> str:
+        path = tmp_path / "robot" / "urdf" / "r.xacro"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f'<robot name="r" {NAMESPACE}>{inside}</robot>')
+        return expand(path, arguments, patience=patience).decode()
+
+    return expanded
+
+
+def link(expression: str) -> str:
+    return f'<link name="{expression}"/>'
+
+
+def as_eval(program: str) -> str:
+    """An argument of $(eval ...), which ends at the first closing bracket: by way of a property."""
+    return f'<xacro:property name="p" value="{program}"/><link name="$(eval ${{p}})"/>'
+
+
+# Each got at os.system, in one way or another, when xacro evaluated it.
+PROGRAMS = [
+    "(lambda: ().__class__)()",
+    "(lambda: [c for c in ().__class__.__base__.__subclasses__() if c.__name__ == 'Popen'])()",
+    "[c for c in ''.__class__.__mro__]",
+    "(x for x in [1]).gi_frame.f_back",
+    "[(yield)]",
+    "load_yaml.__globals__['os']",
+    "xacro.load_yaml.__globals__['os'].system('touch ' + mark)",
+    "'{0.__globals__}'.format(load_yaml)",
+    "str.format('{0.__globals__}', load_yaml)",
+    "python.vars(python)",
+    "python.map(python.vars, [python])",
+    "python.type('x', (), dict(__init__=len))",
+    "list(map(python.type, ['x']))",
+    "list.mro()",
+    "dict['a']",
+    "math.__loader__",
+    "(a := 1)",
+    "f'{load_yaml.__globals__}'",
+    "__import__('os')",
+    "__builtins__",
+    "(len if 1 else 2).__self__",
+]
+
+
+REFUSALS = (
+    "is none of the expressions|not open to expressions|is no function|no elements|'\\w+' is not defined"
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_an_expression_that_is_a_program_is_refused_by_name(expanded: Expand, program: str) -> None:
+    ways = [as_eval(program)]
+    if "}" not in program:  # which ends an expression
+        ways.append(link(f"${{{program}}}"))
+    for inside in ways:
+        with pytest.raises(
+            XacroError, match=rf"r\.xacro: xacro cannot expand the file: found .*({REFUSALS})"
+        ):
+            expanded(inside)
+
+
+@pytest.mark.slow
+def test_eval_has_no_builtins(expanded: Expand, tmp_path: Path) -> None:
+    mark = tmp_path / "mark"
+    for program in (f"open('{mark}', 'w')", f"map(open, ['{mark}'], ['w'])", "open('/etc/passwd').read()"):
+        with pytest.raises(XacroError, match="'open' is not defined"):
+            expanded(as_eval(program))
+    assert not mark.exists()
+    assert 'name="3"' in expanded(as_eval("1 + 2"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("expression", "value"),
+    [
+        ("pi/2", "1.5707963267948966"),
+        ("radians(90)", "1.5707963267948966"),
+        ("math.sqrt(2)**2", "2.0000000000000004"),
+        ("-2 + 7 // 2 % 3", "-2"),
+        ("d['a'] + d.b[1]", "4"),
+        ("prefix + 'arm' + str(1)", "left_arm1"),
+        ("prefix[-5:-1]", "left"),
+        ("'x'.join([str(i * j) for i, j in [(1, 2), (3, 4)] if i])", "2x12"),
+        ("' '.join(map(str, [1, 2]))", "1 2"),
+        ("len(python.list(python.range(3)))", "3"),
+        ("'%0.2f' % pi", "3.14"),
+        ("max(*[1, 2]) if 1 < 2 <= 2 and not None else 0", "2"),
+        ("'1:2'.split(':').pop(0).strip().zfill(2)", "01"),
+        ("python.isinstance(prefix, str) and 'left' in prefix", "True"),
+        ("xacro.dotify(dict(a=dict(b=5))).a.b", "5"),
+        ("xacro.arg('size')", "2"),
+        ("1 << 2", None),
+        ("y.limits.upper", "1.5"),
+        ("y.tilt", "3.141592653589793"),
+    ],
+)
+def test_what_robots_compute_is_computed(
+    expanded: Expand, expression: str, value: str | None, tmp_path: Path
+) -> None:
+    folder = tmp_path / "robot" / "config"
+    folder.mkdir(parents=True)
+    (folder / "y.yaml").write_text("limits: {upper: 1.5}\ntilt: !degrees 180\n")
+    before = (
+        '<xacro:arg name="size" default="2"/><xacro:property name="prefix" value="left_"/>'
+        '<xacro:property name="d" value="${xacro.dotify(dict(a=1, b=[2, 3]))}"/>'
+        '<xacro:property name="y" value="${xacro.load_yaml(\'../config/y.yaml\')}"/>'
+    )
+    (tmp_path / "robot" / "package.xml").write_text("<package><name>robot</name></package>")
+    written = before + link(f"${{{expression}}}".replace("<", "&lt;"))
+    if value is None:
+        with pytest.raises(XacroError, match="operator in"):
+            expanded(written)
+    else:
+        assert f'<link name="{value}"/>' in expanded(written)
+
+
+# -- files -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def secret(tmp_path: Path) -> Path:
+    """A file beside the robot's folder, as a neighbour's in a home folder is."""
+    path = tmp_path / "neighbour" / "secret.yaml"
+    path.parent.mkdir()
+    path.write_text(f"{{password: {SECRET}}}")
+    (path.parent / "secret.xacro").write_text(f'<robot><link name="{SECRET}"/></robot>')
+    return path
+
+
+def refused(expanded: Expand, inside: str) -> str:
+    with pytest.raises(XacroError) as caught:
+        expanded(inside)
+    assert SECRET not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    ["../../neighbour/secret", "{tmp}/neighbour/secret", "../urdf/../../neighbour/secret", "link/secret"],
+)
+def test_files_of_others_are_not_read(expanded: Expand, secret: Path, tmp_path: Path, name: str) -> None:
+    (tmp_path / "robot" / "urdf").mkdir(parents=True)
+    (tmp_path / "robot" / "urdf" / "link").symlink_to(secret.parent)
+    name = name.format(tmp=tmp_path)
+    said = refused(expanded, link(f"${{xacro.load_yaml('{name}.yaml')['password']}}"))
+    assert "lies neither in the file's folder, package or repository nor" in said
+    for how in ('filename="{}.xacro"', 'filename="{}.x*"', 'filename="{}.xacro" optional="true"'):
+        refused(expanded, f"<xacro:include {how.format(name)}/>")
+
+
+@pytest.mark.slow
+def test_a_folder_becomes_a_package_only_by_its_manifest_or_a_search_path(
+    expanded: Expand, secret: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inside = '<xacro:include filename="$(find neighbour)/secret.xacro"/>'
+    assert "package 'neighbour' is not found" in refused(expanded, inside)
+    refused(expanded, '<xacro:include filename="$(find etc)/passwd"/>')
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(secret.parents[1]))
+    assert SECRET in expanded(inside)
+    monkeypatch.delenv("ROS_PACKAGE_PATH")
+    (secret.parent / "package.xml").write_text("<package><name>neighbour</name></package>")
+    assert SECRET in expanded(inside)
+
+
+@pytest.mark.slow
+def test_a_file_that_the_user_names_is_read(expanded: Expand, secret: Path) -> None:
+    inside = '<xacro:arg name="file" default=""/>' + link("${xacro.load_yaml('$(arg file)')['password']}")
+    assert SECRET in expanded(inside, file=str(secret))
+    refused(expanded, inside.replace('default=""', f'default="{secret}"'))
+
+
+@pytest.mark.slow
+def test_hidden_files_and_entities_are_not_read(expanded: Expand, tmp_path: Path, secret: Path) -> None:
+    hidden = tmp_path / "robot" / "urdf" / ".git" / "config"
+    hidden.parent.mkdir(parents=True)
+    hidden.write_text(f"token: {SECRET}")
+    refused(expanded, link("${xacro.load_yaml('.git/config')['token']}"))
+    path = tmp_path / "e.xacro"
+    path.write_text(
+        f'<!DOCTYPE r [<!ENTITY e SYSTEM "{secret}">]><robot name="r"><link name="a">&e;</link></robot>'
+    )
+    assert SECRET not in expand(path, {}).decode()
+
+
+def test_a_repository_is_the_files_own_but_a_home_folder_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "home" / "robots" / "urdf" / "r.xacro"
+    file.parent.mkdir(parents=True)
+    file.touch()
+    other = str(tmp_path / "home" / "robots" / "other" / "o.xacro")
+    assert not Ground.around(file, [], []).holds(other)
+    (tmp_path / "home" / "robots" / ".git").mkdir()
+    ground = Ground.around(file, [], [])
+    assert ground.holds(other)
+    assert not ground.holds(str(tmp_path / "home" / "robots" / ".git" / "config"))
+    assert not ground.holds(str(tmp_path / "home" / "robots2" / "o.xacro"))
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    (tmp_path / "home" / "robots" / ".git").rmdir()
+    (tmp_path / "home" / ".git").mkdir()
+    assert not Ground.around(file, [], []).holds(other)
+    assert not Ground.around(file, [], ["/", str(tmp_path / "home")]).holds(other)
+
+
+def test_links_in_an_installed_package_lead_to_its_sources_and_to_nothing_else(tmp_path: Path) -> None:
+    installed, source, secret = tmp_path / "install/share/arm", tmp_path / "src/arm", tmp_path / "secret.yaml"
+    installed.mkdir(parents=True)
+    source.mkdir(parents=True)
+    for file in (secret, source / "package.xml", source / "arm.xacro", source / ".hidden"):
+        file.touch()
+    for link in ("arm.xacro", ".hidden"):
+        (installed / link.removeprefix(".")).symlink_to(source / link)
+    (installed / "secret.yaml").symlink_to(secret)
+    (source / "secret.yaml").symlink_to(secret)
+    (installed / "by-way.yaml").symlink_to(source / "secret.yaml")
+    ground = Ground.around(tmp_path / "robot" / "r.xacro", [str(tmp_path / "install")], [])
+    assert ground.holds(str(installed / "arm.xacro"))
+    assert not ground.holds(str(source / "arm.xacro"))
+    for other in ("secret.yaml", "by-way.yaml", "hidden", "../../../secret.yaml"):
+        assert not ground.holds(str(installed / other)), other
+
+
+@pytest.mark.slow
+def test_a_repository_on_a_search_path_is_trusted_with_no_links(
+    expanded: Expand, secret: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "robot").mkdir()
+    (tmp_path / "robot" / "link").symlink_to(secret.parent)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "robot"))
+    for name in ("../link/secret", "$(find robot)/link/secret"):
+        refused(expanded, f'<xacro:include filename="{name}.xacro"/>')
+
+
+# -- the environment, programs, the net ---------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_the_environment_is_empty(expanded: Expand, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TOKEN", SECRET)
+    assert "'TOKEN' is not set" in refused(expanded, link("$(env TOKEN)"))
+    assert 'name="none"' in expanded(link("$(optenv TOKEN none)"))
+    refused(expanded, link("${xacro.load_yaml('/proc/self/environ')}"))
+    refused(expanded, link(f"${{xacro.load_yaml('/proc/{os.getpid()}/environ')}}"))
+
+
+WORST = """
+from urdfkin.urdf.confinement import confine, limit
+import ctypes, os, socket, subprocess
+limit(20)
+confine(lambda path: path == "/etc/hostname")
+{}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "deed",
+    [
+        "os.system('true')",
+        "subprocess.run(['true'])",
+        "os.fork()",
+        "os.execv('/bin/true', ['true'])",
+        "os.posix_spawn('/bin/true', ['true'], {})",
+        "socket.socket()",
+        "socket.create_connection(('127.0.0.1', PORT))",
+        "ctypes.CDLL(None)",
+        "ctypes.string_at(id(1), 1)",
+        "import antigravity",
+        "open('/etc/passwd')",
+        "open(0)",
+        "open('/etc/hostname', 'a')",
+        "os.open('/etc/hostname', os.O_RDWR)",
+        "os.remove('/etc/hostname')",
+        "os.rename('/etc/hostname', '/tmp/x')",
+        "os.mkdir('/tmp/x')",
+        "os.listdir('/')",
+        "os.kill(1, 0)",
+        "os.symlink('/etc/passwd', '/tmp/x')",
+        "eval('1')",
+    ],
+)
+def test_even_a_program_in_the_expanding_process_is_refused(deed: str) -> None:
+    import subprocess  # noqa: PLC0415
+    import sys  # noqa: PLC0415
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        connected: list[object] = []
+        thread = threading.Thread(target=lambda: connected.append(server.accept()), daemon=True)
+        thread.start()
+        code = WORST.format(deed.replace("PORT", str(server.getsockname()[1])))
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "RefusedError: " in done.stderr.splitlines()[-1]
+    assert not connected
+
+
+# -- what it takes ------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "inside",
+    [
+        link("${'x' * 3000000000}"),
+        link("${'%3000000000d' % 1}"),
+        link("${python.list(python.range(10**10))}"),
+        link("${len('x' * 2000000000 + 'y' * 2000000000)}"),
+    ],
+)
+def test_memory_has_an_end(expanded: Expand, inside: str) -> None:
+    with pytest.raises(XacroError, match="it takes more than 2 GiB of memory"):
+        expanded(inside)
+
+
+@pytest.mark.slow
+def test_time_has_an_end(expanded: Expand) -> None:
+    with pytest.raises(XacroError, match="does not come to an end: found 2 s"):
+        expanded(link("${max(python.range(10**12))}"), patience=2.0)
+    with pytest.raises(XacroError, match="recursion"):
+        expanded('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>')
+
+
+@pytest.mark.slow
+def test_what_it_writes_has_an_end(expanded: Expand, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("urdfkin.urdf.xacro.MOST", 10_000)
+    with pytest.raises(XacroError, match="too long a URDF: found more than 10000 bytes"):
+        expanded(link("${'x' * 20000}"))
+
+
+# -- the walk itself ----------------------------------------------------------------------------------
+
+
+def test_a_function_is_called_only_if_it_was_offered() -> None:
+    names = {"f": len, "g": max, "d": {"h": print}, "x": [1, 2]}
+    assert evaluate("g(x)", names, [max]) == 2
+    for expression in (
+        "f(x)",
+        "d.h(x)",
+        "d['h'](x)",
+        "(lambda: 1)()",
+        "g(x)(x)",
+        "x.__len__()",
+        "f.__self__",
+    ):
+        with pytest.raises(RefusedError):
+            evaluate(expression, names, [max])
+
+
+def test_and_and_or_stop_where_python_stops() -> None:
+    for expression in ("0 and 1 / 0", "2 or 1 / 0", "1 and 0 or 5", "1 < 0 < 1 / 0", "[] or ''", "3 and 4"):
+        assert evaluate(expression, {}, []) == eval(expression)

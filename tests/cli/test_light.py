@@ -1,0 +1,74 @@
+"""`check` works where nothing but click is installed: pre-commit's hook installs no more."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROBOT = str(ROOT / "robots" / "elbow.urdf")
+
+#: Refuses every import but those of Python, of urdfkin and of what the hook installs.
+BARE = """
+import sys
+from importlib.abc import MetaPathFinder
+
+class Bare(MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] not in {{*sys.stdlib_module_names, "urdfkin", *{installed!r}}}:
+            raise ModuleNotFoundError(f"No module named {{name!r}} in a bare Python", name=name)
+
+sys.meta_path.insert(0, Bare())
+from urdfkin.cli import main
+sys.argv = ["urdfkin", *{words!r}]
+main()
+"""
+
+
+def hook() -> str:
+    return (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8")
+
+
+def installed() -> list[str]:
+    """What the hook has pip install beside urdfkin itself."""
+    found = re.search(r"additional_dependencies: \[(.*)\]", hook())
+    assert found is not None
+    option, *packages = re.findall(r'"([^"]*)"', found[1])
+    assert option == "--no-deps"
+    return [package.partition(">")[0] for package in packages]
+
+
+def bare(*words: str) -> subprocess.CompletedProcess[str]:
+    code = BARE.format(words=words, installed=installed())
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("style", ["terminal", "json", "sarif", "github"])
+def test_the_hooks_command_needs_what_the_hook_installs(style: str) -> None:
+    assert "entry: urdfkin check\n" in hook()
+    assert installed() == ["click"]
+    done = bare("check", "--format", style, ROBOT)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_so_does_the_command_that_explains_what_it_found(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.urdf"
+    bad.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
+    done = bare("check", str(bad))
+    assert done.returncode == 1, done.stderr
+    assert "'urdfkin explain URDF411' tells more" in done.stdout
+    assert bare("explain", "URDF411").returncode == 0
+
+
+def test_a_command_that_needs_more_says_so() -> None:
+    done = bare("placement", ROBOT)
+    assert done.returncode == 2
+    found = re.fullmatch(
+        r"urdfkin: error: (\w+) is not installed; pip install urdfkin with all it needs\n", done.stderr
+    )
+    assert found is not None
+    assert found[1] not in installed()

@@ -1,0 +1,122 @@
+"""The process that expands a xacro file, through xacrodoc; the only module that imports it.
+
+xacro takes a file for a program and the environment for its input. Here its expressions go through
+`expressions`, the environment is empty, and the process is confined to the files it may read.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from urdfkin.urdf.confinement import MEMORY, Ground, confine, limit
+from urdfkin.urdf.expressions import RefusedError, evaluate
+from urdfkin.urdf.packages import find_package
+
+#: What xacro lets expressions call although it gives them more than values.
+_NEVER = ("type", "vars")
+
+#: An expression that no guard of xacro's own stops; if it comes through, the library is not the one we know.
+_PROBE = "${(lambda: 1)()}"
+
+_TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
+
+
+def serve() -> None:
+    """A request on standard input, an answer as the last line of standard output."""
+    request = json.load(sys.stdin)
+    limit(request["seconds"])
+    os.environ.clear()
+    os.chdir(Path(request["path"]).parent)  # what the file includes without a package is relative to it
+    ground = Ground(**request["ground"])
+    try:
+        answer = {"urdf": _expand(Path(request["path"]), request["arguments"], request["search"], ground)}
+    except MemoryError:
+        answer = {"error": _TOO_MUCH}
+    except (Exception, SystemExit) as error:
+        answer = {"error": f"{type(error).__name__}: {error}"[:2000]}
+    sys.stdout.write("\n" + json.dumps(answer) + "\n")
+    sys.stdout.flush()
+    os._exit(0)  # what an interpreter does at its end may not be allowed any more
+
+
+def _expand(path: Path, arguments: dict[str, str], search: Mapping[str, str], ground: Ground) -> str:
+    import xacrodoc  # noqa: PLC0415  the border: nobody else needs it
+
+    _tame(path, search, ground)
+    importlib.import_module("xml.dom.expatbuilder")  # which minidom imports when it first reads a file
+    confine(ground.holds)
+    document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, resolve_packages=False)
+    urdf: str = document.to_urdf_string()
+    return urdf
+
+
+def _tame(path: Path, search: Mapping[str, str], ground: Ground) -> None:
+    """Put our own in the place of what xacro and xacrodoc evaluate, look up and find.
+
+    Raises:
+        RefusedError: it had no effect.
+    """
+    import xacro  # noqa: PLC0415
+    import xacrodoc.packages  # noqa: PLC0415
+    from xacro import substitution_args  # noqa: PLC0415
+
+    symbols = xacro._global_symbols
+    for name in _NEVER:
+        dict.pop(symbols["python"], name, None)
+    functions = [value for table in _tables(symbols) for value in dict.values(table) if callable(value)]
+
+    def value_of(expression: str, names: Mapping[str, Any], local: object = None) -> object:
+        try:
+            return evaluate(expression, names, functions)
+        except MemoryError:  # which has no words of its own
+            raise RefusedError(_TOO_MUCH) from None
+
+    def value_of_arguments(expression: str, context: Mapping[str, Any]) -> str:
+        names = {
+            name: substitution_args.convert_value(x, "auto") for name, x in context.get("arg", {}).items()
+        }
+        return str(evaluate(expression, {**symbols, "true": True, "false": False, **names}, functions))
+
+    xacro.safe_eval = value_of
+    substitution_args._eval = value_of_arguments  # $(eval ...)
+    xacrodoc.packages._finder = _Finder(path, search, ground)
+    try:
+        xacro.eval_text(_PROBE, symbols)
+    except xacro.XacroException as error:
+        if isinstance(error.exc, RefusedError):
+            return
+    raise RefusedError("this version of xacro evaluates expressions in a way that is not known here")
+
+
+def _tables(symbols: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """All names that xacro gives a file, its namespaces' too."""
+    yield dict(symbols)
+    yield from (value for value in symbols.values() if isinstance(value, dict))
+
+
+class _Finder:
+    """Finds packages for xacro's $(find name)."""
+
+    def __init__(self, path: Path, search: Mapping[str, str], ground: Ground) -> None:
+        self._path, self._search, self._ground = path, search, ground
+
+    def get_path(self, name: str) -> str:
+        folder = find_package(name, self._path, self._search, self._is_package)
+        if folder is None:
+            raise LookupError(f"package {name!r} is not found")
+        if not self._ground.holds(str(folder)):
+            self._ground.roots.append(str(folder.resolve()))
+        return str(folder)
+
+    def _is_package(self, folder: Path) -> bool:
+        """A folder outside is one only if it says so: else $(find etc) would be one."""
+        return self._ground.holds(str(folder)) or (folder / "package.xml").is_file()
+
+    def walk_up_from(self, path: object, priority: int = 0) -> None:
+        """Done by `find_package` already."""

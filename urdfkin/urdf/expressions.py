@@ -1,0 +1,218 @@
+"""Values of the expressions in a xacro file, `${...}`, without Python's `eval`.
+
+xacro hands them to `eval` and looks for forbidden names in the outermost code object only: what stands in a
+lambda, a comprehension or a chain of attributes can do all that a program can. Here the syntax tree is walked
+instead. Nothing is compiled; there are values, operators, the functions that xacro offers and the methods
+listed below, and whatever is not named here is refused.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import Any
+
+_BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv,
+    ast.Mod: operator.mod,
+    ast.Pow: operator.pow,
+}
+_UNARY: dict[type[ast.unaryop], Callable[[Any], Any]] = {
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
+    ast.Not: operator.not_,
+}
+_COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.Is: operator.is_,
+    ast.IsNot: operator.is_not,
+    ast.In: lambda value, many: value in many,
+    ast.NotIn: lambda value, many: value not in many,
+}
+
+#: Methods that an expression may call. `str.format` is not among them: it reads attributes.
+_METHODS: dict[type, str] = {
+    str: "capitalize count endswith find index isalnum isalpha isdigit isnumeric join ljust lower lstrip"
+    " partition removeprefix removesuffix replace rfind rjust rpartition rsplit rstrip split splitlines"
+    " startswith strip title upper zfill",
+    list: "append copy count extend index insert pop remove reverse sort",
+    tuple: "count index",
+    dict: "copy get items keys pop setdefault update values",
+    float: "is_integer",
+}
+_CONTAINERS = (str, list, tuple, dict, range)
+
+
+class RefusedError(Exception):
+    """A xacro file asks for what an expansion does not do."""
+
+
+def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[object]) -> Any:
+    """The value of an expression.
+
+    Args:
+        expression: Its text.
+        names: What its names stand for.
+        functions: What it may call besides methods.
+
+    Raises:
+        RefusedError: it is written with something else than values, operators and calls of these.
+        SyntaxError: it is no expression.
+
+    >>> evaluate("2 * a[1] + max(a)", {"a": [1, 2], "max": max}, [max])
+    6
+    """
+    tree = ast.parse(expression.strip(), mode="eval")
+    return _Evaluation(names, functions).value(tree.body)
+
+
+class _Evaluation:
+    """The walk; each method is called as the node whose value it gives."""
+
+    def __init__(self, names: Mapping[str, Any], functions: Collection[object]) -> None:
+        self._names, self._functions = names, functions
+
+    def value(self, node: ast.expr) -> Any:
+        rule: Callable[[Any], Any] | None = getattr(self, type(node).__name__, None)
+        if rule is None:
+            raise RefusedError(f"'{ast.unparse(node)[:80]}' is none of the expressions that are evaluated")
+        return rule(node)
+
+    def Constant(self, node: ast.Constant) -> Any:
+        if not isinstance(node.value, str | int | float | None):
+            raise RefusedError(f"{node.value!r} is neither text nor a number")
+        return node.value
+
+    def Name(self, node: ast.Name) -> Any:
+        try:
+            return self._names[node.id]
+        except KeyError:
+            raise NameError(f"name {node.id!r} is not defined") from None
+
+    def Attribute(self, node: ast.Attribute) -> Any:
+        owner, name = self.value(node.value), node.attr
+        for kind, methods in _METHODS.items():
+            if isinstance(owner, kind) and name in methods.split():
+                return getattr(owner, name)
+        if isinstance(owner, dict) and not name.startswith("_"):
+            try:
+                return owner[name]  # a namespace, or what a YAML file holds
+            except (KeyError, AttributeError):
+                raise NameError(f"{name!r} is not defined in '{ast.unparse(node.value)[:80]}'") from None
+        raise RefusedError(f"the attribute {name!r} of {type(owner).__name__!r} is not open to expressions")
+
+    def Subscript(self, node: ast.Subscript) -> Any:
+        owner = self.value(node.value)
+        if not isinstance(owner, _CONTAINERS):
+            raise RefusedError(f"{type(owner).__name__!r} has no elements that expressions may take")
+        return owner[self.value(node.slice)]
+
+    def Slice(self, node: ast.Slice) -> slice:
+        parts = (node.lower, node.upper, node.step)
+        return slice(*(None if part is None else self.value(part) for part in parts))
+
+    def Call(self, node: ast.Call) -> Any:
+        called = self.value(node.func)
+        method = isinstance(getattr(called, "__self__", None), tuple(_METHODS))
+        if not method and not any(called is function for function in self._functions):
+            raise RefusedError(f"'{ast.unparse(node.func)[:80]}' is no function of xacro")
+        words: dict[str, Any] = {}
+        for word in node.keywords:
+            words |= self.value(word.value) if word.arg is None else {word.arg: self.value(word.value)}
+        return called(*self._elements(node.args), **words)
+
+    def List(self, node: ast.List) -> list[Any]:
+        return list(self._elements(node.elts))
+
+    def Tuple(self, node: ast.Tuple) -> tuple[Any, ...]:
+        return tuple(self._elements(node.elts))
+
+    def _elements(self, nodes: list[ast.expr]) -> Iterator[Any]:
+        for node in nodes:
+            if isinstance(node, ast.Starred):
+                yield from self.value(node.value)
+            else:
+                yield self.value(node)
+
+    def BinOp(self, node: ast.BinOp) -> Any:
+        return _rule(_BINARY, node, node.op)(self.value(node.left), self.value(node.right))
+
+    def UnaryOp(self, node: ast.UnaryOp) -> Any:
+        return _rule(_UNARY, node, node.op)(self.value(node.operand))
+
+    def BoolOp(self, node: ast.BoolOp) -> Any:
+        wanted = isinstance(node.op, ast.Or)
+        for part in node.values[:-1]:
+            if bool(value := self.value(part)) is wanted:
+                return value
+        return self.value(node.values[-1])
+
+    def Compare(self, node: ast.Compare) -> Any:
+        left, result = self.value(node.left), True
+        for op, part in zip(node.ops, node.comparators, strict=True):
+            right = self.value(part)
+            if not (result := _rule(_COMPARE, node, op)(left, right)):
+                break
+            left = right
+        return result
+
+    def IfExp(self, node: ast.IfExp) -> Any:
+        return self.value(node.body if self.value(node.test) else node.orelse)
+
+    def ListComp(self, node: ast.ListComp | ast.GeneratorExp) -> list[Any]:
+        return [inner.value(node.elt) for inner in self._rounds(node.generators)]
+
+    GeneratorExp = ListComp
+
+    def _rounds(self, loops: list[ast.comprehension]) -> Iterator[_Evaluation]:
+        """An evaluation for each round of nested loops, with the loops' names."""
+        if not loops:
+            yield self
+            return
+        loop, *others = loops
+        for value in self.value(loop.iter):
+            inner = _Evaluation(_Scope(self._names, dict(_bound(loop.target, value))), self._functions)
+            if all(inner.value(condition) for condition in loop.ifs):
+                yield from inner._rounds(others)
+
+
+class _Scope(Mapping[str, Any]):
+    """Names of a loop before those around it, which may be evaluated on access and are not copied."""
+
+    def __init__(self, outer: Mapping[str, Any], own: Mapping[str, Any]) -> None:
+        self._outer, self._own = outer, own
+
+    def __getitem__(self, name: str) -> Any:
+        return self._own[name] if name in self._own else self._outer[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter({**self._own, **self._outer})
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
+
+def _bound(target: ast.expr, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(target, ast.Name):
+        yield target.id, value
+    elif isinstance(target, ast.Tuple | ast.List):
+        for part, one in zip(target.elts, value, strict=True):
+            yield from _bound(part, one)
+    else:
+        raise RefusedError(f"'{ast.unparse(target)[:80]}' is no name for the values of a loop")
+
+
+def _rule(rules: Mapping[Any, Callable[..., Any]], node: ast.expr, op: ast.AST) -> Callable[..., Any]:
+    if type(op) not in rules:
+        raise RefusedError(f"the operator in '{ast.unparse(node)[:80]}' is not evaluated")
+    return rules[type(op)]
