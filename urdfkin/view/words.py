@@ -48,6 +48,11 @@ def check_line(x: FrameMotion) -> str:
     return f"{mark} Pinocchio {version()}, eps·scale: {figures}"
 
 
+def says(words: str) -> str:
+    """A line of words that may hold names from the URDF: text, whatever is in them."""
+    return text(words)
+
+
 def legend() -> str:
     """Which colour each part of the acceleration has."""
     return " ".join(
