@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.errors import InputError
+from urdfkin.printable import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,6 +32,9 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "urdfkin",
     "font.family": "DejaVu Sans",
+    # A name is text: neither mathematics between dollars nor TeX, whatever the user's own settings are.
+    "text.parse_math": False,
+    "text.usetex": False,
     "axes.spines.top": False,
     "axes.spines.right": False,
 }
@@ -54,6 +58,11 @@ def style(**more: Any) -> Any:
     import matplotlib as mpl  # noqa: PLC0415
 
     return mpl.rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
+
+
+def label(name: str) -> str:
+    """A name as a drawing can show it: what the font has no glyph for and XML no place is an escape."""
+    return printable(name)
 
 
 def installed() -> bool:

@@ -60,6 +60,18 @@ def attribute(name: str) -> str:
     return quoteattr(name, {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
 
 
+def chain_of_all() -> str:
+    """A robot whose links and joints bear every name that a URDF can hold, one below the other."""
+    names = list(IN_XML.values())
+    links = "".join(f"<link name={attribute(name)}/>" for name in ["base", *names])
+    joints = "".join(
+        f'<joint name={attribute(f"{child} ")} type="continuous"><parent link={attribute(parent)}/>'
+        f'<child link={attribute(child)}/><origin xyz="0.1 0 0"/><axis xyz="0 {k % 2} {1 - k % 2}"/></joint>'
+        for k, (parent, child) in enumerate(zip(["base", *names], names, strict=False))
+    )
+    return f'<?xml version="1.0"?><robot name={attribute(NAMES["line"])}>{links}{joints}</robot>'
+
+
 def urdf(name: str) -> str:
     """A planar arm whose robot, links and joints all bear a name, numbered where they must differ."""
     link = [attribute(f"{name}{k}" if k else name) for k in range(3)]

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import urdfkin
-from tests.attacks.hostile import IN_XML, NAMES, attribute
+from tests.attacks.hostile import IN_XML, NAMES, chain_of_all
 from tests.attacks.test_viewer_gate import free_port, key_of
 from tests.report.browser import Browser, opened
 from urdfkin.view.server import new_server
@@ -62,17 +62,9 @@ def other_site() -> Iterator[str]:
 
 
 def hostile_robot() -> urdfkin.Robot:
-    """A chain whose links bear every name that can be in a URDF, so that each can be chosen as a frame."""
-    names = list(IN_XML.values())
-    links = "".join(f"<link name={attribute(name)}/>" for name in ["base", *names])
-    joints = "".join(
-        f'<joint name={attribute(f"{child} joint")} type="continuous"><parent link={attribute(parent)}/>'
-        f'<child link={attribute(child)}/><origin xyz="0.1 0 0"/><axis xyz="0 {k % 2} {1 - k % 2}"/></joint>'
-        for k, (parent, child) in enumerate(zip(["base", *names], names, strict=False))
-    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(f'<robot name="r">{links}{joints}</robot>')
+        return urdfkin.load(chain_of_all())
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from typing import cast
 
 import click
 
+from urdfkin.cli.door import guard
 from urdfkin.errors import UnknownNameError, UrdfkinError
 
 #: Command name -> (module that holds `command`, one-line summary), in the order of the help page.
@@ -92,6 +93,7 @@ def main() -> None:
 
     Exit 0: verified. 1: a disagreement. 2: bad input or usage. 3: computed, but Pinocchio did not check it.
     """
+    guard()
     # The line under a result says that it was not verified, and why; once is enough.
     warnings.filterwarnings("ignore", message="not verified")
     try:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from urdfkin.cli.door import say
 from urdfkin.cli.output import console
 from urdfkin.cli.reports import check_writable, report_options, write_reports
 
@@ -42,7 +43,7 @@ def command(
     check_writable(html, junit, markdown)
     write_reports(document, html=html, junit=junit, markdown=markdown)
     if written := [str(path) for path in (html, junit, markdown) if path]:
-        click.echo(f"wrote {', '.join(written)}")
+        say(f"wrote {', '.join(written)}")
     else:
         from urdfkin.report.terminal import print_report  # noqa: PLC0415
 

@@ -7,6 +7,7 @@ import sys
 import click
 
 from urdfkin.cli.arguments import load_robot, robot_argument
+from urdfkin.cli.door import say
 from urdfkin.cli.output import compiling
 
 EXAMPLE = "urdfkin view panda"
@@ -38,7 +39,7 @@ def command(robot: str, mimic: bool | None, root_joint: str | None, host: str, p
     with compiling():
         Viewer(server, loaded)
     try:
-        click.echo(f"{loaded.name}: {server.address}")
+        say(f"{loaded.name}: {server.address}")
         sys.stdout.flush()  # whoever reads a pipe wants the address now
         server.sleep_forever()
     except KeyboardInterrupt:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from urdfkin.printable import markdown_text as text
 from urdfkin.report.compare import Change, Comparison, figures
 from urdfkin.report.document import Document, Units
-from urdfkin.report.markdown import LIMIT, shortened, text
+from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.terminal import plain_table
 from urdfkin.report.words import counted, quantity_name, summary, units
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from urdfkin.printable import markdown_code, printable
+from urdfkin.printable import markdown_text as text
 from urdfkin.report.document import Document, Robot
 from urdfkin.report.words import (
     VERDICTS,
@@ -72,7 +74,7 @@ def _cells(robot: Robot, quantities: list[tuple[str, ...]]) -> list[str]:
     verdict = robot["verdict"]
     share = percent(share_of(robot)) if robot["checks"] else ""
     return [
-        text(shortened(robot["source"], 60)),
+        markdown_code(shortened(robot["source"], 60)),
         str(len(robot["joints"])),
         str(len(robot["frames"])),
         f"{robot['results']:,}",
@@ -85,19 +87,19 @@ def _cells(robot: Robot, quantities: list[tuple[str, ...]]) -> list[str]:
 def _details(robot: Robot) -> list[str]:
     """What went wrong with one robot."""
     if robot["reason"]:
-        return ["", f"**{text(robot['source'])}**: {text(shortened(robot['reason'], 600))}"]
+        return ["", f"**{markdown_code(robot['source'])}**: {text(shortened(robot['reason'], 600))}"]
     failed = [check for check in robot["checks"] if check["failed"]]
     lines: list[str] = []
     for check in failed[:_SHOWN]:
         lines += [
             "",
-            f"**{text(robot['source'])}**, {text(check_name(check))}: {check['failed']:,} of"
+            f"**{markdown_code(robot['source'])}**, {text(check_name(check))}: {check['failed']:,} of"
             f" {check['results']:,} outside their bound, worst {units(check['worst'])} eps·scale",
         ]
         if check["worst_case"] is not None:
             lines += ["", fenced(shortened(check["worst_case"]["replay"], 4000))]
     if len(failed) > _SHOWN:
-        lines += ["", f"... and {len(failed) - _SHOWN} more quantities of {text(robot['source'])}"]
+        lines += ["", f"... and {len(failed) - _SHOWN} more quantities of {markdown_code(robot['source'])}"]
     return lines
 
 
@@ -105,18 +107,12 @@ def _row(cells: list[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def text(words: str) -> str:
-    """Words that Markdown, HTML and mentions leave alone."""
-    flat = re.sub(r"[\x00-\x1f\x7f\u2028\u2029]+", " ", words)
-    flat = flat.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("@", "&#64;")
-    return re.sub(r"([\\`*_{}\[\]|~!#])(?!64;)", r"\\\1", flat)
-
-
 def fenced(code: str) -> str:
     """A block of code whose fence is longer than any run of backticks inside."""
     longest = max((len(run) for run in re.findall("`+", code)), default=0)
     fence = "`" * max(3, longest + 1)
-    return f"{fence}sh\n{code}\n{fence}"
+    lines = "\n".join(map(printable, code.split("\n")))
+    return f"{fence}sh\n{lines}\n{fence}"
 
 
 def shortened(words: str, length: int) -> str:

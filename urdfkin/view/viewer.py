@@ -10,12 +10,13 @@ import numpy as np
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.frame_motion import FrameMotion, frame_motion
+from urdfkin.printable import markdown_code, markdown_text
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
 from urdfkin.view.overlays import acceleration_arrows, jacobian_arrows, velocity_ellipsoid
 from urdfkin.view.stage import Stage
-from urdfkin.view.words import legend, numbers, says
+from urdfkin.view.words import legend, numbers
 
 _REFERENCES = tuple(reference.name.lower() for reference in Reference)
 
@@ -132,9 +133,11 @@ class Viewer:
             if self.dh.value != "none":
                 try:
                     self._table = self.robot.dh(self.frame.value, convention=self.dh.value)
-                    self.dh_words.content = says(f"{self._table.base_frame} to {self._table.tip_frame}")
+                    self.dh_words.content = " to ".join(
+                        map(markdown_code, (self._table.base_frame, self._table.tip_frame))
+                    )
                 except UrdfkinError as error:
-                    self.dh_words.content = says(str(error))
+                    self.dh_words.content = markdown_text(str(error))
             self.update()
 
     # -- what is seen --------------------------------------------------------------------------------
