@@ -5,6 +5,7 @@ Every name is legal in a URDF: XML lets an attribute hold any of these character
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 
 #: Each tries to become something else than text in some form that urdfkin writes.
@@ -60,16 +61,15 @@ def attribute(name: str) -> str:
     return quoteattr(name, {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
 
 
-def chain_of_all() -> str:
+def chain_of_all(names: Sequence[str] = tuple(IN_XML.values()), robot: str = NAMES["line"]) -> str:
     """A robot whose links and joints bear every name that a URDF can hold, one below the other."""
-    names = list(IN_XML.values())
     links = "".join(f"<link name={attribute(name)}/>" for name in ["base", *names])
     joints = "".join(
         f'<joint name={attribute(f"{child} ")} type="continuous"><parent link={attribute(parent)}/>'
         f'<child link={attribute(child)}/><origin xyz="0.1 0 0"/><axis xyz="0 {k % 2} {1 - k % 2}"/></joint>'
         for k, (parent, child) in enumerate(zip(["base", *names], names, strict=False))
     )
-    return f'<?xml version="1.0"?><robot name={attribute(NAMES["line"])}>{links}{joints}</robot>'
+    return f'<?xml version="1.0"?><robot name={attribute(robot)}>{links}{joints}</robot>'
 
 
 def urdf(name: str) -> str:
