@@ -36,7 +36,10 @@ ROBOT = {
     ],
     "check": [["--format", form] for form in ("terminal", "json", "sarif", "github")] + [["--each"]],
     "validate": [["--samples", "2", "--cases"], ["--samples", "1", "--isolate"]],
-    "plot": [["--to", "neutral", "--frame", NAMES["math"], "--output", "PICTURE"], ["--to", FILE, "--output", "PICTURE"]],
+    "plot": [
+        ["--to", "neutral", "--frame", NAMES["math"], "--output", "PICTURE"],
+        ["--to", FILE, "--output", "PICTURE"],
+    ],
 }  # fmt: skip
 OTHERS: dict[str, list[list[str]]] = {
     "robots": [[], ["--format", "json"], ["--family", FILE]],
