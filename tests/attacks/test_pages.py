@@ -24,7 +24,7 @@ from lxml import etree
 from markdown_it import MarkdownIt
 
 import urdfkin
-from tests.attacks.hostile import IN_XML, NAMES, chain_of_all
+from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
 from urdfkin.dh import DHTable, export
 from urdfkin.dh.drawing import drawing
 from urdfkin.dh.export.latex import escaped
@@ -112,6 +112,8 @@ def _report(called: Callable[[str], str]) -> str:
     whole["source"] = called(NAMES["colours"])
     failed = whole["checks"][0]
     failed |= {"failed": 1}
+    # As wide as each other: it stands beside a plot, whose ticks are as many as there is room for.
+    whole["checks"][2] |= {"quantity": "<b>|`\x1b" if called is same else "abcdefghij"}
     failed["worst_case"] |= {"replay": called(NAMES["code"]), "frame": called(NAMES["line"])}
     document |= {"passed": False, "command": called(NAMES["code"]), "started": called(NAMES["end of data"])}
     document["versions"] = {key: called(NAMES["script"]) for key in document["versions"]}
@@ -178,6 +180,18 @@ def _table() -> DHTable:
 def table(name: str) -> DHTable:
     rows = tuple(replace(row, joint=f"{name} {i}") for i, row in enumerate(_table().rows))
     return replace(_table(), robot=name, base_frame=name, tip_frame=name, rows=rows)
+
+
+@pytest.mark.parametrize("kind", IN_XML)
+def test_what_was_snapped_is_told_with_names_as_words(kind: str) -> None:
+    def page(name: str) -> _Elements:
+        text = urdf(name).replace('<origin xyz="0.3 0 0"/>', '<origin xyz="0.3 0 0" rpy="1.5708 0 0"/>')
+        snapped = urdfkin.load(text).dh(snap=1e-3)
+        assert snapped.snap is not None
+        assert snapped.snap.changes
+        return rendered(export(snapped, "markdown"), True)
+
+    assert page(IN_XML[kind]).found == page("tame_name").found
 
 
 @pytest.mark.parametrize("html", [True, False])

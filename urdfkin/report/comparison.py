@@ -40,7 +40,9 @@ def markdown_of(old: Document, new: Document, found: Comparison, limit: int = LI
     mark = "❌" if found.regressions else "✅"
     lines = [f"## {mark} {verdict(found)[0].upper()}{verdict(found)[1:]}", ""]
     lines += ["| worst, eps·scale | old | new |", "| --- | ---: | ---: |"]
-    lines += [f"| {quantity_name(name)} | {_cell(a)} | {_cell(b)} |" for name, a, b in figures(old, new)]
+    lines += [
+        f"| {text(quantity_name(name))} | {_cell(a)} | {_cell(b)} |" for name, a, b in figures(old, new)
+    ]
     lines += ["", *(["| | what | old | new |", "| --- | --- | --- | --- |"] if found.changes else [])]
     left = limit - sum(len(line) + 1 for line in lines) - 100
     ordered = sorted(found.changes, key=lambda change: not change.regression)

@@ -53,7 +53,7 @@ def as_markdown(document: Document, limit: int = LIMIT) -> str:
 
 def _body(robots: list[Robot], room: int) -> list[str]:
     quantities = columns(robots)
-    heads = ["robot", "joints", "frames", "results", *quantities, "of bound", "verdict"]
+    heads = ["robot", "joints", "frames", "results", *map(text, quantities), "of bound", "verdict"]
     lines = [_row(heads), _row(["---", *["---:"] * (len(heads) - 2), "---"])]
     left = room - sum(len(line) + 1 for line in lines) - 200
     tails: list[str] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from urdfkin.dh.export.words import cells, formula, headings, is_identity, pose_lines, snap_lines
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
-from urdfkin.printable import markdown_code
+from urdfkin.printable import markdown_code, markdown_text
 
 
 def write(table: DHTable, units: Units) -> str:
@@ -25,7 +25,8 @@ def write(table: DHTable, units: Units) -> str:
         else:
             lines += ["", f"{what} (metres):", "", "```", *pose_lines(T, units.digits), "```"]
     if table.snap is not None:
-        lines += ["", *snap_lines(table, "- ")]
+        said = snap_lines(table, "- ")  # joints are named in it
+        lines += ["", *(f"- {markdown_text(s[2:])}" if s.startswith("- ") else s for s in said)]
     return "\n".join(lines) + "\n"
 
 
