@@ -10,7 +10,7 @@ import numpy as np
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.frame_motion import FrameMotion, frame_motion
-from urdfkin.printable import markdown_code, markdown_text
+from urdfkin.printable import markdown_text
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
@@ -133,9 +133,9 @@ class Viewer:
             if self.dh.value != "none":
                 try:
                     self._table = self.robot.dh(self.frame.value, convention=self.dh.value)
-                    self.dh_words.content = " to ".join(
-                        map(markdown_code, (self._table.base_frame, self._table.tip_frame))
-                    )
+                    table = self._table
+                    # Not as code: viser looks for images there, too, and reads their files.
+                    self.dh_words.content = markdown_text(f"{table.base_frame} to {table.tip_frame}")
                 except UrdfkinError as error:
                     self.dh_words.content = markdown_text(str(error))
             self.update()

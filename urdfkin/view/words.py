@@ -6,7 +6,7 @@ import numpy as np
 
 from urdfkin.frame_motion import FrameMotion
 from urdfkin.oracle import version
-from urdfkin.printable import markdown_code, markdown_text
+from urdfkin.printable import markdown_text
 from urdfkin.tree import FloatArray
 from urdfkin.view.overlays import PART_COLOURS
 
@@ -21,7 +21,7 @@ def numbers(x: FrameMotion) -> str:
         ("ang. acceleration", "rad/s²", x.acceleration[0, 3:]),
     ]
     lines = [
-        f"**{markdown_code(x.frame)}**, {x.reference.name}",
+        f"**{markdown_text(x.frame)}**, {x.reference.name}",
         "",
         "| | x | y | z |",
         "| --- | ---: | ---: | ---: |",
