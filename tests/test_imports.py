@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).parent.parent / "urdfkin"
 #: Every part of the package, in the order in which they may build on one another: a module imports what
 #: stands in its own row or above it. Imports inside functions count; those for types alone do not.
 LAYERS = (
-    ("errors", "nearest", "frame_names", "interpreter"),
+    ("errors", "nearest", "frame_names", "interpreter", "printable"),
     ("rotation", "motion", "equations", "resources", "keeping", "figure", "plain_xml"),
     ("tree", "reference"),
     ("coupling", "followers", "configuration", "chain"),

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Self, TypeVar
 
 from urdfkin.nearest import nearest
+from urdfkin.printable import printable
 
 _E = TypeVar("_E", bound="UrdfkinError")
 
@@ -40,7 +41,8 @@ class UrdfkinError(Exception):
         place = f"{self.where}: " if self.where else ""
         found = f": found {self.found}" if self.found else ""
         remedy = f"; {self.remedy}" if self.remedy else ""
-        return f"{place}{self.what}{found}{remedy}"
+        # Names and files are in it: none of them may add a line or act on a terminal.
+        return printable(f"{place}{self.what}{found}{remedy}")
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
         # Errors cross process borders in `validate --jobs`; the default would lose the keyword fields.

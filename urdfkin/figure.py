@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from urdfkin.errors import InputError
 from urdfkin.interpreter import not_reading
+from urdfkin.printable import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,6 +35,9 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "urdfkin",
     "font.family": "DejaVu Sans",
+    # A name is text: neither mathematics between dollars nor TeX, whatever the user's own settings are.
+    "text.parse_math": False,
+    "text.usetex": False,
     "axes.spines.top": False,
     "axes.spines.right": False,
 }
@@ -54,6 +58,11 @@ def new_figure(width: float, height: float) -> Figure:
 def style(**more: Any) -> Any:
     """The context to draw in: text stays text, and the same drawing gives the same file."""
     return _matplotlib().rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
+
+
+def label(name: str) -> str:
+    """A name as a drawing can show it: what the font has no glyph for and XML no place is an escape."""
+    return printable(name)
 
 
 def installed() -> bool:
@@ -124,4 +133,4 @@ def _with_ids(text: str, prefix: str) -> str:
 
 
 def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    return printable(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

@@ -40,12 +40,14 @@ def require_chromium() -> tuple[str, str]:
 
 
 @contextmanager
-def opened(profile: Path, *, width: int = 1280, height: int = 1000, dark: bool = False) -> Iterator[Browser]:
-    """A browser with an empty profile."""
+def opened(
+    profile: Path, *, width: int = 1280, height: int = 1000, dark: bool = False, flags: tuple[str, ...] = ()
+) -> Iterator[Browser]:
+    """A browser with an empty profile; `flags` are Chromium's own."""
     binary, driver = require_chromium()
     options = webdriver.ChromeOptions()
     options.binary_location = binary
-    for flag in (*_FLAGS, f"--user-data-dir={profile}", f"--window-size={width},{height}"):
+    for flag in (*_FLAGS, *flags, f"--user-data-dir={profile}", f"--window-size={width},{height}"):
         options.add_argument(flag)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     chrome = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))

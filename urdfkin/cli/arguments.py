@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from urdfkin.cli.door import say
 from urdfkin.cli.idle import refuse_idle
 from urdfkin.errors import InputError, SourceError
 
@@ -122,7 +123,7 @@ def load_robot(source: str, mimic: bool | None, root_joint: str | None, *, verif
         warnings.simplefilter("always")
         robot = load(source, mimic=mimic, root_joint=root_joint, xacro_args=xacro_args(), verify=verify)
     for warning in caught:
-        click.echo(str(warning.message), err=True)
+        say(str(warning.message), err=True)
     return robot
 
 
@@ -150,7 +151,7 @@ def read_inputs(
     n = lengths.pop() if lengths else 1
     full = [np.ascontiguousarray(np.broadcast_to(part, (n, part.shape[1]))) for part in rows]
     for line in robot.limit_violations(full[0]):
-        click.echo(f"warning: {line}", err=True)
+        say(f"warning: {line}", err=True)
     return Inputs(robot, frame or robot.tip_frame, *full)
 
 

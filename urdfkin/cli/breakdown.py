@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from urdfkin.cli.arguments import Inputs
+from urdfkin.cli.door import say
 from urdfkin.cli.output import SIX, check_line, console, write_file
 from urdfkin.cli.tables import print_named
+from urdfkin.printable import csv_cell, json_text
 
 if TYPE_CHECKING:
     from urdfkin.recursion.breakdown import AccelerationBreakdown
@@ -32,7 +31,7 @@ def emit_breakdown(
     certificate = inputs.robot.certificate()
     if format_ == "table" and output is None:
         _print(inputs, reference, parts)
-        click.echo(check_line(certificate))
+        say(check_line(certificate))
         return
     writer = {"table": _as_csv, "csv": _as_csv, "json": _as_json, "npy": _as_npy}[format_]
     data = writer(inputs, reference, parts)
@@ -42,7 +41,7 @@ def emit_breakdown(
         sys.stdout.buffer.write(data)
         sys.stdout.buffer.flush()
     if format_ != "json":
-        click.echo(check_line(certificate), err=True)
+        say(check_line(certificate), err=True)
 
 
 def _rows(parts: AccelerationBreakdown, sample: int) -> Iterator[tuple[str, str, FloatArray]]:
@@ -100,7 +99,7 @@ def _as_json(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> by
         "verified": certificate.verified,
         "check": check_line(certificate),
     }
-    return (json.dumps(document, indent=2, allow_nan=False) + "\n").encode()
+    return (json_text(document) + "\n").encode()
 
 
 def _as_csv(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> bytes:
@@ -109,7 +108,7 @@ def _as_csv(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> byt
     writer.writerow(["sample", "joint", "kind", *SIX])
     for sample in range(len(parts.base)):
         for joint, kind, six in _rows(parts, sample):
-            writer.writerow([sample, joint, kind, *map(repr, six.tolist())])
+            writer.writerow([sample, csv_cell(joint), kind, *map(repr, six.tolist())])
         writer.writerow([sample, "sum", "", *map(repr, parts.total[sample].tolist())])
     return stream.getvalue().encode()
 

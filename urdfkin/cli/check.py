@@ -12,6 +12,7 @@ import click
 
 from urdfkin.checking import check
 from urdfkin.cli.arguments import xacro_args, xacro_option
+from urdfkin.cli.door import command_lines, say, say_styled
 from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Limits, Severity
 from urdfkin.diagnostics.codes import REGISTRY
 from urdfkin.diagnostics.explain import find_code
@@ -101,7 +102,7 @@ def command(
         findings += [_judged(f, strict) for f in found if _wanted(f, ignored, no_notes)]
     _print(findings, files, style)
     for failure in unreadable:
-        click.echo(f"urdfkin: error: {failure}", err=True)
+        say(f"urdfkin: error: {failure}", err=True)
     failed = any(finding.severity is Severity.ERROR for finding in findings)
     sys.exit(2 if unreadable else 1 if failed else 0)
 
@@ -135,7 +136,7 @@ def _print(findings: list[Finding], files: Sequence[str], style: str) -> None:
         click.echo(as_sarif(findings, version))
     elif style == "github":
         if findings:
-            click.echo(as_github(findings))
+            command_lines(as_github(findings))
     else:
         _print_terminal(findings, len(files))
 
@@ -150,8 +151,8 @@ def _version() -> str:
 def _print_terminal(findings: list[Finding], files: int) -> None:
     for finding in findings:
         place, rest = str(finding).split(f": {finding.code} ", 1)
-        code = click.style(finding.code, fg=_COLOURS[finding.severity], bold=True)
-        click.echo(f"{click.style(place, bold=True)}: {code} {rest}")
+        colour = {"fg": _COLOURS[finding.severity], "bold": True}
+        say_styled((place, {"bold": True}), (": ", {}), (finding.code, colour), (f" {rest}", {}))
     click.echo(summary(findings, files))
     worst = next((f.code for f in findings if f.severity is Severity.ERROR), None)
     if worst is not None:

@@ -10,6 +10,7 @@ from typing import Any
 import click
 import numpy as np
 
+from urdfkin.cli.door import say
 from urdfkin.cli.output import write_file
 from urdfkin.dh import DHTable, Units, export, read_table, units_of
 from urdfkin.dh.compare import CellDifference, Comparison, compare, comparison_text
@@ -106,7 +107,8 @@ def _tables(work: Work) -> int:
     _put(work, text)
     if work.format_ not in (*_READ, "json"):
         for table, check in made:
-            click.echo(_said(work, table, check), err=True)
+            for line in _said(work, table, check).split("\n"):
+                say(line, err=True)
     return 0 if all(check is not None and check.within for _, check in made) else 3
 
 
@@ -186,7 +188,7 @@ def _tree(work: Work) -> int:
         q = draw(work.robot.tree, SAMPLES, np.random.default_rng(1), with_special=True).q
         text += f"{printed_tree(parameters, work.units, q)}\n"
     else:
-        click.echo(str(check or check_line(None)), err=True)
+        say(str(check or check_line(None)), err=True)
     _put(work, text)
     return 0 if check is not None else 3
 

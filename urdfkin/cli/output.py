@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import errno
 import io
-import json
 import os
 import sys
 import tempfile
@@ -17,8 +16,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.arguments import Inputs
+from urdfkin.cli.door import say
 from urdfkin.cli.tables import make_table, print_named
 from urdfkin.errors import SourceError
+from urdfkin.printable import csv_cell, json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -56,17 +57,17 @@ def compiling() -> Iterator[None]:
     from urdfkin.recursion.announcing import announced  # noqa: PLC0415  keeps --help fast
 
     message = "urdfkin: compiling the recursion for this machine, once; some ten seconds ..."
-    with announced(lambda: click.echo(message, err=True)):
+    with announced(lambda: say(message, err=True)):
         yield
 
 
 def console(*, err: bool = False) -> Console:
     """A terminal 80 columns wide or as wide as it is; colours only where there is a terminal."""
-    from rich.console import Console  # noqa: PLC0415  keeps --help fast
+    from urdfkin.cli.terminal import Terminal  # noqa: PLC0415  keeps --help fast
 
     stream = sys.stderr if err else sys.stdout
     width = None if stream.isatty() else int(os.environ.get("COLUMNS", "100"))
-    return Console(file=stream, width=width, highlight=False, soft_wrap=False, emoji=False, markup=False)
+    return Terminal(stream, width=width, soft_wrap=False)
 
 
 def write_file(path: Path, data: bytes) -> None:
@@ -127,7 +128,7 @@ def emit(
         sys.stdout.buffer.write(data)
         sys.stdout.buffer.flush()
     if format_ != "json":
-        click.echo(check_line(certificate), err=True)
+        say(check_line(certificate), err=True)
 
 
 def check_line(certificate: Certificate) -> str:
@@ -172,7 +173,7 @@ def _as_json(
     document["result"] = result.tolist()
     document["verified"] = certificate.verified
     document["check"] = check_line(certificate)
-    return (json.dumps(document, indent=2, allow_nan=False) + "\n").encode()
+    return (json_text(document) + "\n").encode()
 
 
 def _as_csv(
@@ -181,7 +182,7 @@ def _as_csv(
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     if quantity in MATRICES:
-        writer.writerow(["sample", "row", *inputs.robot.rate_names])
+        writer.writerow(["sample", "row", *map(csv_cell, inputs.robot.rate_names)])
         for k, J in enumerate(result):
             writer.writerows(
                 [k, row, *map(repr, values)] for row, values in zip(SIX, J.tolist(), strict=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.arguments import frame_option, load_robot, reference_option, robot_argument, seed_option
+from urdfkin.cli.door import say
 from urdfkin.cli.output import compiling, write_file
 from urdfkin.cli.reports import check_writable
 from urdfkin.errors import InputError
@@ -87,7 +88,7 @@ def command(
     with compiling():
         found = frame_motion(loaded, motion.q, motion.v, motion.a, frame or loaded.tip_frame, reference)
     write_file(output, save(sheet(loaded, found, motion, panels), output))
-    click.echo(f"{loaded.name}: {found.frame}: {foot(found, motion)}")
+    say(f"{loaded.name}: {found.frame}: {foot(found, motion)}")
     context.exit(3 if found.not_verified is not None else 0 if found.agrees else 1)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from urdfkin.cli.door import say
 from urdfkin.cli.output import console
 from urdfkin.cli.reports import check_writable, report_options, write_reports
 
@@ -45,7 +46,7 @@ def command(
     failed = write_reports(document, html=html, junit=junit, markdown=markdown)
     if paths := [str(path) for path in (html, junit, markdown) if path]:
         if not failed:
-            click.echo(f"wrote {', '.join(paths)}")
+            say(f"wrote {', '.join(paths)}")
     else:
         from urdfkin.report.terminal import print_report  # noqa: PLC0415
 

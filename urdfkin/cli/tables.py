@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal
 
+from urdfkin.printable import printable
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -78,7 +80,8 @@ def _texts(rows: Iterable[Sequence[str | float]]) -> list[list[str]]:
     cells = [list(row) for row in rows]
     largest = max((abs(cell) for row in cells for cell in row if not isinstance(cell, str)), default=0.0)
     return [
-        [cell if isinstance(cell, str) else _number(cell, 1e-15 * largest) for cell in row] for row in cells
+        [printable(cell) if isinstance(cell, str) else _number(cell, 1e-15 * largest) for cell in row]
+        for row in cells
     ]
 
 

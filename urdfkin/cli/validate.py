@@ -15,6 +15,7 @@ from urdfkin.cli.judgement import judge_all
 from urdfkin.cli.output import compiling, console
 from urdfkin.cli.reports import check_writable, report_options, write_reports
 from urdfkin.cli.stopping import stoppable
+from urdfkin.printable import printable
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
@@ -110,7 +111,9 @@ def _progress() -> Iterator[Progress]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn  # noqa: PLC0415
 
     screen = console(err=True)
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn()
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task("", total=None)
-        yield lambda done, total, label: bar.update(task, completed=done, total=total, description=label)
+        yield lambda done, total, label: bar.update(
+            task, completed=done, total=total, description=printable(label)
+        )

@@ -7,6 +7,7 @@ import sys
 import click
 
 from urdfkin.cli.arguments import load_robot, robot_argument
+from urdfkin.cli.door import say
 from urdfkin.cli.output import compiling
 
 EXAMPLE = "urdfkin view panda"
@@ -26,16 +27,20 @@ def command(robot: str, mimic: bool | None, root_joint: str | None, host: str, p
 
     The numbers of the chosen frame are checked by Pinocchio as the robot moves. Needs the extra
     `urdfkin[view]`. Press Ctrl-C to end it.
+
+    The address that is printed holds a key: open it as it stands, and show it to nobody who should not see
+    or move the robot. Other pages and other users of this machine are refused.
     """
-    from urdfkin.view.viewer import Viewer, new_server  # noqa: PLC0415  keeps --help fast
+    from urdfkin.view.server import new_server  # noqa: PLC0415  keeps --help fast
+    from urdfkin.view.viewer import Viewer  # noqa: PLC0415
 
     loaded = load_robot(robot, mimic, root_joint)
     server = new_server(host, port)
     with compiling():
         Viewer(server, loaded)
-    click.echo(f"{loaded.name}: http://{host}:{server.get_port()}")
-    sys.stdout.flush()  # whoever reads a pipe wants the address now
     try:
+        say(f"{loaded.name}: {server.address}")
+        sys.stdout.flush()  # whoever reads a pipe wants the address now
         server.sleep_forever()
     except KeyboardInterrupt:
         server.stop()

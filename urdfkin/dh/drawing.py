@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from urdfkin.dh.row import Convention
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
-from urdfkin.figure import new_figure, style
+from urdfkin.figure import label, new_figure, style
 from urdfkin.tree import FloatArray
 
 _X, _Z, _D, _A, _AXIS, _TEXT = "#c0392b", "#2456a6", "#6b7280", "#d97904", "#9aa7b5", "#222222"
@@ -61,7 +61,7 @@ def drawing(
             sheet.write_labels()
         axes.set_aspect("equal")
         axes.set_axis_off()
-        title = f"{table.robot}: {table.base_frame} to {table.tip_frame}"
+        title = label(f"{table.robot}: {table.base_frame} to {table.tip_frame}")
         axes.set_title(f"{title}\n{table.convention} Denavit-Hartenberg frames", color=_TEXT)
         out = io.StringIO()
         axes.figure.savefig(out, format="svg", metadata={"Date": None}, bbox_inches="tight")
@@ -127,7 +127,8 @@ class _Sheet:
                     break
                 spot = spot + step * side
             taken.append(spot)
-            self.axes.text(*spot, ", ".join(texts), color=color, ha="center", va="center", zorder=6)
+            words = {"color": color, "ha": "center", "va": "center", "zorder": 6}
+            self.axes.text(*spot, ", ".join(texts), parse_math=color in (_X, _Z), **words)  # ours, not names
 
 
 def _corners(table: DHTable, frames: FloatArray) -> FloatArray:
@@ -155,7 +156,7 @@ def _draw(sheet: _Sheet, table: DHTable, frames: FloatArray, tip: FloatArray) ->
         sheet.line(origin - 0.2 * size * z, origin + 0.28 * size * z, **dashes)
         marker = {"marker": "o" if row.kind.turns else "s", "color": _TEXT, "markerfacecolor": "white"}
         sheet.mark(origin, markersize=5.5, **marker)
-        sheet.label(origin - 0.24 * size * z, z, row.joint, "#6f7d8c")
+        sheet.label(origin - 0.24 * size * z, z, label(row.joint), "#6f7d8c")
     dots = {"color": _D, "linewidth": 1.2, "linestyle": ":"}
     sheet.line(np.zeros(3), frames[0, :3, 3], **dots)
     sheet.line(frames[-1, :3, 3], tip[:3, 3], **dots)
@@ -163,4 +164,6 @@ def _draw(sheet: _Sheet, table: DHTable, frames: FloatArray, tip: FloatArray) ->
         sheet.arrow(T[:3, 3], 0.13 * size * T[:3, 0], _X, f"$x_{{{i}}}$")
         sheet.arrow(T[:3, 3], 0.13 * size * T[:3, 2], _Z, f"$z_{{{i}}}$")
     sheet.mark(tip[:3, 3], marker="D", color=_TEXT, markersize=4.5)
-    sheet.label(tip[:3, 3] - 0.07 * size * (tip[:3, 0] + tip[:3, 2]), tip[:3, 2], table.tip_frame, _TEXT)
+    sheet.label(
+        tip[:3, 3] - 0.07 * size * (tip[:3, 0] + tip[:3, 2]), tip[:3, 2], label(table.tip_frame), _TEXT
+    )

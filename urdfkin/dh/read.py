@@ -15,6 +15,7 @@ from urdfkin.dh.rows import table_from_mapping
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.written_row import ORDER
 from urdfkin.errors import InputError, SourceError, UrdfkinError
+from urdfkin.printable import from_csv_cell
 
 
 def read_table(path: str | os.PathLike[str]) -> DHTable:
@@ -114,6 +115,7 @@ def _row_from_csv(names: list[str], cells: list[str], index: int) -> dict[str, A
             remedy=f"the columns are {', '.join(names)}",
         )
     said = {name: cell.strip() for name, cell in zip(names, cells, strict=True) if cell or name in ORDER}
+    said |= {key: from_csv_cell(said[key]) for key in ("joint", "leader") if key in said}
     mimic = {key: said.pop(key) for key in ("leader", "multiplier", "offset") if key in said}
     limit = {key: said.pop(key) for key in ("lower", "upper", "velocity", "effort") if key in said}
     nested: dict[str, Any] = {"mimic": mimic} if mimic else {}

@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
+from urdfkin.printable import printable
+
 #: Longest piece of a file that is quoted in a message.
 QUOTED = 60
-
-
-def printable(text: str) -> str:
-    r"""The text with everything that a terminal could act on written as an escape.
-
-    >>> print(printable("a\u202eb\x1b[31m"))
-    a\u202eb\x1b[31m
-    """
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def shortened(text: str, limit: int = QUOTED) -> str:

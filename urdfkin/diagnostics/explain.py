@@ -6,8 +6,8 @@ import textwrap
 
 from urdfkin.diagnostics.codes import REGISTRY
 from urdfkin.diagnostics.codes.base import Code
-from urdfkin.diagnostics.escape import printable
 from urdfkin.errors import UnknownNameError
+from urdfkin.printable import printable
 
 #: Longest line of an example that is shown whole.
 _WIDEST = 100

@@ -11,8 +11,9 @@ from dataclasses import asdict, dataclass
 from enum import Enum
 from typing import Any
 
-from urdfkin.diagnostics.escape import printable, shortened
+from urdfkin.diagnostics.escape import shortened
 from urdfkin.errors import UrdfkinError
+from urdfkin.printable import printable
 
 
 class Severity(Enum):

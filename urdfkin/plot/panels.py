@@ -83,6 +83,7 @@ def singular_values(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     shown = np.where(values > EPS * largest, values, np.nan)
     _lines(axes, t, shown, tuple(f"σ{k + 1}" for k in range(values.shape[1])))
     axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylabel("singular values of J [SI]")
 
 

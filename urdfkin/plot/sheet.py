@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urdfkin.errors import UnknownNameError
-from urdfkin.figure import new_figure, style
+from urdfkin.figure import label, new_figure, style
 from urdfkin.frame_motion import FrameMotion
 from urdfkin.oracle import version
 from urdfkin.plot.panels import PANELS
@@ -53,7 +53,7 @@ def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence
             axes.tick_params(labelbottom=True)
         for axes in grid[-1]:
             axes.set_xlabel("time [s]")
-        figure.suptitle(f"{robot.name}: {x.frame}, {x.reference.name}", fontsize=11)
+        figure.suptitle(label(f"{robot.name}: {x.frame}, {x.reference.name}"), fontsize=11)
         figure.supxlabel(foot(x, trajectory), fontsize=8, color="#444444")
     return figure
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from urdfkin.printable import markdown_text as text
 from urdfkin.report.compare import Change, Comparison, figures
 from urdfkin.report.document import Document, Units
-from urdfkin.report.markdown import LIMIT, shortened, text
+from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.terminal import plain_table
 from urdfkin.report.words import counted, quantity_name, summary, units
 
@@ -39,7 +40,9 @@ def markdown_of(old: Document, new: Document, found: Comparison, limit: int = LI
     mark = "❌" if found.regressions else "✅"
     lines = [f"## {mark} {verdict(found)[0].upper()}{verdict(found)[1:]}", ""]
     lines += ["| worst, eps·scale | old | new |", "| --- | ---: | ---: |"]
-    lines += [f"| {quantity_name(name)} | {_cell(a)} | {_cell(b)} |" for name, a, b in figures(old, new)]
+    lines += [
+        f"| {text(quantity_name(name))} | {_cell(a)} | {_cell(b)} |" for name, a, b in figures(old, new)
+    ]
     lines += ["", *(["| | what | old | new |", "| --- | --- | --- | --- |"] if found.changes else [])]
     left = limit - sum(len(line) + 1 for line in lines) - 100
     ordered = sorted(found.changes, key=lambda change: not change.regression)

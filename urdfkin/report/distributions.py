@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urdfkin.figure import FIRST, GRID, SECOND, TEXT, THIRD, inline_svg, new_figure, style
+from urdfkin.figure import FIRST, GRID, SECOND, TEXT, THIRD, inline_svg, label, new_figure, style
 from urdfkin.report.document import Check, Robot
 from urdfkin.report.words import of_quantity, quantities, quantity_name, units, worst
 
@@ -109,7 +109,7 @@ def _decorate(axes: Axes, names: Sequence[str], right: float) -> None:
     axes.set_xlim(_LEFT, right)
     axes.set_ylim(-0.15, len(names) - 0.05)
     axes.set_yticks(
-        [len(names) - 1 - row for row in range(len(names))], [quantity_name(name) for name in names]
+        [len(names) - 1 - row for row in range(len(names))], [label(quantity_name(name)) for name in names]
     )
     axes.tick_params(axis="y", length=0, labelsize=9, colors=TEXT, pad=26)
     axes.tick_params(axis="x", which="both", labelsize=8, colors=TEXT, color=GRID)

@@ -26,7 +26,9 @@ def as_junit(document: Document) -> bytes:
     root.extend(suites)
     ET.indent(root)
     return (
-        b'<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode").encode() + b"\n"
+        b'<?xml version="1.0" encoding="UTF-8"?>\n'
+        + _clean(ET.tostring(root, encoding="unicode")).encode()
+        + b"\n"
     )
 
 

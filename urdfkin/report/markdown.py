@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from urdfkin.printable import markdown_code, printable
+from urdfkin.printable import markdown_text as text
 from urdfkin.report.document import Document, Robot, outcome_of
 from urdfkin.report.words import (
     VERDICTS,
@@ -52,7 +54,7 @@ def as_markdown(document: Document, limit: int = LIMIT) -> str:
 
 def _body(robots: list[Robot], room: int) -> list[str]:
     quantities = columns(robots)
-    heads = ["robot", "joints", "frames", "results", *quantities, "of bound", "verdict"]
+    heads = ["robot", "joints", "frames", "results", *map(text, quantities), "of bound", "verdict"]
     lines = [_row(heads), _row(["---", *["---:"] * (len(heads) - 2), "---"])]
     left = room - sum(len(line) + 1 for line in lines) - 200
     tails: list[str] = []
@@ -73,7 +75,7 @@ def _cells(robot: Robot, quantities: list[tuple[str, ...]]) -> list[str]:
     verdict = robot["verdict"]
     share = percent(share_of(robot)) if robot["checks"] else ""
     return [
-        text(shortened(robot["source"], 60)),
+        markdown_code(shortened(robot["source"], 60)),
         str(len(robot["joints"])),
         str(len(robot["frames"])),
         f"{robot['results']:,}",
@@ -87,18 +89,18 @@ def _details(robot: Robot) -> list[str]:
     """What went wrong with one robot."""
     lines: list[str] = []
     if robot["reason"]:
-        lines += ["", f"**{text(robot['source'])}**: {text(shortened(robot['reason'], 600))}"]
+        lines += ["", f"**{markdown_code(robot['source'])}**: {text(shortened(robot['reason'], 600))}"]
     failed = [check for check in robot["checks"] if check["failed"]]
     for check in failed[:_SHOWN]:
         lines += [
             "",
-            f"**{text(robot['source'])}**, {text(check_name(check))}: {check['failed']:,} of"
+            f"**{markdown_code(robot['source'])}**, {text(check_name(check))}: {check['failed']:,} of"
             f" {check['results']:,} outside their bound, worst {units(check['worst'])} eps·scale",
         ]
         if check["worst_case"] is not None:
             lines += ["", fenced(shortened(check["worst_case"]["replay"], 4000))]
     if len(failed) > _SHOWN:
-        lines += ["", f"... and {len(failed) - _SHOWN} more quantities of {text(robot['source'])}"]
+        lines += ["", f"... and {len(failed) - _SHOWN} more quantities of {markdown_code(robot['source'])}"]
     return lines
 
 
@@ -106,18 +108,12 @@ def _row(cells: list[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def text(words: str) -> str:
-    """Words that Markdown, HTML and mentions leave alone."""
-    flat = re.sub(r"[\x00-\x1f\x7f\u2028\u2029]+", " ", words)
-    flat = flat.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("@", "&#64;")
-    return re.sub(r"([\\`*_{}\[\]|~!#])(?!64;)", r"\\\1", flat)
-
-
 def fenced(code: str) -> str:
     """A block of code whose fence is longer than any run of backticks inside."""
     longest = max((len(run) for run in re.findall("`+", code)), default=0)
     fence = "`" * max(3, longest + 1)
-    return f"{fence}sh\n{code}\n{fence}"
+    lines = "\n".join(map(printable, code.split("\n")))
+    return f"{fence}sh\n{lines}\n{fence}"
 
 
 def shortened(words: str, length: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from urdfkin.printable import printable
 from urdfkin.report.document import Check, Document, Judgement, Robot, outcome_of
 from urdfkin.report.words import (
     SIDES,
@@ -68,14 +69,14 @@ def plain_table(heads: Sequence[str], rows: Iterable[Sequence[str]], words: Sequ
     from rich.table import Table  # noqa: PLC0415
 
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
-    for i, head in enumerate(heads):
+    for i, head in enumerate(heads):  # a head may have two lines
         left = i in words
         width = _ROBOT_WIDTH if i == 0 and len(words) > 1 else None
         table.add_column(
             head, justify="left" if left else "right", overflow="fold", max_width=width, vertical="top"
         )
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(printable, row))
     return table
 
 
@@ -132,7 +133,7 @@ def _figures(checks: Sequence[Check]) -> list[str]:
 
 def _checks(robot: Robot) -> Table:
     """One robot: a row for each quantity and reference."""
-    heads = [robot["source"], "results", "outside", "median", "99 %", "worst", "of bound"]
+    heads = [printable(robot["source"]), "results", "outside", "median", "99 %", "worst", "of bound"]
     rows = (
         [
             check_name(check),
@@ -173,7 +174,10 @@ def _judged(judgement: Judgement) -> Table:
 
 def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
     if robot["reason"]:
-        out.print(f"{robot['source']}: {robot['verdict']}: {robot['reason']}")
+        first, *rest = robot["reason"].split("\n")
+        out.print(f"{robot['source']}: {robot['verdict']}: {first}")
+        for line in rest:
+            out.print(line)
     noted = [finding for finding in robot["findings"] if finding["severity"] != "note"]
     if noted and robot["checks"] and cases:
         out.print(

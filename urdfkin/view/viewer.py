@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from urdfkin.dh.table import DHTable
-from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.errors import UrdfkinError
 from urdfkin.frame_motion import FrameMotion, frame_motion
+from urdfkin.printable import markdown_text
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
@@ -17,21 +18,7 @@ from urdfkin.view.overlays import acceleration_arrows, jacobian_arrows, velocity
 from urdfkin.view.stage import Stage
 from urdfkin.view.words import legend, numbers
 
-LOOPBACK = "127.0.0.1"
 _REFERENCES = tuple(reference.name.lower() for reference in Reference)
-
-
-def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
-    """Viser's server.
-
-    Raises:
-        InputError: viser is not installed.
-    """
-    try:
-        import viser  # noqa: PLC0415  an extra
-    except ImportError:
-        raise InputError("the viewer needs viser", remedy="pip install 'urdfkin[view]'") from None
-    return viser.ViserServer(host=host, port=port, label="urdfkin", verbose=False)
 
 
 class Viewer:
@@ -57,7 +44,6 @@ class Viewer:
 
     def _build(self) -> None:
         gui = self.server.gui
-        # Sharing would open a tunnel to the outside.
         gui.configure_theme(show_share_button=False, control_width="large")
         self.words = gui.add_markdown("")
         with gui.add_folder("Frame"):
@@ -147,9 +133,11 @@ class Viewer:
             if self.dh.value != "none":
                 try:
                     self._table = self.robot.dh(self.frame.value, convention=self.dh.value)
-                    self.dh_words.content = f"{self._table.base_frame} to {self._table.tip_frame}"
+                    table = self._table
+                    # Not as code: viser looks for images there, too, and reads their files.
+                    self.dh_words.content = markdown_text(f"{table.base_frame} to {table.tip_frame}")
                 except UrdfkinError as error:
-                    self.dh_words.content = str(error)
+                    self.dh_words.content = markdown_text(str(error))
             self.update()
 
     # -- what is seen --------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import numpy as np
 
 from urdfkin.frame_motion import FrameMotion
 from urdfkin.oracle import version
-from urdfkin.report.markdown import text
+from urdfkin.printable import markdown_text
 from urdfkin.tree import FloatArray
 from urdfkin.view.overlays import PART_COLOURS
 
@@ -21,7 +21,7 @@ def numbers(x: FrameMotion) -> str:
         ("ang. acceleration", "rad/s²", x.acceleration[0, 3:]),
     ]
     lines = [
-        f"**{text(x.frame)}**, {text(x.reference.name)}",
+        f"**{markdown_text(x.frame)}**, {x.reference.name}",
         "",
         "| | x | y | z |",
         "| --- | ---: | ---: | ---: |",
@@ -42,7 +42,7 @@ def numbers(x: FrameMotion) -> str:
 def check_line(x: FrameMotion) -> str:
     """What Pinocchio says of the numbers shown."""
     if x.not_verified is not None:
-        return f"**! not verified** by Pinocchio {version()}: {text(x.not_verified)}"
+        return f"**! not verified** by Pinocchio {version()}: {markdown_text(x.not_verified)}"
     figures = ", ".join(f"{quantity} {check.units[0]:.2g}" for quantity, check in x.checks.items())
     mark = "**✓ verified** by" if x.agrees else "**✗ disagrees** with"
     return f"{mark} Pinocchio {version()}, eps·scale: {figures}"

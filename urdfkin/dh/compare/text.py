@@ -13,6 +13,7 @@ from urdfkin.dh.export.terminal import aligned
 from urdfkin.dh.export.words import added, pose_lines
 from urdfkin.dh.row import DHRow
 from urdfkin.dh.units import Units
+from urdfkin.printable import printable
 
 
 def comparison_text(found: Comparison, units: Units) -> str:
@@ -34,7 +35,7 @@ def comparison_text(found: Comparison, units: Units) -> str:
         rounded = np.round(T / fine) * fine
         if np.abs(rounded - np.eye(4)).max() > fine:
             lines += ["", f"{what} (metres):", *("  " + line for line in pose_lines(rounded, 6))]
-    return "\n".join(lines) + "\n"
+    return "\n".join(map(printable, lines)) + "\n"
 
 
 def _verdict(found: Comparison) -> list[str]:

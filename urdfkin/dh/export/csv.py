@@ -9,6 +9,7 @@ import json
 from urdfkin.dh.export.mapping import to_mapping
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
+from urdfkin.printable import csv_cell
 
 COLUMNS = (
     *("joint", "kind", "sense", "a", "alpha", "d", "theta", "beta"),
@@ -24,10 +25,11 @@ def write(table: DHTable, units: Units) -> str:
     data.pop("snap", None)
     out = io.StringIO()
     for key, value in data.items():
-        out.write(f"# {key}: {json.dumps(value)}\n")
+        out.write(f"# {key}: {json.dumps(value)}\n".replace("##", "#\\u0023"))
     writer = csv.DictWriter(out, COLUMNS, restval="", lineterminator="\n")
     writer.writeheader()
     for row in rows:
         flat = {**row, **row.pop("mimic", {}), **row.pop("limit", {})}
-        writer.writerow({key: flat[key] for key in COLUMNS if key in flat})
+        named = {key: csv_cell(flat[key]) for key in ("joint", "leader") if key in flat}
+        writer.writerow({key: value for key, value in (flat | named).items() if key in COLUMNS})
     return out.getvalue()

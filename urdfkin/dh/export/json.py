@@ -12,4 +12,4 @@ from urdfkin.dh.units import Units
 def write(table: DHTable, units: Units) -> str:
     """JSON in metres and radians, whatever the units for people are."""
     del units
-    return json.dumps(to_mapping(table), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(to_mapping(table), indent=2, allow_nan=False) + "\n"

@@ -8,6 +8,7 @@ from urdfkin.dh.export.words import at_most, cells, is_identity
 from urdfkin.dh.row import Convention
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Angles, Units
+from urdfkin.printable import printable
 from urdfkin.tree import FloatArray
 
 _FORMULA = {
@@ -90,5 +91,5 @@ def _plain(text: str) -> str:
 
 
 def escaped(text: str) -> str:
-    """Text with LaTeX's special characters made harmless."""
-    return "".join(_SPECIAL.get(character, character) for character in text)
+    """Text with LaTeX's special characters made harmless, on one line."""
+    return "".join(_SPECIAL.get(character, character) for character in printable(text))

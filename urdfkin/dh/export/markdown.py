@@ -5,13 +5,17 @@ from __future__ import annotations
 from urdfkin.dh.export.words import cells, formula, headings, is_identity, pose_lines, snap_lines
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
+from urdfkin.printable import markdown_code, markdown_text
 
 
 def write(table: DHTable, units: Units) -> str:
     """A heading line, the table, base and tool, and what was snapped."""
     body = [["i", "joint", *headings(table, units)]]
-    body += [[str(i), f"`{row.joint}`", *cells(table, row, units)] for i, row in enumerate(table.rows, 1)]
-    title = f"**{table.robot}**, `{table.base_frame}` to `{table.tip_frame}`"
+    body += [
+        [str(i), markdown_code(row.joint), *cells(table, row, units)] for i, row in enumerate(table.rows, 1)
+    ]
+    robot, base, tip = (markdown_code(name) for name in (table.robot, table.base_frame, table.tip_frame))
+    title = f"**{robot}**, {base} to {tip}"
     lines = [f"{title}, {table.convention} Denavit-Hartenberg parameters: `{formula(table)}`", ""]
     lines += [_line(body[0]), _line(["---:", ":---", *["---:"] * (len(body[0]) - 2)])]
     lines += [_line(row) for row in body[1:]]
@@ -21,9 +25,10 @@ def write(table: DHTable, units: Units) -> str:
         else:
             lines += ["", f"{what} (metres):", "", "```", *pose_lines(T, units.digits), "```"]
     if table.snap is not None:
-        lines += ["", *snap_lines(table, "- ")]
+        said = snap_lines(table, "- ")  # joints are named in it
+        lines += ["", *(f"- {markdown_text(s[2:])}" if s.startswith("- ") else s for s in said)]
     return "\n".join(lines) + "\n"
 
 
 def _line(texts: list[str]) -> str:
-    return "| " + " | ".join(text.replace("|", "\\|") for text in texts) + " |"
+    return "| " + " | ".join(texts) + " |"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from urdfkin.dh.export.words import cells, formula, headings, is_identity, pose_lines, snap_lines
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
+from urdfkin.printable import printable
 
 
 def write(table: DHTable, units: Units) -> str:
@@ -26,11 +27,12 @@ def write(table: DHTable, units: Units) -> str:
             lines.append(f"{what}: the identity")
     if table.snap is not None:
         lines += ["", *snap_lines(table)]
-    return "\n".join(lines) + "\n"
+    return "\n".join(map(printable, lines)) + "\n"
 
 
 def aligned(body: list[list[str]]) -> list[str]:
     """Columns side by side with a rule under the headings: names to the left, numbers to the right."""
+    body = [[printable(text) for text in row] for row in body]
     widths = [max(len(row[i]) for row in body) for i in range(len(body[0]))]
     lines = []
     for row in body:

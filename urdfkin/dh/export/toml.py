@@ -9,6 +9,7 @@ from typing import Any
 from urdfkin.dh.export.mapping import to_mapping
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
+from urdfkin.printable import escape
 
 
 def write(table: DHTable, units: Units) -> str:
@@ -26,5 +27,6 @@ def _value(value: Any) -> str:
         return "{" + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(_value(item) for item in value) + "]"
-    # A TOML basic string takes JSON's escapes, and both write numbers alike.
-    return json.dumps(value, ensure_ascii=True, allow_nan=False)
+    # A TOML basic string takes JSON's escapes, but no pairs of surrogates, and both write numbers alike.
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    return "".join(c if c.isprintable() else escape(c) for c in text)

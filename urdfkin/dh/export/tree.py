@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Callable
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -11,6 +12,7 @@ from urdfkin.dh.export.terminal import aligned
 from urdfkin.dh.export.words import added
 from urdfkin.dh.tree_parameters import TreeParameters, TreeRow
 from urdfkin.dh.units import Units
+from urdfkin.printable import csv_cell, markdown_code, printable
 
 FORMULA = "T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r), i = a(j)"
 
@@ -32,15 +34,17 @@ def write_tree(table: TreeParameters, form: str, units: Units) -> str:
         out = io.StringIO()
         writer = csv.DictWriter(out, [field.name for field in fields(TreeRow)], lineterminator="\n")
         writer.writeheader()
-        writer.writerows(as_mapping(table)["rows"])
+        for row in as_mapping(table)["rows"]:
+            writer.writerow({k: csv_cell(v) if isinstance(v, str) else v for k, v in row.items()})
         return out.getvalue()
-    title = f"{table.robot}: Khalil-Kleinfinger parameters, {table.root} is frame 0"
-    body = [_heads(table, units), *(_cells(table, j, units) for j in range(len(table.rows)))]
+    shown = markdown_code if form == "markdown" else str
+    title = f"{shown(table.robot)}: Khalil-Kleinfinger parameters, {shown(table.root)} is frame 0"
+    body = [_heads(table, units), *(_cells(table, j, units, shown) for j in range(len(table.rows)))]
     if form == "markdown":
         lines = ["| " + " | ".join(row) + " |" for row in body]
         rule = "| " + " | ".join(["---:"] * len(body[0])) + " |"
-        return "\n".join([f"**{title}**: `{FORMULA}`", "", lines[0], rule, *lines[1:]]) + "\n"
-    return "\n".join([title, FORMULA, "", *aligned(body)]) + "\n"
+        return "\n".join([f"{title}: `{FORMULA}`", "", lines[0], rule, *lines[1:]]) + "\n"
+    return "\n".join([printable(title), FORMULA, "", *aligned(body)]) + "\n"
 
 
 def _heads(table: TreeParameters, units: Units) -> list[str]:
@@ -50,16 +54,17 @@ def _heads(table: TreeParameters, units: Units) -> list[str]:
     return [*heads, f"beta [{angle}]"] if _bent(table) else heads
 
 
-def _cells(table: TreeParameters, j: int, units: Units) -> list[str]:
+def _cells(table: TreeParameters, j: int, units: Units, shown: Callable[[str], str]) -> list[str]:
     row = table.rows[j]
     theta, r = units.angle(row.theta), units.length(row.r)
     # A follower's own offset is part of its constant, as in the other tables.
-    own = f"q({row.joint})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
+    leader = shown(row.leader)
+    own = f"q({leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({leader})"
     if row.sigma == 0:
         theta = added(own, units.angle(row.theta + row.offset))
     elif row.sigma == 1:
         r = added(own, units.length(row.r + row.offset))
-    cells = [str(j + 1), row.joint, str(row.antecedent + 1), str(row.sigma), units.angle(row.gamma)]
+    cells = [str(j + 1), shown(row.joint), str(row.antecedent + 1), str(row.sigma), units.angle(row.gamma)]
     cells += [units.length(row.b), units.angle(row.alpha), units.length(row.d), theta, r]
     return [*cells, units.angle(row.beta)] if _bent(table) else cells
 

@@ -1,0 +1,77 @@
+"""Whether loading robots keeps memory or files: loads N, no two alike, and says what is held after each part.
+
+python -m scripts.leaks 10000
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import os
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+
+import urdfkin
+
+#: In how many parts a run is measured.
+PARTS = 5
+_ROBOT = """<robot name="r{k}">
+  <link name="base{k}"/><link name="arm"/><link name="{odd}tip{k}"/>
+  <joint name="a{k}" type="revolute"><parent link="base{k}"/><child link="arm"/><origin xyz="0 0 {x}"/>
+    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+  <joint name="b" type="continuous"><parent link="arm"/><child link="{odd}tip{k}"/><origin xyz="{x} 0 0"/>
+    <axis xyz="0 1 0"/></joint>
+</robot>
+"""
+
+
+def use(k: int, folder: Path) -> None:
+    """A robot of its own: from a file, checked, computed with, verified; or one that is refused."""
+    text = _ROBOT.format(k=k, x=0.1 + 1e-6 * k, odd="&lt;b&gt; " if k % 3 else "")
+    path = folder / f"{k % 10}.urdf"
+    path.write_text(text if k % 5 else text.replace("</robot>", ""))
+    urdfkin.check(path)
+    try:
+        robot = urdfkin.load(path)
+    except urdfkin.UrdfkinError:
+        return
+    robot.acceleration(robot.sample(20), robot.sample(20), robot.sample(20), robot.tip_frame)
+    robot.dh()
+
+
+def held() -> dict[str, float]:
+    """Resident memory in MiB, open descriptors, objects that Python keeps account of."""
+    gc.collect()
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return {
+        "MiB": pages * os.sysconf("SC_PAGE_SIZE") / 2**20,
+        "descriptors": len(os.listdir("/proc/self/fd")),  # noqa: PTH208  one less than a Path would open
+        "objects": len(gc.get_objects()),
+    }
+
+
+def measure(n: int) -> list[dict[str, float]]:
+    """What is held after each part of N robots."""
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = []
+        for k in range(n):
+            use(k, Path(folder))
+            if (k + 1) % (n // PARTS) == 0:
+                found.append(held())
+                print(f"{k + 1} robots: {json.dumps(found[-1])}", file=sys.stderr, flush=True)
+    return found
+
+
+def main() -> None:
+    """Print it as JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("robots", type=int, nargs="?", default=10_000)
+    print(json.dumps(measure(parser.parse_args().robots)))
+
+
+if __name__ == "__main__":
+    main()

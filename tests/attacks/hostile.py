@@ -1,0 +1,91 @@
+"""Names that attack whoever shows them, and robots that bear them.
+
+Every name is legal in a URDF: XML lets an attribute hold any of these characters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.sax.saxutils import quoteattr
+
+#: Each tries to become something else than text in some form that urdfkin writes.
+NAMES = {
+    "script": "<script>window.hacked=1</script>",
+    "event": "<img src=x onerror=window.hacked=1>",
+    "frame": '<iframe srcdoc="<script>parent.hacked=1</script>"></iframe>',
+    "attribute": "\"'><svg onload=window.hacked=1>",
+    "end of data": "</script></style></textarea></title>--><b id=hacked>x</b>",
+    "comment": "<!-- ]]> --> <?php x ?> <![CDATA[<b id=hacked>]]>",
+    "template": "{{7*7}}$ {7*7}#{7*7}<%= 7*7 %>&amp;&#60;b id=hacked&#62;",
+    "link": "[x](javascript:window.hacked=1)",
+    "image": "![x](/etc/hostname)",
+    "reference": "[x]: https://evil.example",
+    "address": "https://evil.example/x www.evil.example me@evil.example <https://evil.example>",
+    "mention": "@somebody #1 GH-1",
+    "code": "`</code><b id=hacked>x</b>`` ``` ~~~",
+    "backslashes": "\\`<b id=hacked>x</b>\\\\`\\|\\",
+    "emphasis": "**x** _x_ ~~x~~ # x",
+    "cell": "a | b | c \\| d |",
+    "rule": "---",
+    "line": "a\n\n<b id=hacked>x</b>\n::error::forged\n# heading\n| a | b |",
+    "carriage": "a\r::error::forged\rverified by Pinocchio",
+    "separators": "a\u2028::error::forged\u2029b\x85c\x0bd\x0ce",
+    "workflow": "::error file=x::forged",
+    "workflow after a blank": "x ::error::forged " * 8,
+    "azure": "##vso[task.setvariable variable=x]y ##[error]x ##teamcity[x]",
+    "colours": "\x1b[31mred\x1b[0m\x1b]0;title\x07\x1b[2J\x9b31m",
+    "link of a terminal": "\x1b]8;;https://evil.example\x1b\\x\x1b]8;;\x1b\\",
+    "colours of one byte": "\x9b31mred\x9b0m\x9d0;title\x9c\x7f",
+    "erased": "good\x08\x08\x08\x08evil\x7f",
+    "bidi": "\u202egnp.exe\u202c\u2066x\u2069\u200f\u061c\ufeff\U000e0041",
+    "markup": "[red]x[/red] [link=https://evil.example]x[/link] :skull: [bold",
+    "latex": r"\input{/etc/passwd}$x^2_{}~%\write18{id}",
+    "math": "J$$(x)$\\frac{",
+    "c comment": '*/ int hacked = 1; /* // "; ??/',
+    "python": '"""; hacked = 1; """ \\',
+    "matlab": "'; hacked = 1; % ...",
+    "formula": "=cmd|' /C calc'!A0",
+    "formula of another kind": "@SUM(1+1)*cmd|' /C calc'!A0",
+    "key": "__proto__",
+    "percent": "%s%n%d{0}{x!r}",
+}  # fmt: skip
+
+#: Those that XML 1.0 can hold.
+IN_XML = {
+    kind: name for kind, name in NAMES.items() if not any(c in "\x1b\x07\x08\x0b\x0c\x00" for c in name)
+}
+
+
+def attribute(name: str) -> str:
+    """A name as an attribute's value, quotes included; line ends survive."""
+    return quoteattr(name, {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
+
+
+def chain_of_all(names: Sequence[str] = tuple(IN_XML.values()), robot: str = NAMES["line"]) -> str:
+    """A robot whose links and joints bear every name that a URDF can hold, one below the other."""
+    links = "".join(f"<link name={attribute(name)}/>" for name in ["base", *names])
+    joints = "".join(
+        f'<joint name={attribute(f"{child} ")} type="continuous"><parent link={attribute(parent)}/>'
+        f'<child link={attribute(child)}/><origin xyz="0.1 0 0"/><axis xyz="0 {k % 2} {1 - k % 2}"/></joint>'
+        for k, (parent, child) in enumerate(zip(["base", *names], names, strict=False))
+    )
+    return f'<?xml version="1.0"?><robot name={attribute(robot)}>{links}{joints}</robot>'
+
+
+def urdf(name: str) -> str:
+    """A planar arm whose robot, links and joints all bear a name, numbered where they must differ."""
+    link = [attribute(f"{name}{k}" if k else name) for k in range(3)]
+    joint = [attribute(f"{name} {k}") for k in (1, 2)]
+    return f"""<?xml version="1.0"?>
+<robot name={attribute(name)}>
+  <link name={link[0]}/><link name={link[1]}/><link name={link[2]}/>
+  <joint name={joint[0]} type="revolute">
+    <parent link={link[0]}/><child link={link[1]}/><origin xyz="0 0 0.4"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+  <joint name={joint[1]} type="revolute">
+    <parent link={link[1]}/><child link={link[2]}/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+</robot>
+"""

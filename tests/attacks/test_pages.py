@@ -1,0 +1,317 @@
+"""No name becomes an element, an attribute, a script or a line in any form that urdfkin writes.
+
+Where a form can be parsed, its skeleton (what there is besides the words) is compared with that of the same
+thing under tame names: whatever a name adds is found, also what nobody thought of.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any, cast
+
+import jsonschema
+import pytest
+from lxml import etree
+from markdown_it import MarkdownIt
+
+import urdfkin
+from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
+from urdfkin.dh import DHTable, export
+from urdfkin.dh.drawing import drawing
+from urdfkin.dh.export.latex import escaped
+from urdfkin.dh.export.tree import write_tree
+from urdfkin.dh.read import read_table
+from urdfkin.dh.tree_parameters import tree_parameters
+from urdfkin.dh.units import Units
+from urdfkin.printable import csv_cell, from_csv_cell, markdown_code, markdown_text
+from urdfkin.report.compare import compare
+from urdfkin.report.comparison import markdown_of
+from urdfkin.report.document import Document, asset
+from urdfkin.report.html import as_html
+from urdfkin.report.junit import as_junit
+from urdfkin.report.markdown import as_markdown
+from urdfkin.validation.campaign import validate
+
+pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.diagnostics.finding.UrdfWarning")
+
+Skeleton = list[tuple[str, tuple[str, ...]]]
+
+
+class _Elements(HTMLParser):
+    """Tags with the names of their attributes, comments and instructions, and the text of scripts."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: Skeleton = []
+        self.scripts: list[str] = []
+        self.words = ""
+        self._script = self._code = False
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, tuple(name for name, _ in attrs)))
+        self._script = tag == "script"
+        self._code = self._code or tag == "code"
+
+    def handle_endtag(self, tag: str) -> None:
+        self.found.append((f"/{tag}", ()))
+        self._script = False
+        self._code = self._code and tag != "code"
+
+    def handle_data(self, data: str) -> None:
+        if self._script:
+            self.scripts.append(data)
+        elif not self._code:
+            self.words += data
+
+    def handle_comment(self, data: str) -> None:
+        self.found.append(("comment", ()))
+
+    def handle_decl(self, decl: str) -> None:
+        self.found.append(("declaration", ()))
+
+    def handle_pi(self, data: str) -> None:
+        self.found.append(("instruction", ()))
+
+    def unknown_decl(self, data: str) -> None:
+        self.found.append(("declaration", ()))
+
+
+def tame(name: str) -> str:
+    return f"n{list(NAMES.values()).index(name)}"
+
+
+def same(name: str) -> str:
+    return name
+
+
+# -- reports -----------------------------------------------------------------------------------------
+
+
+@cache
+def _report(called: Callable[[str], str]) -> str:
+    """A run on a robot with every name, and a robot for each name that no URDF could hold or that failed."""
+    names = [called(name) for name in IN_XML.values()]
+    document = validate([chain_of_all(names, called(NAMES["line"]))], samples=1).as_dict()
+    whole = document["robots"][0]
+    refused = {**whole, "checks": [], "joints": [], "frames": [], "chains": [], "model": None, "results": 0}
+    document["robots"] += [
+        {**refused, "name": n, "source": n, "reason": f"{n}: no\n  {n}: yes", "verdict": "bad input"}
+        for n in map(called, NAMES.values())
+    ]
+    whole["source"] = called(NAMES["colours"])
+    failed = whole["checks"][0]
+    failed |= {"failed": 1}
+    # As wide as each other: it stands beside a plot, whose ticks are as many as there is room for.
+    whole["checks"][2] |= {"quantity": "<b>|`\x1b" if called is same else "abcdefghij"}
+    failed["worst_case"] |= {"replay": called(NAMES["code"]), "frame": called(NAMES["line"])}
+    document |= {"passed": False, "command": called(NAMES["code"]), "started": called(NAMES["end of data"])}
+    document["versions"] = {key: called(NAMES["script"]) for key in document["versions"]}
+    return json.dumps(document)
+
+
+def report(called: Callable[[str], str]) -> Document:
+    return cast("Document", json.loads(_report(called)))
+
+
+@pytest.mark.slow
+def test_a_report_of_hostile_names_fits_the_schema() -> None:
+    jsonschema.validate(report(same), json.loads(asset("validation-1.schema.json")))
+
+
+@pytest.mark.slow
+def test_a_page_has_the_same_elements_attributes_and_scripts_under_any_names() -> None:
+    hostile, plain = (_Elements(as_html(report(called))) for called in (same, tame))
+    assert hostile.found == plain.found
+    data = [script for script in hostile.scripts if script.lstrip().startswith(("{", "["))]
+    assert data, "the page's data"
+    links = [json.loads(script)["links"] for script in data if '"links"' in script]
+    assert links == [["base", *IN_XML.values()]]
+    code = [[s for s in page.scripts if not s.lstrip().startswith(("{", "["))] for page in (hostile, plain)]
+    assert code[0] == code[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("html", [True, False])
+def test_a_comment_in_markdown_has_the_same_elements_under_any_names(html: bool) -> None:
+    for write in (as_markdown, _compared):
+        hostile, plain = (write(report(called)) for called in (same, tame))
+        assert hostile.count("\n") == plain.count("\n")
+        assert rendered(hostile, html).found == rendered(plain, html).found
+        assert not re.search(r"@\w|://|www\.|#\d", rendered(hostile, html).words)
+
+
+def _compared(document: Document) -> str:
+    """With one that has lost every robot: each is named as gone."""
+    empty: Any = {**document, "robots": document["robots"][:1]}
+    return markdown_of(document, empty, compare(document, empty))
+
+
+@pytest.mark.slow
+def test_junit_has_the_same_elements_and_attributes_under_any_names() -> None:
+    trees = [etree.fromstring(as_junit(report(called))) for called in (same, tame)]
+    skeletons = [[(element.tag, sorted(element.attrib)) for element in tree.iter()] for tree in trees]
+    assert skeletons[0] == skeletons[1]
+
+
+def rendered(text: str, html: bool) -> _Elements:
+    parser = MarkdownIt("commonmark", {"html": html}).enable(["table", "strikethrough"])
+    return _Elements(str(parser.render(text)))
+
+
+# -- tables ------------------------------------------------------------------------------------------
+
+
+@cache
+def _table() -> DHTable:
+    return urdfkin.load("planar_two_link").dh()
+
+
+def table(name: str) -> DHTable:
+    rows = tuple(replace(row, joint=f"{name} {i}") for i, row in enumerate(_table().rows))
+    return replace(_table(), robot=name, base_frame=name, tip_frame=name, rows=rows)
+
+
+@pytest.mark.parametrize("kind", IN_XML)
+def test_what_was_snapped_is_told_with_names_as_words(kind: str) -> None:
+    def page(name: str) -> _Elements:
+        text = urdf(name).replace('<origin xyz="0.3 0 0"/>', '<origin xyz="0.3 0 0" rpy="1.5708 0 0"/>')
+        snapped = urdfkin.load(text).dh(snap=1e-3)
+        assert snapped.snap is not None
+        assert snapped.snap.changes
+        return rendered(export(snapped, "markdown"), True)
+
+    assert page(IN_XML[kind]).found == page("tame_name").found
+
+
+@pytest.mark.parametrize("html", [True, False])
+@pytest.mark.parametrize("kind", NAMES)
+def test_a_table_in_markdown_has_the_same_elements_under_any_name(kind: str, html: bool) -> None:
+    hostile, plain = (rendered(export(table(name), "markdown"), html) for name in (NAMES[kind], "tame_name"))
+    assert hostile.found == plain.found
+    assert not re.search(r"@\w|://|www\.", hostile.words)
+
+
+@pytest.mark.parametrize("kind", NAMES)
+def test_a_name_in_markdown_is_code_and_prose_is_prose(kind: str) -> None:
+    name = NAMES[kind]
+    cell = rendered(f"| a | b |\n| --- | --- |\n| {markdown_code(name)} | x |\n", True)
+    assert [tag for tag, _ in cell.found if tag in ("td", "code", "tr")] == ["tr", "tr", "td", "code", "td"]
+    prose = rendered(markdown_text(name), True)
+    assert prose.found == [("p", ()), ("/p", ())]
+    assert not re.search(r"@\w|://|www\.|#\d", prose.words)
+
+
+@pytest.mark.parametrize("form", ["markdown", "terminal"])
+def test_the_whole_tree_has_the_same_lines_under_any_names(form: str) -> None:
+    texts = [
+        write_tree(tree_parameters(urdfkin.load(chain_of_all(names, names[0])).tree), form, Units())
+        for names in (list(IN_XML.values()), [f"n{k}" for k in range(len(IN_XML))])
+    ]
+    assert texts[0].count("\n") == texts[1].count("\n")
+    if form == "markdown":
+        hostile, plain = (rendered(text, True) for text in texts)
+        assert hostile.found == plain.found
+
+
+@pytest.mark.parametrize("kind", NAMES)
+def test_a_name_in_latex_is_words(kind: str) -> None:
+    known = r"\\textbackslash\{\}|\\textasciitilde\{\}|\\textasciicircum\{\}|\\[&%$#_{}]"
+    assert not re.search(r"[\\{}$&#^_~%\n\r]", re.sub(known, "", escaped(NAMES[kind])))
+    lines = [export(table(name), "latex").count("\n") for name in (NAMES[kind], "tame_name")]
+    assert lines[0] == lines[1]
+
+
+@pytest.mark.parametrize("form", ["numpy", "roboticstoolbox"])
+@pytest.mark.parametrize("kind", NAMES)
+def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
+    def code(name: str) -> str:
+        tree = ast.parse(export(table(name), form))
+        words = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
+        assert name.isidentifier() or name not in words or not name.isascii() or name.isprintable()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                node.value = ""
+        return ast.dump(tree)
+
+    assert code(NAMES[kind]) == code("tame_name")
+
+
+@pytest.mark.parametrize("kind", NAMES)
+def test_c_code_is_the_same_under_any_name_and_compiles(kind: str, tmp_path: Path) -> None:
+    def code(name: str) -> str:
+        text = export(table(name), "c")
+        head, end, rest = text.partition("*/")
+        assert head.startswith("/*")
+        assert end
+        prefix = re.search(r"void (\w+)_placement", rest)
+        assert prefix is not None
+        return rest.replace(prefix[1], "NAME")
+
+    assert code(NAMES[kind]) == code("tame_name")
+    if shutil.which("gcc"):
+        file = tmp_path / "table.c"
+        file.write_text(export(table(NAMES[kind]), "c"))
+        subprocess.run(["gcc", "-std=c99", "-Wall", "-Werror", "-fsyntax-only", file], check=True)
+
+
+@pytest.mark.parametrize("form", ["matlab", "matlab-rst"])
+@pytest.mark.parametrize("kind", NAMES)
+def test_matlab_code_is_the_same_under_any_name(kind: str, form: str) -> None:
+    def code(name: str) -> list[str]:
+        first, *lines = export(table(name), form).split("\n")
+        assert re.fullmatch(r"function \w+ = \w+\(q?\)", first)
+        return [re.sub("'[^']*'", "''", line) for line in lines if not line.startswith("%")]
+
+    assert code(NAMES[kind]) == code("tame_name")
+
+
+@pytest.mark.parametrize("form", ["json", "toml", "csv"])
+@pytest.mark.parametrize("kind", NAMES)
+def test_a_table_that_is_read_back_has_its_names(kind: str, form: str, tmp_path: Path) -> None:
+    file = tmp_path / f"table.{form}"
+    file.write_text(export(table(NAMES[kind]), form), encoding="utf-8")
+    found = read_table(file)
+    assert (found.robot, found.base_frame, found.tip_frame) == (NAMES[kind],) * 3
+    # In CSV what would act on a log or a terminal stays an escape: urdfkin's JSON and TOML hold every name.
+    if form != "csv" or (NAMES[kind].isprintable() and "##" not in NAMES[kind]):
+        assert [row.joint for row in found.rows] == [f"{NAMES[kind]} {i}" for i in range(2)]
+
+
+@pytest.mark.parametrize("name", ["=1+1", "+x", "-x", "@x", "'=1", " =1", "\t=1", "'''@x", "'x", "x'", "'"])
+def test_no_spreadsheet_takes_a_name_for_a_formula(name: str) -> None:
+    cell = csv_cell(name)
+    assert not cell.startswith(("=", "+", "-", "@", "\t", "\r"))
+    if name.isprintable():
+        assert from_csv_cell(cell) == name
+
+
+def test_a_drawing_has_names_as_words_alone() -> None:
+    def elements(called: Callable[[str], str]) -> list[Any]:
+        names = [called(name) for name in IN_XML.values()]
+        robot = urdfkin.load(chain_of_all(names, called(NAMES["math"])))
+        svg = etree.fromstring(drawing(robot.dh(names[-1])).encode())
+        comments = [str(comment.text).strip() for comment in svg.iter(etree.Comment)]
+        assert [c for c in comments if not re.fullmatch(r"\$[xz]_\{\d+\}\$(, \$[xz]_\{\d+\}\$)*", c)] == []
+        return [
+            (element.tag, sorted(element.attrib)) for element in svg.iter() if "path" not in str(element.tag)
+        ]
+
+    assert elements(same) == elements(tame)
+
+
+@pytest.mark.parametrize("name", ["J$$(x)", "$x^2$", "J$$", r"$\frac{", r"\$x$"])
+def test_dollars_in_a_name_are_no_mathematics(name: str) -> None:
+    svg = etree.fromstring(drawing(table(name)).encode())
+    words = " ".join("".join(map(str, element.itertext())) for element in svg.iter("{*}text"))
+    assert name in words

@@ -1,0 +1,261 @@
+"""Nothing that a file brings acts on a terminal or a log: every command, on hostile names."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
+from tests.cli.running import Done, urdfkin
+from urdfkin.cli import COMMANDS
+from urdfkin.cli.door import Door
+from urdfkin.dh.export import FORMATS
+
+#: A file may be called so.
+FILE = "\x1b[31m\n::error::forged\u202e ##vso[x]"
+
+ROBOT = {
+    "info": [[], ["--format", "json"]],
+    "placement": [[], ["--format", "json"], ["--format", "csv"], ["--frame", "FRAME"]],
+    "velocity": [[], ["--q", "random:3"], ["--q", "\x1b[31mx"]],
+    "jacobian": [[], ["--format", "json"], ["--format", "csv"], ["--frame", FILE]],
+    "jacobian-rate": [[], ["--format", "csv"]],
+    "acceleration": [[], ["--explain", "--v", "random"], ["--explain", "--v", "random", "--format", "csv"]],
+    "dh": [
+        *(["--format", form, "--no-mimic"] for form in (*FORMATS, "urdf", "svg")),
+        *(["--tree", "--format", form] for form in ("terminal", "markdown", "csv", "json")),
+        ["--flip", FILE], ["--near-parallel", "strict"], ["--compare", "TABLE"],
+    ],
+    "check": [["--format", form] for form in ("terminal", "json", "sarif", "github")] + [["--each"]],
+    "validate": [["--samples", "2", "--cases"], ["--samples", "1", "--isolate"]],
+    "plot": [
+        ["--to", "neutral", "--frame", NAMES["math"], "--output", "PICTURE"],
+        ["--to", FILE, "--output", "PICTURE"],
+    ],
+}  # fmt: skip
+OTHERS: dict[str, list[list[str]]] = {
+    "robots": [[], ["--format", "json"], ["--family", FILE]],
+    "explain": [["URDF502"], ["7.130"], [FILE]],
+    "report": [["REPORT"], ["REPORT", "--cases"], [FILE]],
+    "compare": [["REPORT", "REPORT"], ["REPORT", "REPORT", "--format", "json"], ["REPORT", FILE]],
+    "view": [[FILE]],
+}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """A robot, a table and a report, in a folder and under names as hostile as what is in them."""
+    folder = tmp_path_factory.mktemp("files") / FILE.replace("/", "")
+    folder.mkdir()
+    made = {name: str(folder / f"{FILE}{ending}") for name, ending in ENDINGS.items()}
+    Path(made["ROBOT"]).write_text(chain_of_all(), encoding="utf-8")
+    names = [NAMES["colours"], *list(IN_XML.values())[1:]]
+    rows = ", ".join(
+        f"{{joint = {_toml(name)}, kind = 'revolute', a = 0.1, alpha = 0, d = 0, theta = 0}}"
+        for name in names
+    )
+    Path(made["TABLE"]).write_text(
+        "convention = 'standard'\nangles = 'radians'\nlengths = 'metres'\n"
+        f"robot = {_toml(NAMES['colours'])}\nrows = [{rows}]\n",
+        encoding="utf-8",
+    )
+    done = urdfkin("validate", made["ROBOT"], "--samples", "1", "--json", made["REPORT"])
+    assert done.code == 0, done.err
+    report = json.loads(Path(made["REPORT"]).read_text())
+    entry = report["robots"][0]
+    entry["source"] = NAMES["colours"] + NAMES["line"]
+    entry["checks"][0]["worst_case"]["replay"] = NAMES["colours"]
+    refused = {
+        **entry,
+        "verdict": "bad input",
+        "reason": "\n".join(NAMES.values()),
+        "checks": [],
+        "model": None,
+    }
+    report["robots"] += [refused | {"joints": [], "frames": [], "chains": [], "results": 0}]
+    report["command"], report["started"] = NAMES["colours"], NAMES["erased"]
+    Path(made["REPORT"]).write_text(json.dumps(report))
+    return made | {"FRAME": NAMES["line"]}
+
+
+def _toml(name: str) -> str:
+    return '"' + "".join(f"\\U{ord(c):08x}" for c in name) + '"'
+
+
+ENDINGS = {"ROBOT": ".urdf", "TABLE": ".toml", "REPORT": ".json", "PICTURE": ".svg"}
+
+
+def acts(text: str, *, commands: bool = False) -> list[str]:
+    """What in a text would act on a terminal or a log."""
+    found = [repr(c) for c in text if c != "\n" and not c.isprintable()]
+    found += re.findall(r"##(?:vso|teamcity)?\[", text)
+    lines = [line.strip() for line in re.split("[\n\r]", text)]
+    ours = re.compile(r"::(error|warning|notice) file=[^:]*,title=URDF\d+::")
+    return found + [line for line in lines if line.startswith("::") and not (commands and ours.match(line))]
+
+
+def run(files: dict[str, str], words: list[str]) -> Done:
+    return urdfkin(*(files.get(word, word) for word in words))
+
+
+def harmless(done: Done, words: list[str]) -> None:
+    assert acts(done.text, commands="github" in words) == []
+    assert acts(done.err) == []
+    assert "Traceback" not in done.err
+
+
+def test_every_command_is_tried() -> None:
+    assert set(ROBOT) | set(OTHERS) == set(COMMANDS)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [[c, "ROBOT", *more] for c, lists in ROBOT.items() for more in lists],
+    ids=lambda w: ascii(" ".join(w)),
+)
+def test_no_name_acts_on_the_terminal(words: list[str], files: dict[str, str]) -> None:
+    harmless(run(files, words), words)
+
+
+@pytest.mark.parametrize(
+    "words", [[c, *more] for c, lists in OTHERS.items() for more in lists], ids=lambda w: ascii(" ".join(w))
+)
+def test_no_word_of_a_report_or_of_the_command_line_acts(words: list[str], files: dict[str, str]) -> None:
+    harmless(run(files, words), words)
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "no such command"])
+def test_no_name_of_a_file_or_an_option_acts(command: str) -> None:
+    for words in ([command, f"--{FILE}"], [command, f"{FILE}.urdf"], [f"{command}{FILE}"]):
+        if words != ["explain", f"{FILE}.urdf"]:
+            harmless(urdfkin(*words), words)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", IN_XML)
+def test_each_name_alone_adds_no_line(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many lines as for a robot with tame names of that length: a name is one line, or part of one."""
+    monkeypatch.setenv("COLUMNS", "10000")
+    lines: list[list[int]] = []
+    for name in (IN_XML[kind], "x" * len(IN_XML[kind].encode("unicode_escape"))):
+        path = tmp_path / f"{len(lines)}.urdf"
+        path.write_text(urdf(name), encoding="utf-8")
+        counts = []
+        for words in (["info"], ["jacobian"], ["dh"], ["dh", "--format", "markdown"], ["dh", "--tree"],
+                      ["acceleration", "--explain", "--v", "random"], ["dh", "--format", "c"]):  # fmt: skip
+            done = urdfkin(words[0], str(path), *words[1:])
+            harmless(done, words)
+            counts.append(done.text.count("\n"))
+        lines.append(counts)
+    assert lines[0] == lines[1]
+
+
+def test_machine_formats_say_the_names_as_they_are(files: dict[str, str]) -> None:
+    names = [f"{name} " for name in IN_XML.values()]
+    assert set(names) <= {
+        joint["name"] for joint in run(files, ["info", "ROBOT", "--format", "json"]).data["joints"]
+    }
+    rows = run(files, ["dh", "ROBOT", "--format", "json"]).data["rows"]
+    assert [row["joint"] for row in rows] == names
+    import tomllib  # noqa: PLC0415
+
+    table = tomllib.loads(run(files, ["dh", "ROBOT", "--format", "toml"]).text)
+    assert [row["joint"] for row in table["rows"]] == names
+
+
+def test_a_crash_says_its_last_words_through_the_door() -> None:
+    code = f"import urdfkin.cli as c\ndef crash(**_): raise ValueError({FILE!r})\nc.cli = crash\nc.main()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "ValueError" in done.stderr
+    assert acts(done.stderr) == []
+
+
+def test_on_a_real_terminal_nothing_but_our_own_colours_comes_out(files: dict[str, str]) -> None:
+    for words in (["check", "ROBOT"], ["info", "ROBOT"], ["dh", "ROBOT"], ["report", "REPORT"]):
+        shown = on_a_terminal([files.get(word, word) for word in words])
+        assert "\x1b[1m" in shown or words[0] in ("dh", "info")
+        assert acts(re.sub(r"\x1b\[(0|1|3[1-4]|1;3[1-4])?m", "", shown.replace("\r\n", "\n"))) == []
+
+
+def on_a_terminal(words: list[str]) -> str:
+    pid, screen = pty.fork()
+    if pid == 0:
+        os.environ["TERM"] = "xterm"
+        os.execv(sys.executable, [sys.executable, "-m", "urdfkin", *words])
+    shown = b""
+    while True:
+        try:
+            piece = os.read(screen, 65536)
+        except OSError:
+            break
+        if not piece:
+            break
+        shown += piece
+    os.close(screen)
+    os.waitpid(pid, 0)
+    return shown.decode()
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_terminal_of_any_encoding_shows_escapes(encoding: str, files: dict[str, str]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "urdfkin", "check", files["ROBOT"]],
+        capture_output=True, check=False, env=os.environ | {"PYTHONIOENCODING": encoding},
+    )  # fmt: skip
+    assert acts(done.stdout.decode(encoding) + done.stderr.decode(encoding)) == []
+    assert b"Traceback" not in done.stderr
+
+
+class Kept:
+    """A stream that keeps what it is given."""
+
+    encoding = "utf-8"
+
+    def __init__(self) -> None:
+        self.text = ""
+
+    def write(self, text: str) -> None:
+        self.text += text
+
+
+@pytest.mark.parametrize("step", [1, 2, 3, 7, 1000])
+def test_a_command_in_pieces_is_noticed_too(step: int) -> None:
+    kept: Any = Kept()
+    door = Door(kept)
+    text = " " * 200 + "::error::x\n" + "a ##vso[task]\n  : :x\n:" + ":warning::y\nfine: ::x ## [y]\n"
+    for k in range(0, len(text), step):
+        door.write(text[k : k + step])
+    assert acts(kept.text) == []
+    assert kept.text.endswith("fine: ::x ## [y]\n")
+
+
+def test_what_is_printed_goes_through_the_door() -> None:
+    """No module of the command line has a way round it; whole documents go through `click.echo`."""
+    allowed = {
+        "door.py": ("click.echo(printable(line)",),
+        "info.py": ("click.echo()",), "robots.py": ("click.echo()",),
+        "explain.py": ("click.echo(equation)", "click.echo(page(", 'click.echo(f"{code.id}'),
+        "check.py": ("click.echo(as_json(", "click.echo(as_sarif(", "click.echo(summary(", "click.echo(f\"'"),
+        "report.py": ("click.echo(asset(",), "compare.py": ("click.echo(json.dumps(",),
+        "dh_work.py": ("click.echo(text, nl=False)",),
+        "__init__.py": ('click.echo(f"urdfkin {found', 'click.echo(f"urdfkin: error: {error}'),
+    }  # fmt: skip
+    folder = Path(__file__).parents[2] / "urdfkin" / "cli"
+    for path in folder.glob("*.py"):
+        lines = [line.strip() for line in path.read_text().splitlines()]
+        ways = [
+            line
+            for line in lines
+            if re.search(r"\bclick\.echo\(|\bprint\(|Console\(|sys\.stdout\.write", line)
+        ]
+        ways = [line for line in ways if not re.search(r"out\.print\(|def |super\(\)\.|_print\(", line)]
+        strange = [line for line in ways if not line.startswith(allowed.get(path.name, ()))]
+        assert strange == [] or path.name == "terminal.py", (path.name, strange)

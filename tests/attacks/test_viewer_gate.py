@@ -1,0 +1,193 @@
+"""The viewer answers its own page with its key, and nobody else: asked over a socket, as a stranger would."""
+
+from __future__ import annotations
+
+import http.client
+import inspect
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import urdfkin
+from urdfkin.cli.view import command
+from urdfkin.errors import InputError
+from urdfkin.view import server as module
+from urdfkin.view.gate import Gate
+from urdfkin.view.server import LOOPBACK, UnguardedError, new_server
+from urdfkin.view.viewer import Viewer
+
+viser = pytest.importorskip("viser")
+websockets = pytest.importorskip("websockets.asyncio.server") and pytest.importorskip("websockets")
+
+UPGRADE = {
+    "Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==", "Sec-WebSocket-Protocol": f"viser-v{viser.__version__}",
+}  # fmt: skip
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Any]:
+    server = new_server(port=free_port())
+    Viewer(server, urdfkin.load("planar_two_link"))
+    yield server
+    server.stop()
+
+
+def key_of(server: Any) -> str:
+    return str(server.address.rstrip("/").rsplit("/", 1)[1])
+
+
+def ask(server: Any, path: str, **headers: str | None) -> http.client.HTTPResponse:
+    """A request with headers of one's own; KEY in the path stands for the key."""
+    connection = http.client.HTTPConnection(LOOPBACK, server.get_port(), timeout=20)
+    connection.putrequest("GET", path.replace("KEY", key_of(server)), skip_host=True)
+    own = f"{LOOPBACK}:{server.get_port()}"
+    for name, value in ({"Host": own} | {k.replace("_", "-"): v for k, v in headers.items()}).items():
+        if value is not None:
+            connection.putheader(name, value.replace("OWN", own))
+    connection.endheaders()
+    answer = connection.getresponse()
+    answer.close()
+    connection.close()
+    return answer
+
+
+def connect(server: Any, path: str = "/KEY", **headers: str | None) -> int:
+    return ask(server, path, **UPGRADE, **headers).status
+
+
+def test_the_viewer_listens_to_this_machine_alone_unless_told_otherwise(server: Any) -> None:
+    assert LOOPBACK == "127.0.0.1"
+    assert inspect.signature(new_server).parameters["host"].default == "127.0.0.1"
+    assert next(option for option in command.params if option.name == "host").default == "127.0.0.1"
+    assert server.get_host() == "127.0.0.1"
+    sockets = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
+    listening = {line[1] for line in sockets if line[3] == "0A"}
+    assert [at for at in listening if at.endswith(f":{server.get_port():04X}")] == [
+        f"0100007F:{server.get_port():04X}"
+    ]
+
+
+def test_the_page_is_for_who_holds_the_key(server: Any) -> None:
+    assert ask(server, "/KEY/").status == 200
+    assert ask(server, "/KEY/?darkMode").status == 200
+    for path in (
+        "/",
+        "/KEYx/",
+        "/index.html",
+        "/KEY/index.html",
+        "/../KEY/",
+        "/%2e%2e/",
+        "/key/",
+        "/KEY/x/..",
+    ):
+        assert ask(server, path).status == 403, path
+    assert len(key_of(server)) >= 20
+    other = new_server(port=free_port())
+    other.stop()
+    assert key_of(other) != key_of(server)
+
+
+def test_a_connection_needs_the_key_and_the_viewers_own_page(server: Any) -> None:
+    assert connect(server, Origin="http://OWN") == 101
+    assert connect(server, "/", Origin="http://OWN") == 403
+    for origin in (
+        None,
+        "null",
+        "http://evil.example",
+        "https://OWN",
+        "http://127.0.0.1:1",
+        "http://localhost",
+    ):
+        assert connect(server, Origin=origin) == 403, origin
+
+
+def test_a_name_that_someone_points_at_this_machine_is_refused(server: Any) -> None:
+    port = server.get_port()
+    for host in (f"localhost:{port}", f"[::1]:{port}", "127.0.0.1:9000", "127.0.0.2"):
+        assert ask(server, "/KEY/", Host=host).status == 200, host
+    strangers = ["evil.example", f"evil.example:{port}", "6.6.6.6", "127.0.0.1.nip.example", "", None]
+    for strange in [*strangers, "x@127.0.0.1", "127.0.0.1/", "localhost.", "0x7f.1"]:
+        assert ask(server, "/KEY/", Host=strange).status == 403, strange
+        assert connect(server, Host=strange, Origin=f"http://{strange}") == 403, strange
+
+
+def test_every_answer_forbids_frames_and_the_page_runs_its_own_scripts_alone(server: Any) -> None:
+    for path in ("/KEY/", "/"):
+        answer = ask(server, path)
+        assert answer.getheader("X-Frame-Options") == "DENY"
+        assert answer.getheader("Referrer-Policy") == "no-referrer"
+        assert answer.getheader("Cross-Origin-Resource-Policy") == "same-origin"
+    policies = [ask(server, "/KEY/").getheader("Content-Security-Policy") or "" for _ in range(2)]
+    assert policies[0] != policies[1]  # a nonce is used once
+    rules = dict(rule.split(" ", 1) for rule in policies[0].split("; "))
+    assert rules["default-src"] == rules["frame-ancestors"] == rules["base-uri"] == "'none'"
+    assert "unsafe" not in rules["script-src"].replace("'wasm-unsafe-eval'", "")
+    assert rules["connect-src"].endswith(f" 'self' ws://{LOOPBACK}:{server.get_port()}")
+
+
+def test_no_client_can_have_the_viewer_published(server: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[object] = []
+    monkeypatch.setattr("viser._viser.ViserTunnel", lambda *words: opened.append(words))
+    heard = {message.__name__ for message in server._websock_server._incoming_handlers}
+    assert heard == {"GuiUpdateMessage"}
+    assert server.request_share_url() is None
+    assert opened == []
+
+
+def test_a_viser_that_begins_its_server_in_another_way_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if its next version called something else: the server runs, but not through the gate."""
+    plain = SimpleNamespace(serve=websockets.asyncio.server.serve)
+    monkeypatch.setattr(
+        "viser.infra._infra.websockets",
+        SimpleNamespace(
+            asyncio=SimpleNamespace(server=plain),
+            datastructures=websockets.datastructures,
+            exceptions=websockets.exceptions,
+        ),
+    )
+    port = free_port()
+    with pytest.raises(UnguardedError, match=r"viser \d.*cannot be guarded: .*; pip install 'viser=="):
+        new_server(port=port)
+    with pytest.raises(OSError, match="refused"):
+        socket.create_connection((LOOPBACK, port), timeout=5)
+
+
+def test_a_page_with_other_scripts_than_known_is_not_served(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_SCRIPTS", (("<script data-other=", "{nonce}"),))
+    with pytest.raises(UnguardedError, match="its page has other scripts than it had"):
+        new_server(port=free_port())
+
+
+def test_a_gate_that_lets_anybody_in_is_noticed_before_a_robot_is_shown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Gate, "refusal", lambda *_, **__: None)
+    with pytest.raises(UnguardedError, match="a page without the key was answered with 200"):
+        new_server(port=free_port())
+
+
+def test_an_address_of_another_machine_is_an_error_and_no_search_without_end() -> None:
+    with pytest.raises(InputError, match=r"--host 192\.0\.2\.1: nothing can listen there"):
+        new_server("192.0.2.1")
+
+
+def test_on_the_whole_network_names_of_others_are_still_refused() -> None:
+    gate = Gate("0.0.0.0", "key")
+    own = socket.gethostname()
+    for host in ("192.168.1.7:8080", f"{own}:8080", "localhost:8080"):
+        assert gate.refusal("/key/", [host], [], connects=False) is None, host
+    assert gate.refusal("/key/", ["evil.example:8080"], [], connects=False) is not None
+    assert gate.refusal("/", ["192.168.1.7:8080"], [], connects=False) is not None
+    assert gate.address(8080) == "http://127.0.0.1:8080/key/"
+    assert Gate("::1", "key").address(80) == "http://[::1]:80/key/"

@@ -1,0 +1,23 @@
+"""The console that tables and coloured lines are printed on: words are words, whatever is in them."""
+
+from __future__ import annotations
+
+from typing import Any, TextIO, cast
+
+from rich.console import Console
+
+from urdfkin.cli.door import Door
+from urdfkin.printable import printable
+
+
+class Terminal(Console):
+    """Rich's console, on which each text that is printed is one line without markup."""
+
+    def __init__(self, stream: TextIO, **options: Any) -> None:
+        door = Door(stream, styled=True)
+        super().__init__(file=cast("TextIO", door), highlight=False, emoji=False, markup=False, **options)
+        door.styled = self.is_terminal
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """As rich does; tables bring their own cells."""
+        super().print(*(printable(o) if isinstance(o, str) else o for o in objects), **options)
