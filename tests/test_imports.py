@@ -14,8 +14,9 @@ PACKAGE = Path(__file__).parent.parent / "urdfkin"
 #: Every part of the package, in the order in which they may build on one another: a module imports what
 #: stands in its own row or above it. Imports inside functions count; those for types alone do not.
 LAYERS = (
-    ("errors",),
-    ("rotation", "motion", "equations", "resources", "keeping", "figure"),
+    ("errors", "numerals"),
+    ("files", "rotation", "motion", "equations", "resources", "keeping", "figure"),
+    ("columns",),
     ("tree", "reference"),
     ("coupling", "followers", "configuration", "chain"),
     ("recursion",),
@@ -24,7 +25,7 @@ LAYERS = (
     ("catalogue", "sources", "origin", "deep_stack"),
     ("oracle", "verification"),
     ("checks", "call", "prepared", "manipulator", "tables", "robot"),
-    ("loading", "from_table", "checking", "description", "trajectory", "frame_motion"),
+    ("loading", "from_table", "checking", "description", "unwrapping", "trajectory", "frame_motion"),
     ("judge", "validation"),
     ("plot", "report", "view"),
     ("cli",),

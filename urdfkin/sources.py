@@ -11,6 +11,7 @@ from typing import IO, TypeGuard
 
 from urdfkin.catalogue import Entry, catalogue
 from urdfkin.errors import InputError, SourceError, UnknownNameError
+from urdfkin.files import read_bytes
 
 #: What `load` and `check` take.
 Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
@@ -104,7 +105,7 @@ def _read_word(word: str, most: int) -> Text:
         read = _read_file(entry.path, most)
         return Text(read.data, read.label, word, entry)
     path = Path(word).expanduser()
-    if path.exists() or os.sep in word or path.suffix:
+    if os.sep in word or path.suffix or _there(path):
         return _read_file(path, most)
     raise UnknownNameError("robot", word, catalogue(), where="neither a file nor in the catalogue")
 
@@ -117,21 +118,28 @@ def _encoded(content: str | bytes, label: str, source: str) -> Text:
 
 def _read_file(path: Path, most: int) -> Text:
     try:
-        with path.open("rb") as file:
-            return Text(file.read(most + 1), str(path), as_word(path))
-    except FileNotFoundError:
-        raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
-    except IsADirectoryError:
-        raise SourceError("a folder, not a file", where=str(path), remedy="name the .urdf inside") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise SourceError("cannot be read", where=str(path), found=reason) from error
+        return Text(read_bytes(path, most), str(path), as_word(path))
+    except SourceError as error:
+        if isinstance(error.__cause__, FileNotFoundError):
+            raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
+        if isinstance(error.__cause__, IsADirectoryError):
+            raise SourceError(
+                "a folder, not a file", where=str(path), remedy="name the .urdf inside"
+            ) from None
+        raise
 
 
 def as_word(path: Path) -> str:
     """A path that cannot be taken for a name of the catalogue, an option, standard input or text."""
     word = str(path)
     return f"./{word}" if word in catalogue() or word.startswith(("-", "<")) else word
+
+
+def _there(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:  # a name too long for a file is hardly one of the catalogue: let the system say so
+        return True
 
 
 def _nearest_file(path: Path) -> str:

@@ -8,7 +8,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, TypedDict, cast
 
-from urdfkin.errors import InputError, SourceError
+from urdfkin.errors import InputError
+from urdfkin.files import read_bytes
 from urdfkin.validation.report import SCHEMA
 
 #: A disagreement in eps * scale; None is no number, or what must agree exactly and does not.
@@ -239,9 +240,7 @@ def read_document(path: Path) -> Document:
         InputError: it is not JSON, not a validation report, of another version, or breaks the schema.
     """
     try:
-        data = json.loads(path.read_bytes())
-    except OSError as error:
-        raise SourceError("cannot be read", where=str(path), found=error.strerror or str(error)) from error
+        data = json.loads(read_bytes(path))
     except ValueError as error:
         raise InputError("not a JSON file", where=str(path), found=str(error)) from error
     return checked(data, str(path))
