@@ -82,6 +82,8 @@ def command(
     loaded = load_robot(robot, mimic, root_joint)
     if trajectory is not None:
         motion = read_trajectory(loaded, trajectory)
+        for note in (*motion.notes, *loaded.limit_violations(motion.q)):
+            click.echo(f"warning: {note}", err=True)
     else:
         motion = _line(loaded, start, end or "", duration, samples, seed)
     with compiling():
