@@ -15,6 +15,7 @@ PACKAGE = Path(__file__).parent.parent / "urdfkin"
 #: stands in its own row or above it. Imports inside functions count; those for types alone do not.
 LAYERS = (
     ("errors", "numerals"),
+    ("demands",),
     ("files", "rotation", "motion", "equations", "resources", "keeping", "figure"),
     ("columns",),
     ("tree", "reference"),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.call import Call
-from urdfkin.errors import InputError
+from urdfkin.demands import real_number, word, words
 from urdfkin.motion.representation import analytical_jacobian
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import BaseMotion
@@ -231,6 +231,7 @@ class Manipulator:
             VerificationError: Pinocchio computes something else.
         """
         robot = _robot(self)
+        representation, nearest = word(representation, "representation"), real_number(nearest, "nearest")
         T_world_frame = robot.placement(q, frame, base=base, verify=verify)
         J_v = robot.jacobian(q, frame, base=base, verify=verify)
         return analytical_jacobian(representation, T_world_frame[..., :3, :3], J_v, nearest)
@@ -274,6 +275,4 @@ def _robot(manipulator: Manipulator) -> Robot:
 
 
 def _names(robot: Robot, frames: Sequence[str] | None) -> Sequence[str]:
-    if isinstance(frames, str):
-        raise InputError("frames are a list of names", found=repr(frames), remedy=f"write [{frames!r}]")
-    return robot.link_names if frames is None else frames
+    return robot.link_names if frames is None else words(frames, "frames")

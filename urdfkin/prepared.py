@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.recursion.compiling import NoKernelError
 from urdfkin.recursion.plan import Packed, Plan
 from urdfkin.recursion.scratch import scratch
 from urdfkin.reference import Reference
@@ -26,7 +27,7 @@ _empty = np.empty
 #: What the kernels count, in the order of `Packed.COUNTS`.
 _COUNTED = Quantity.PLACEMENT, Quantity.VELOCITY, Quantity.ACCELERATION, Quantity.JACOBIAN
 #: What Numba raises for arguments that are no arrays of the kernel's kind; an empty list has no type at all.
-_NOT_TAKEN = (TypeError, ValueError, OverflowError)
+_NOT_TAKEN = (TypeError, ValueError, OverflowError, NoKernelError)
 
 
 class PreparedFrame:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import IO, TypeGuard
 
 from urdfkin.catalogue import Entry, catalogue
+from urdfkin.demands import shown
 from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.files import read_bytes
 
@@ -55,10 +56,14 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
         UnknownNameError: neither a file nor a name of the catalogue; the nearest names are offered.
         InputError: something else than a source.
     """
+    if xacro_args is not None and not isinstance(xacro_args, Mapping):
+        raise InputError("xacro_args are a mapping from names to values", found=shown(xacro_args))
     if is_xacro(source):
         return _expanded(Path(source).expanduser(), xacro_args or {})
     if xacro_args:
-        raise InputError("xacro_args go with the path of a .xacro file", found=", ".join(xacro_args))
+        raise InputError(
+            "xacro_args go with the path of a .xacro file", found=", ".join(map(str, xacro_args))
+        )
     if isinstance(source, bytes):
         return Text(source, "<bytes>", "<bytes>")
     if isinstance(source, os.PathLike):

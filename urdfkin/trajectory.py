@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urdfkin.columns import read_columns
+from urdfkin.demands import real_number, whole_number
 from urdfkin.errors import InputError
 from urdfkin.files import read_text
 from urdfkin.rotation.quaternion import rotation_of
@@ -72,7 +73,9 @@ def line(robot: Robot, start: FloatArray, end: FloatArray, duration: float, samp
     >>> motion.q[2].round(3).tolist(), motion.v[[0, -1]].any()
     ([0.5, 0.5, 0.5, 0.5, 0.5, 0.5], np.False_)
     """
-    if not duration > 0.0 or samples < _FEWEST:
+    duration = real_number(duration, "the duration")
+    samples = whole_number(samples, "samples", 0)
+    if duration <= 0.0 or samples < _FEWEST:
         raise InputError(
             f"a line needs a duration above 0 and {_FEWEST} samples", found=f"{duration} s, {samples}"
         )

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.demands import shown
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.rotation.arrays import FloatArray, floats
 
@@ -270,7 +271,7 @@ class KinematicTree:
             InputError: a link and a joint elsewhere share the name; say `link:NAME` or `joint:NAME`.
         """
         if not isinstance(name, str):
-            raise InputError("a frame is the name of a link or joint", where=self.name, found=repr(name)[:60])
+            raise InputError("a frame is the name of a link or joint", where=self.name, found=shown(name))
         prefix, _, rest = name.partition(":")
         if prefix == "link" and rest in self._link_index:
             return self._link_index[rest]

@@ -19,6 +19,9 @@ from numba import types
 from urdfkin.keeping import kept_folder
 from urdfkin.recursion.lanes import COMPILED
 
+#: What Numba raises of its own where a kernel does not take an argument.
+NoKernelError: type[Exception] = numba.core.errors.NumbaError
+
 _config: Any = numba.config  # settings that numba sets at run time
 
 # Inputs may be read-only; a writable array converts without a copy. One signature, compiled once.
