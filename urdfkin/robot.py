@@ -162,7 +162,10 @@ class Robot(Manipulator, Tables):
         return configuration.neutral(self.tree)
 
     def sample(self, n: int, seed: int = 0) -> FloatArray:
-        """(n, nq) configurations within limits; the same seed gives the same ones.
+        """(n, nq) configurations within limits, followers' too; the same seed gives the same ones.
+
+        Where a follower's limits leave its leader no room, the leader keeps to its own, and
+        `limit_violations` names the follower.
 
         Raises:
             InputError: `n` or `seed` is no whole number from 0 on.
