@@ -15,8 +15,8 @@ PACKAGE = Path(__file__).parent.parent / "urdfkin"
 #: stands in its own row or above it. Imports inside functions count; those for types alone do not.
 LAYERS = (
     ("errors", "numerals"),
-    ("demands",),
-    ("files", "rotation", "motion", "equations", "resources", "keeping", "figure"),
+    ("demands", "forking"),
+    ("files", "rotation", "motion", "equations", "resources", "keeping", "sealed", "figure"),
     ("columns",),
     ("tree", "reference"),
     ("coupling", "followers", "configuration", "chain"),

@@ -84,4 +84,8 @@ def _filled(x: FloatArray, rows: int) -> FloatArray:
 
 @cache
 def _pool() -> ThreadPoolExecutor:
+    """The threads, which a forked child does not have: it starts its own."""
     return ThreadPoolExecutor(_processors(), thread_name_prefix="urdfkin")
+
+
+os.register_at_fork(after_in_child=_pool.cache_clear)

@@ -9,6 +9,7 @@ which is how the compiler sees that rows do not overlap and turns the loops into
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numba
@@ -30,7 +31,26 @@ Vec = tuple[float, float, float]
 #: that no loop carries a branch that raises. Nothing is allocated, so that arrays need no reference counts:
 #: counting them took half of the time.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-lane_function: Any = numba.njit(forceinline=True, **COMPILED)
+
+
+def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Decorator: Numba's, with the options of every function here, and those given.
+
+    NUMBA_DISABLE_JIT is not obeyed: it is meant for functions that Python could run instead.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        config: Any = numba.config
+        before, config.DISABLE_JIT = config.DISABLE_JIT, 0
+        try:
+            return numba.njit(**options, **COMPILED)(function)
+        finally:
+            config.DISABLE_JIT = before
+
+    return decorate
+
+
+lane_function = jitted(forceinline=True)
 
 
 @intrinsic
