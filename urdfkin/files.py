@@ -10,6 +10,7 @@ import errno
 import os
 import select
 import stat
+import sys
 import time
 from pathlib import Path
 
@@ -53,6 +54,37 @@ def read_text(path: Path, most: int | None = None) -> str:
         return read_bytes(path, most).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SourceError("cannot be read", where=str(path), found=f"no UTF-8 text ({error})") from None
+
+
+def read_standard_input(most: int | None = None) -> bytes:
+    """What standard input holds.
+
+    Raises:
+        SourceError: it is closed, or cannot be read.
+    """
+    try:
+        if sys.stdin is None:  # closed by whoever started the process
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        data: bytes = sys.stdin.buffer.read(-1 if most is None else most + 1)
+    except OSError as error:
+        raise SourceError("cannot be read", where="standard input", found=error.strerror) from error
+    return data
+
+
+def exists(path: Path) -> bool:
+    """Whether there is something; True for a name too long for a file, so that reading it says so."""
+    try:
+        return path.exists()
+    except OSError:
+        return True
+
+
+def at_home(name: str | os.PathLike[str]) -> Path:
+    """A path whose `~` is the home it stands for; what stands for no home is a name like others."""
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        return Path(name)
 
 
 def shortened(path: Path) -> str:

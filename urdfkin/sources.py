@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import IO, TypeGuard
 from urdfkin.catalogue import Entry, catalogue
 from urdfkin.demands import shown
 from urdfkin.errors import InputError, SourceError, UnknownNameError
-from urdfkin.files import read_bytes
+from urdfkin.files import at_home, exists, read_bytes, read_standard_input
 
 #: What `load` and `check` take.
 Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
@@ -59,7 +58,7 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
         raise InputError("xacro_args are a mapping from names to values", found=shown(xacro_args))
     if is_xacro(source):
-        return _expanded(Path(source).expanduser(), xacro_args or {})
+        return _expanded(at_home(source), xacro_args or {})
     if xacro_args:
         raise InputError(
             "xacro_args go with the path of a .xacro file", found=", ".join(map(str, xacro_args))
@@ -103,14 +102,14 @@ def _read_word(word: str, most: int) -> Text:
             "no robot is named", found=repr(word), remedy="a path, a name that 'urdfkin robots' lists, or '-'"
         )
     if word == "-":
-        return Text(sys.stdin.buffer.read(most + 1), "<stdin>", "-")
+        return Text(read_standard_input(most), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):
         return _encoded(word, "<text>", "<text>")
     if (entry := catalogue().get(word)) is not None:
         read = _read_file(entry.path, most)
         return Text(read.data, read.label, word, entry)
-    path = Path(word).expanduser()
-    if os.sep in word or path.suffix or _there(path):
+    path = at_home(word)
+    if os.sep in word or path.suffix or exists(path):
         return _read_file(path, most)
     raise UnknownNameError("robot", word, catalogue(), where="neither a file nor in the catalogue")
 
@@ -138,13 +137,6 @@ def as_word(path: Path) -> str:
     """A path that cannot be taken for a name of the catalogue, an option, standard input or text."""
     word = str(path)
     return f"./{word}" if word in catalogue() or word.startswith(("-", "<")) else word
-
-
-def _there(path: Path) -> bool:
-    try:
-        return path.exists()
-    except OSError:  # a name too long for a file is hardly one of the catalogue: let the system say so
-        return True
 
 
 def _nearest_file(path: Path) -> str:

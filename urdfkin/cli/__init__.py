@@ -12,6 +12,7 @@ from typing import cast
 
 import click
 
+from urdfkin.cli import streams
 from urdfkin.errors import UnknownNameError, UrdfkinError
 
 #: Command name -> (module that holds `command`, one-line summary), in the order of the help page.
@@ -92,10 +93,14 @@ def main() -> None:
 
     Exit 0: verified. 1: a disagreement. 2: bad input or usage. 3: computed, but Pinocchio did not check it.
     """
+    streams.prepare()
     # The line under a result says that it was not verified, and why; once is enough.
     warnings.filterwarnings("ignore", message="not verified")
     try:
-        cli(prog_name="urdfkin")
+        try:
+            cli(prog_name="urdfkin")
+        finally:
+            streams.finish()
     except UrdfkinError as error:
         click.echo(f"urdfkin: error: {error}", err=True)
         sys.exit(1 if error.is_disagreement else 2)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from urdfkin.errors import InputError, SourceError
-from urdfkin.files import read_text
+from urdfkin.files import read_standard_input, read_text
 from urdfkin.numerals import whole
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def _read_csv(path: Path, letter: str, names: Sequence[str]) -> FloatArray:
 
 def _standard_input() -> str:
     try:
-        return sys.stdin.buffer.read().decode("utf-8-sig")
+        return read_standard_input().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SourceError("cannot be read", where="-", found=f"no UTF-8 text ({error})") from None
 

@@ -19,6 +19,7 @@ import click
 from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.tables import make_table, print_named
 from urdfkin.errors import SourceError
+from urdfkin.numerals import whole
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -31,6 +32,8 @@ FORMATS = ("table", "json", "csv", "npy")
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
 #: Quantities with a column for each rate.
 MATRICES = ("jacobian", "jacobian rate")
+#: Columns beyond which a table gets no wider: padding takes memory.
+_WIDEST = 10_000
 #: How many samples of a batch a table shows.
 _SHOWN = 5
 
@@ -65,8 +68,14 @@ def console(*, err: bool = False) -> Console:
     from rich.console import Console  # noqa: PLC0415  keeps --help fast
 
     stream = sys.stderr if err else sys.stdout
-    width = None if stream.isatty() else int(os.environ.get("COLUMNS", "100"))
+    width = None if stream.isatty() else _columns()
     return Console(file=stream, width=width, highlight=False, soft_wrap=False, emoji=False, markup=False)
+
+
+def _columns() -> int:
+    """How wide a pipe is, as COLUMNS says; a shell may leave it empty, and 0 stands for what nobody knows."""
+    wanted = whole(os.environ.get("COLUMNS", "")) or 0
+    return min(wanted, _WIDEST) if wanted > 0 else 100
 
 
 def write_file(path: Path, data: bytes) -> None:
