@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from urdfkin.cli.numbers import Whole
 from urdfkin.errors import InputError, SourceError
 from urdfkin.files import read_standard_input, read_text
 from urdfkin.numerals import whole
@@ -94,7 +95,7 @@ verify_option = click.option(
     "--verify/--no-verify", default=True, help="Whether Pinocchio checks each result (the default)."
 )
 seed_option = click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="What `random` is drawn from."
+    "--seed", type=Whole(0), default=0, show_default=True, help="What `random` is drawn from."
 )
 _VALUES = "Numbers '0,0.5,...', '@FILE.csv' for a batch, 'neutral', 'random' or 'random:N'."
 q_option = click.option("--q", metavar="VALUES", default="neutral", show_default=True, help=_VALUES)

@@ -18,7 +18,7 @@ from numba import types
 from urdfkin.forking import lock_over_forks
 from urdfkin.keeping import kept_folder
 from urdfkin.recursion.kept_kernels import KeptKernel
-from urdfkin.recursion.lanes import jitted
+from urdfkin.recursion.lanes import compiling_allowed, jitted
 
 #: What Numba raises of its own where a kernel does not take an argument.
 NoKernelError: type[Exception] = numba.core.errors.NumbaError
@@ -72,7 +72,8 @@ class Kernel:
         dispatcher = jitted(nogil=self._nogil)(self._function)
         if (folder := cache_folder()) is not None:
             dispatcher._cache = KeptKernel(self._function, folder)
-        dispatcher.compile(types.int64(*self._arguments))
+        with compiling_allowed():
+            dispatcher.compile(types.int64(*self._arguments))
         dispatcher.disable_compile()
         return dispatcher
 

@@ -9,7 +9,8 @@ which is how the compiler sees that rows do not overlap and turns the loops into
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numba
@@ -34,20 +35,24 @@ COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 
 
 def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator: Numba's, with the options of every function here, and those given.
-
-    NUMBA_DISABLE_JIT is not obeyed: it is meant for functions that Python could run instead.
-    """
+    """Decorator: Numba's, with the options of every function here, and those given."""
 
     def decorate(function: Callable[..., Any]) -> Any:
-        config: Any = numba.config
-        before, config.DISABLE_JIT = config.DISABLE_JIT, 0
-        try:
+        with compiling_allowed():
             return numba.njit(**options, **COMPILED)(function)
-        finally:
-            config.DISABLE_JIT = before
 
     return decorate
+
+
+@contextmanager
+def compiling_allowed() -> Iterator[None]:
+    """NUMBA_DISABLE_JIT is not obeyed: it is meant for functions that Python could run instead."""
+    config: Any = numba.config
+    before, config.DISABLE_JIT = config.DISABLE_JIT, 0
+    try:
+        yield
+    finally:
+        config.DISABLE_JIT = before
 
 
 lane_function = jitted(forceinline=True)
