@@ -11,9 +11,10 @@ from pathlib import Path
 
 from urdfkin.catalogue import catalogue
 from urdfkin.checking import check
-from urdfkin.diagnostics import Finding, Severity
+from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Severity
 from urdfkin.diagnostics.codes import REGISTRY
 from urdfkin.diagnostics.escape import shortened
+from urdfkin.diagnostics.reporter import WRITTEN_OUT
 
 PAGE = Path(__file__).parents[1] / "docs" / "findings.md"
 
@@ -57,8 +58,15 @@ In a repository of robots, use the hook `urdfkin-check` of pre-commit, or in a w
 programs. Exit status: 0 no error, 1 an error (with `--strict`, a warning), 2 a file or an option that cannot
 be used.
 
-Limits, which options raise: 100,000,000 bytes (`--max-bytes`), 500 levels of nesting (`--max-depth`),
-2,000,000 elements (`--max-elements`).
+Time and memory grow with the file, and no faster (`scripts/check_growth.py` measures it for every kind of
+content). Limits, which options raise: {limits.bytes:,} bytes (`--max-bytes`), {limits.depth:,} levels of
+nesting (`--max-depth`), {limits.elements:,} elements (`--max-elements`), {limits.attributes:,} attributes of
+one element (`--max-attributes`), {limits.name:,} characters of a name (`--max-name`) and {limits.number:,} of
+a number (`--max-number`). `load` keeps the same limits.
+
+On a terminal, many warnings of one kind become one that tells the lines, and so do errors from the hundredth
+of a kind on; `--each` prints each. Of every kind, {written:,} findings of a file are written out, in JSON and
+SARIF too; the last of them tells the lines of the others (`also` in JSON).
 
 ## Codes
 """
@@ -76,7 +84,8 @@ the warnings; robots that are not listed have none. Notes, such as rounded multi
 
 def page() -> str:
     """The page as it should be."""
-    return HEAD + "".join(_tables()) + "\n" + ROBOTS + "".join(_robots())
+    head = HEAD.format(limits=DEFAULT_LIMITS, written=WRITTEN_OUT)
+    return head + "".join(_tables()) + "\n" + ROBOTS + "".join(_robots())
 
 
 def _tables() -> Iterator[str]:

@@ -48,9 +48,9 @@ def count(robot: urdfkin.Robot, frame: str) -> dict[str, int]:
     q, v, a = ([Counted(0.1 + 0.01 * i) for i in range(n)] for n in (robot.nq, robot.nv, robot.nv))
     base = [Counted(x) for x in walk.STILL_STATE[0]]
     walked, out = walk.walk_of(plan.packed), [0.0] * (6 * robot.nv + 16)
-    # Whether inputs are finite is no part of the equations.
-    jacobian.finite = lambda *_: True
-    motion.inputs_finite = lambda *_: 1
+    # Whether inputs are ordinary is no part of the equations.
+    jacobian.ordinary = lambda *_: True
+    motion.inputs_ordinary = lambda *_: 1
     found = {}
     quantities: dict[str, Callable[[list[Counted]], object]] = {
         "jacobian": lambda s: jacobian._jacobian_block(1, s, walked, 0, 2, base, 0, q, out),

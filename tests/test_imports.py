@@ -14,9 +14,9 @@ PACKAGE = Path(__file__).parent.parent / "urdfkin"
 #: Every part of the package, in the order in which they may build on one another: a module imports what
 #: stands in its own row or above it. Imports inside functions count; those for types alone do not.
 LAYERS = (
-    ("errors", "numerals"),
+    ("errors", "nearest", "numerals"),
     ("demands", "forking"),
-    ("files", "rotation", "motion", "equations", "resources", "keeping", "sealed", "figure"),
+    ("files", "rotation", "motion", "equations", "resources", "keeping", "sealed", "figure", "plain_xml"),
     ("columns",),
     ("tree", "reference"),
     ("coupling", "followers", "configuration", "chain"),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.checks import Part, bound_of, pinocchios
+from urdfkin.checks import Part, held_against
 from urdfkin.errors import InputError, NotFiniteError, RangeError
 from urdfkin.recursion.base import STILL_STATE, BaseMotion
 from urdfkin.recursion.plan import IntArray
@@ -28,13 +28,32 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+#: The commands that compute a quantity again.
+_COMMANDS = {
+    Quantity.PLACEMENT: "placement",
+    Quantity.VELOCITY: "velocity",
+    Quantity.JACOBIAN: "jacobian",
+    Quantity.JACOBIAN_RATE: "jacobian-rate",
+    Quantity.ACCELERATION: "acceleration",
+    Quantity.ACCELERATION_BREAKDOWN: "acceleration --explain",
+}
+
 
 class NotVerifiedWarning(UserWarning):
     """Results are handed out that Pinocchio could not check; the message says why."""
 
 
 class Call:
-    """One call's inputs as flat batches, and the way back to the caller's shape."""
+    """One call's inputs as flat batches, and the way back to the caller's shape.
+
+    Args:
+        robot: The robot.
+        frames: Names of links or joints.
+        reference: For all but placements.
+        base: How the base moves; None if it stands still.
+        inputs: q, v and a, as many as the call takes.
+        options: What else the call was given, by the method's names for it.
+    """
 
     def __init__(
         self,
@@ -43,6 +62,7 @@ class Call:
         reference: Reference | str,
         base: BaseMotion | None,
         *inputs: ArrayLike,
+        **options: object,
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
             raise InputError("base is a BaseMotion or None", found=type(base).__name__)
@@ -50,7 +70,7 @@ class Call:
         self.reference = Reference.of(reference)
         self.links = tuple(robot.tree.frame_link(frame) for frame in self.frames)
         self.plan = robot.plan(self.links)
-        self.inputs = inputs
+        self.inputs, self.options = inputs, options
         given = [robot.shaped(x, name) for x, name in zip(inputs, "qva", strict=False)]
         self.shape = self._batch_shape(given)
         self.n = math.prod(self.shape)
@@ -126,10 +146,13 @@ class Call:
                 self.robot.checked(x, name)
             raise
 
+    def wanted(self, verify: Verify | None) -> Verify:
+        """Which results are to be checked; None leaves it to the robot."""
+        return checked_choice(self.robot.verify if verify is None else verify)
+
     def verify(self, quantity: Quantity, results: FloatArray, verify: Verify | None) -> None:
         """Have (n, frames, ...) results checked and entered in the ledger, or raise VerificationError."""
-        robot, ledger = self.robot, self.robot.ledger
-        wanted = checked_choice(robot.verify if verify is None else verify)
+        robot, ledger, wanted = self.robot, self.robot.ledger, self.wanted(verify)
         if wanted is False:
             ledger.unchecked(quantity, self.results)
             return
@@ -156,15 +179,15 @@ class Call:
             base = BaseMotion(base.placement[part], base.velocity[part], base.acceleration[part])
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
-        return Part(self.plan, self.frames, self.reference, self.q[part], rates, base, state)
+        representation = str(self.options.get("representation", ""))
+        return Part(self.plan, self.frames, self.reference, self.q[part], rates, base, state, representation)
 
     def _compare(
         self, quantity: Quantity, ours: FloatArray, part: slice | IntArray
     ) -> tuple[Comparison, VerificationError | None]:
         """Hold some of the results against Pinocchio's; the worst of them, if it disagrees."""
         x = self.part(part)
-        theirs = pinocchios(quantity, self.robot.oracle(self.base), x)
-        bound = bound_of(quantity, x)
+        theirs, bound = held_against(quantity, self.robot.oracle(self.base), x, ours)
         comparison = compare(ours, theirs, bound, 2)
         if comparison.agrees:
             return comparison, None
@@ -180,7 +203,7 @@ class Call:
         return comparison, VerificationError(
             quantity,
             self.frames[f],
-            self.reference.name,
+            x.representation or self.reference.name,
             index=self._index(k),
             ours=ours[i, f],
             theirs=theirs[i, f],
@@ -194,17 +217,17 @@ class Call:
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
     def _replay(self, quantity: Quantity, k: int, frame: str) -> str:
-        reference = None if quantity is Quantity.PLACEMENT else self.reference.name.lower()
         values = {name: array[k].tolist() for name, array in zip("qva", (self.q, *self.rates), strict=False)}
-        if self.base is None:
-            command = str(quantity).replace(" ", "-")
-            return replay_line(self.robot.origin, command, frame, reference, values)
-        # The command line has no words for a moving base.
-        base = self.flat_base or self.base
-        arguments = [*map(repr, values.values()), repr(frame), *([repr(reference)] if reference else [])]
-        fields = ((base.placement, 2), (base.velocity, 1), (base.acceleration, 1))
-        motion = (repr((x if x.ndim == own else x[k]).tolist()) for x, own in fields)
-        return (
-            f"{self.robot.origin.python}.{str(quantity).replace(' ', '_')}({', '.join(arguments)},"
-            f" base=urdfkin.BaseMotion({', '.join(motion)}))"
-        )
+        without = quantity in (Quantity.PLACEMENT, Quantity.ANALYTICAL_JACOBIAN)
+        reference = None if without else self.reference.name.lower()
+        if self.base is None and quantity in _COMMANDS:
+            return replay_line(self.robot.origin, _COMMANDS[quantity], frame, reference, values)
+        options = self.options if reference is None else {"reference": reference, **self.options}
+        # The command line has no words for a moving base, and none for the rest.
+        words = [*map(repr, values.values()), repr(frame), *(f"{x}={y!r}" for x, y in options.items())]
+        if self.base is not None:
+            base = self.flat_base or self.base
+            fields = ((base.placement, 2), (base.velocity, 1), (base.acceleration, 1))
+            motion = (repr((x if x.ndim == own else x[k]).tolist()) for x, own in fields)
+            words.append(f"base=urdfkin.BaseMotion({', '.join(motion)})")
+        return f"{self.robot.origin.python}.{str(quantity).replace(' ', '_')}({', '.join(words)})"

@@ -56,8 +56,8 @@ def check(
     text = read_source(source, limits.bytes, xacro_args)
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
-    report = Reporter(text.label, text.data)
-    root = read_document(report, text.data, limits)
+    report = Reporter(text.label, text.data, limits)
+    root = read_document(report, text.data)
     if root is not None and check_robot(report, root, mimic=mimic, root_joint=root_joint) is not None:
         check_meshes(report, root, _file(text))
     return list(report.findings(fold=fold))

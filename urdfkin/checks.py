@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from urdfkin.oracle import Oracle
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import Plan
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
 from urdfkin.verification import bounds
-from urdfkin.verification.bounds import Bound, Quantity
+from urdfkin.verification.bounds import EPS, Bound, Quantity, result_k
+from urdfkin.verification.line_of_nodes import euler_jacobian, quaternion_jacobian
 from urdfkin.verification.magnitudes import Magnitudes, magnitudes
 
 #: Whether Pinocchio needs v, or v and a.
@@ -20,7 +23,9 @@ _RATES = {
     Quantity.JACOBIAN: 0,
     Quantity.JACOBIAN_RATE: 1,
     Quantity.ACCELERATION: 2,
+    Quantity.ACCELERATION_BREAKDOWN: 2,
 }
+_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
 
 class Part(NamedTuple):
@@ -34,6 +39,7 @@ class Part(NamedTuple):
         rates: (n, nv) v, and a, as far as the call was given them.
         base: How the base moves, with one batch axis or none; None if it stands still.
         state: (n or 1, 24) the same for the kernels.
+        representation: Of an analytical Jacobian's orientation.
     """
 
     plan: Plan
@@ -43,8 +49,35 @@ class Part(NamedTuple):
     rates: tuple[FloatArray, ...]
     base: BaseMotion | None
     state: FloatArray
+    representation: str = ""
 
 
+def held_against(quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray) -> tuple[FloatArray, Bound]:
+    """The same results computed by Pinocchio, and what the two are measured against."""
+    if quantity is Quantity.ANALYTICAL_JACOBIAN:
+        return _analytical(oracle, x, ours)
+    return pinocchios(quantity, oracle, x), bound_of(quantity, x)
+
+
+def _analytical(oracle: Oracle, x: Part, ours: FloatArray) -> tuple[FloatArray, Bound]:
+    """From Pinocchio's rotation and Jacobian, by `line_of_nodes`."""
+    J_v = oracle.jacobians(x.q, x.frames, [_ALIGNED], x.base)[:, :, 0]
+    size = magnitudes(x.plan, x.q, None, None, x.state)
+    if x.representation == "quaternion":
+        quat = oracle.quaternions(x.q, x.frames, x.base)
+        bound = bounds.quaternion_jacobian_bound(x.plan, size)
+        theirs, hidden = quaternion_jacobian(quat, J_v), 1.5 * EPS * result_k(bound, quat.shape[:-1])
+        # Of q and -q the one with qw >= 0 counts; where rounding hides the sign of qw, either does.
+        with_other = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
+        turned = with_other & (np.abs(quat[..., 3]) <= hidden)
+        theirs[..., 3:, :] *= np.where(turned, -1.0, 1.0)[..., np.newaxis, np.newaxis]
+        return theirs, bound
+    R = oracle.placements(x.q, x.frames, x.base)[..., :3, :3]
+    theirs, apart = euler_jacobian(x.representation, R, J_v)
+    return theirs, bounds.euler_jacobian_bound(x.plan, size, apart)
+
+
+@np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite disagrees
 def pinocchios(quantity: Quantity, oracle: Oracle, x: Part) -> FloatArray:
     """(n, frames, ...) the same results, computed by Pinocchio."""
     if quantity is Quantity.PLACEMENT:
@@ -54,6 +87,7 @@ def pinocchios(quantity: Quantity, oracle: Oracle, x: Part) -> FloatArray:
         Quantity.JACOBIAN: oracle.jacobians,
         Quantity.JACOBIAN_RATE: oracle.jacobian_rates,
         Quantity.ACCELERATION: oracle.accelerations,
+        Quantity.ACCELERATION_BREAKDOWN: oracle.accelerations,
     }
     rates, compute = x.rates[: _RATES[quantity]], in_references[quantity]
     return compute(x.q, *rates, x.frames, [x.reference], x.base)[:, :, 0]
@@ -69,5 +103,6 @@ def bound_of(quantity: Quantity, x: Part) -> Bound:
         Quantity.JACOBIAN: lambda size: bounds.jacobian_bound(x.plan, size, x.reference),
         Quantity.JACOBIAN_RATE: lambda size: bounds.jacobian_rate_bound(x.plan, size, x.reference),
         Quantity.ACCELERATION: lambda size: bounds.acceleration_bound(size, x.reference),
+        Quantity.ACCELERATION_BREAKDOWN: lambda size: bounds.acceleration_bound(size, x.reference),
     }
     return of[quantity](size)

@@ -6,9 +6,10 @@ attributes, so that a program need not read the sentence.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterable
 from typing import Any, Self, TypeVar
+
+from urdfkin.nearest import nearest
 
 _E = TypeVar("_E", bound="UrdfkinError")
 
@@ -75,16 +76,16 @@ class UnknownNameError(UrdfkinError, LookupError):
 
     def __init__(self, kind: str, name: str, known: Iterable[str], *, where: str | None = None) -> None:
         names = sorted(set(known))
-        nearest = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
-        if nearest:
-            remedy = f"did you mean {', '.join(nearest)}?"
+        close = nearest(name, names, cutoff=0.5)
+        if close:
+            remedy = f"did you mean {', '.join(close)}?"
         elif names:
             remedy = f"there are {len(names)}: {', '.join(names[:6])}{', ...' if len(names) > 6 else ''}"
         else:
             remedy = "there are none"
         super().__init__(f"unknown {kind} {name!r}", where=where, remedy=remedy)
         self.name = name
-        self.nearest = tuple(nearest)
+        self.nearest = tuple(close)
 
 
 class SourceError(UrdfkinError, OSError):

@@ -1,15 +1,15 @@
 """Mimic rules as the URDF's text states them, for the oracle: read apart from urdfkin's own reader.
 
 Pinocchio couples nothing here (see `urdfkin.oracle`), so that a rule which the reader got wrong would be
-wrong on both sides, and agree. The standard library's parser reads it a second time.
+wrong on both sides, and agree. `urdfkin.plain_xml` reads it a second time.
 """
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as Xml
 from dataclasses import replace
 
 from urdfkin.errors import InputError
+from urdfkin.plain_xml import plain_xml
 from urdfkin.tree import KinematicTree, Mimic
 
 
@@ -29,22 +29,28 @@ def with_rules_of_text(tree: KinematicTree, text: str) -> KinematicTree:
         joint.get("name", ""): Mimic(
             rule.get("joint", ""), float(rule.get("multiplier", "1")), float(rule.get("offset", "0"))
         )
-        for joint in Xml.fromstring(text).iterfind("joint")
+        for joint in plain_xml(text).iterfind("joint")
         if (rule := joint.find("mimic")) is not None
     }
     missing = [joint.name for joint in tree.joints if joint.mimic and joint.name not in rules]
     if missing:
         raise InputError("the URDF has no mimic rule for a joint", where=f"joint {missing[0]}")
-    joints = (replace(j, mimic=_to_the_end(j.name, rules)) if j.mimic else j for j in tree.joints)
+    known: dict[str, Mimic] = {}
+    joints = (replace(j, mimic=_to_the_end(j.name, rules, known)) if j.mimic else j for j in tree.joints)
     return KinematicTree(tree.name, tree.links, tuple(joints))
 
 
-def _to_the_end(follower: str, rules: dict[str, Mimic]) -> Mimic:
-    """q_follower = m_1 (m_2 (... q_leader ... + o_2) + o_1, multiplied out from the leader's end."""
-    chain = [rules[follower]]
-    while (following := rules.get(chain[-1].leader)) is not None and len(chain) <= len(rules):
-        chain.append(following)
-    multiplier, offset = 1.0, 0.0
-    for rule in reversed(chain):
-        multiplier, offset = rule.multiplier * multiplier, rule.multiplier * offset + rule.offset
-    return Mimic(chain[-1].leader, multiplier, offset)
+def _to_the_end(follower: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> Mimic:
+    """q_follower = m_1 (m_2 (... q_leader ... + o_2) + o_1, multiplied out from the leader's end.
+
+    What is found is kept in `known`: in a chain of followers, each is asked for once.
+    """
+    chain = [follower]
+    while (leader := rules[chain[-1]].leader) in rules and leader not in known and len(chain) <= len(rules):
+        chain.append(leader)
+    for name in reversed(chain):
+        rule = rules[name]
+        end = known.get(rule.leader, Mimic(rule.leader, 1.0, 0.0))
+        offset = rule.multiplier * end.offset + rule.offset
+        known[name] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
+    return known[follower]

@@ -6,11 +6,14 @@ import warnings
 from collections.abc import Mapping
 
 from urdfkin.diagnostics import Finding, Oracle, Severity, UrdfError, UrdfWarning, check_text
+from urdfkin.diagnostics.codes.joints import NEARLY_COORDINATE_AXIS
 from urdfkin.origin import Origin
 from urdfkin.robot import Robot
 from urdfkin.sources import Source, read_source
+from urdfkin.tree import with_tilts
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.remembering import remembered_tree
+from urdfkin.urdf.skeleton import tilts
 from urdfkin.verification.choosing import Verify
 
 
@@ -59,8 +62,11 @@ def load(
             if finding.severity is Severity.WARNING:
                 warnings.warn(str(finding), UrdfWarning, stacklevel=2)
     read = read_tree if text.entry is None else remembered_tree
+    tree = read(text.data, mimic=mimic, root_joint=root_joint)
+    if any(finding.code == NEARLY_COORDINATE_AXIS.id for finding in findings):
+        tree = with_tilts(tree, tilts(text.data))
     return Robot(
-        read(text.data, mimic=mimic, root_joint=root_joint),
+        tree,
         text.data.decode("utf-8-sig"),
         origin=origin,
         verify=verify,

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.call import Call
 from urdfkin.demands import real_number, word, words
+from urdfkin.errors import RangeError
 from urdfkin.motion.representation import analytical_jacobian
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import BaseMotion
@@ -20,7 +21,7 @@ from urdfkin.recursion.breakdown import AccelerationBreakdown, acceleration_brea
 from urdfkin.reference import Reference
 from urdfkin.rotation.euler_rates import NEAREST
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import Quantity
+from urdfkin.verification.bounds import Quantity, nearest_singularity
 from urdfkin.verification.choosing import Verify
 
 if TYPE_CHECKING:
@@ -208,8 +209,9 @@ class Manipulator:
     ) -> FloatArray:
         """The manipulator Jacobian J = C^-1 J_v (7.122): derivatives of position and orientation by q.
 
-        J_v and the orientation are checked against Pinocchio; C^-1 is the closed form of
-        `urdfkin.motion.representation_inverse`.
+        It is checked against Pinocchio's rotation and Jacobian, with the rates of the orientation's numbers
+        by a way of their own (`urdfkin.verification.line_of_nodes`). The bound grows as 1 / s^2, s being the
+        sine or cosine of the middle angle: near the singularity that many digits are lost.
 
         Args:
             q: (..., nq) rad, m.
@@ -224,17 +226,27 @@ class Manipulator:
             (..., 6, nv), or (..., 7, nv) for a quaternion.
 
         Raises:
-            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`; the
-                error says how near. A quaternion has none.
+            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`, or, when it
+                is to be checked, than rounding can tell (some 1e-13 rad); the error says how near. A
+                quaternion has none.
             UnknownNameError: no such frame or representation.
             InputError: as `placements`.
             VerificationError: Pinocchio computes something else.
         """
         robot = _robot(self)
         representation, nearest = word(representation, "representation"), real_number(nearest, "nearest")
-        T_world_frame = robot.placement(q, frame, base=base, verify=verify)
-        J_v = robot.jacobian(q, frame, base=base, verify=verify)
-        return analytical_jacobian(representation, T_world_frame[..., :3, :3], J_v, nearest)
+        call = Call(robot, (frame,), _ALIGNED, base, q, representation=representation, nearest=nearest)
+        poses = call.compute(evaluate.placements, call.plan, call.q, base=call.state)
+        J_v = call.compute(evaluate.jacobians, call.plan, call.q, base=call.state)
+        if call.wanted(verify):
+            nearest = max(nearest, nearest_singularity(call.plan))
+        R = call.one(poses, None)[..., :3, :3]
+        with np.errstate(over="ignore", invalid="ignore"):
+            J = analytical_jacobian(representation, R, call.one(J_v, None), nearest)
+        if not np.isfinite(J).all():
+            raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
+        call.verify(Quantity.ANALYTICAL_JACOBIAN, J.reshape(call.n, 1, *J.shape[-2:]), verify)
+        return J
 
     def acceleration_breakdown(
         self,
@@ -265,7 +277,7 @@ class Manipulator:
             call.reference,
             call.state,
         )
-        call.verify(Quantity.ACCELERATION, parts.total[:, np.newaxis], verify)
+        call.verify(Quantity.ACCELERATION_BREAKDOWN, parts.total[:, np.newaxis], verify)
         return AccelerationBreakdown(parts.joints, call.every(parts.base), call.every(parts.terms))
 
 

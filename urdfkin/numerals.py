@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import re
 
-_DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+#: The grammar, which takes time linear in the length of a text.
+DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _WHOLE = re.compile(r"[+-]?[0-9]+")
 #: Longest number that is read; Python's conversion takes time quadratic in the length of absurd ones.
 _LONGEST = 2000
@@ -32,7 +33,7 @@ def decimal(text: str) -> float | None:
     (-0.0015, None, None, None, None)
     """
     text = text.strip(" \t\r\n")
-    if len(text) > _LONGEST or not _DECIMAL.fullmatch(text):
+    if len(text) > _LONGEST or not DECIMAL.fullmatch(text):
         return None
     value = float(text)
     return value if math.isfinite(value) else None

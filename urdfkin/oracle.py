@@ -169,6 +169,13 @@ class Oracle:
                 out[k, f] = pin.updateFramePlacement(model, data, frame).homogeneous
         return out
 
+    def quaternions(self, q: FloatArray, frames: Sequence[str], base: BaseMotion | None = None) -> FloatArray:
+        """(n, frames, 4) orientations as Pinocchio's quaternions, scalar last, with qw >= 0."""
+        R = self.placements(q, frames, base)[..., :3, :3]
+        quats = [self._pin.Quaternion(np.array(one)).coeffs() for one in R.reshape(-1, 3, 3)]
+        out: FloatArray = np.array(quats).reshape(*R.shape[:-2], 4)
+        return np.where(out[..., 3:] < 0.0, -out, out)
+
     def velocities(
         self,
         q: FloatArray,

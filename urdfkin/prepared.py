@@ -64,8 +64,8 @@ class PreparedFrame:
         self._shape = (6, plan.nv)
         for place, quantity in enumerate(_COUNTED, Packed.COUNTS):
             robot.ledger.account(quantity).counters.append((self._packed, place))
-        # Quaternions are brought to norm 1 first, which is the robot's business.
-        self._plain = not robot.tree.floating_joints
+        # Quaternions are brought to norm 1 first, and what may overflow is looked at: the robot's business.
+        self._plain = not robot.tree.floating_joints and not plan.is_large
         # Compiled, or read from disk, when they are first called.
         self._placement: Callable[..., int] = self._first_placement
         self._jacobian: Callable[..., int] = self._first_jacobian

@@ -12,6 +12,7 @@ from urdfkin.catalogue import Entry, catalogue
 from urdfkin.demands import shown
 from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.files import at_home, exists, read_bytes, read_standard_input
+from urdfkin.nearest import nearest
 
 #: What `load` and `check` take.
 Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
@@ -140,13 +141,9 @@ def as_word(path: Path) -> str:
 
 
 def _nearest_file(path: Path) -> str:
-    import difflib  # noqa: PLC0415  only for the message
-
     try:
         names = [entry.name for entry in path.parent.iterdir()]
     except OSError:
         return f"there is no folder {path.parent}"
-    nearest = difflib.get_close_matches(path.name, names, n=3)
-    return (
-        f"did you mean {', '.join(nearest)}?" if nearest else "'urdfkin robots' lists names that need no file"
-    )
+    close = nearest(path.name, names)
+    return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists names that need no file"

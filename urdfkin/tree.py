@@ -6,7 +6,7 @@ sibling joints by name), so that coordinates and rates can be exchanged with it 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Enum
 from functools import cached_property
@@ -116,6 +116,8 @@ class Joint:
         axis: (3,) unit axis in the joint frame; (1, 0, 0) where the kind has none.
         limit: Its bounds, None where there are none.
         mimic: Whom it follows, None if it has a coordinate of its own.
+        tilt: By how much (rad) the axis that Pinocchio turns about is off this one (URDF514); mostly 0.
+            Nothing is computed from it: results may differ from Pinocchio's by so much more.
     """
 
     name: str
@@ -125,6 +127,7 @@ class Joint:
     axis: FloatArray
     limit: Limit | None = None
     mimic: Mimic | None = None
+    tilt: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_parent_joint", frozen(self.T_parent_joint))
@@ -329,6 +332,12 @@ def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
     root = Joint("root_joint", kind, 0, np.eye(4), np.array([1.0, 0.0, 0.0]))
     moved = [replace(joint, parent=joint.parent + 1) for joint in tree.joints]
     return KinematicTree(tree.name, ("universe", *tree.links), (root, *moved))
+
+
+def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree:
+    """The tree with the tilts of some joints, by name: see `Joint.tilt`."""
+    joints = (replace(joint, tilt=tilts.get(joint.name, 0.0)) for joint in tree.joints)
+    return KinematicTree(tree.name, tree.links, tuple(joints))
 
 
 def freed(tree: KinematicTree) -> KinematicTree:

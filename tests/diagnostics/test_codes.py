@@ -16,8 +16,15 @@ EVERY_CODE = pytest.mark.parametrize("code", REGISTRY.values(), ids=lambda code:
 
 
 def limits_for(code: Code) -> Limits:
-    """One code is only seen when the limit on depth was raised."""
-    return Limits(depth=5_000) if code.slug == "too-deep-for-pinocchio" else DEFAULT_LIMITS
+    """Two codes are only seen in small examples with a limit lowered, one with a limit raised."""
+    return _LIMITS.get(code.slug, DEFAULT_LIMITS)
+
+
+_LIMITS = {
+    "too-deep-for-pinocchio": Limits(depth=5_000),
+    "too-large": Limits(bytes=100),
+    "too-many-elements": Limits(elements=10),
+}
 
 
 @EVERY_CODE

@@ -52,19 +52,34 @@ def test_50000_unknown_links_do_not_search_for_suggestions_forever() -> None:
         for i in range(5_000)
     )
     links = "".join(f'<link name="l{i}"/>' for i in range(5_000))
-    assert len(timed(f'<robot name="r">{links}{joints}</robot>'.encode())) == 5_000
+    findings = timed(f'<robot name="r">{links}{joints}</robot>'.encode())
+    assert sum(finding.count for finding in findings) == 5_000
 
 
 @pytest.mark.parametrize(
-    ("limits", "word"),
-    [(Limits(bytes=10), "bytes"), (Limits(depth=1), "levels"), (Limits(elements=1), "elements")],
+    ("limits", "code"),
+    [
+        (Limits(bytes=10), "URDF108"),
+        (Limits(elements=1), "URDF114"),
+        (Limits(depth=1), "URDF115"),
+        (Limits(attributes=0), "URDF116"),
+        (Limits(name=2), "URDF117"),
+    ],
 )
-def test_each_limit_refuses_and_says_how_to_raise_it(limits: Limits, word: str) -> None:
+def test_each_limit_refuses_and_says_how_to_raise_it(limits: Limits, code: str) -> None:
     (finding,) = check_text(b'<robot name="r"><link name="a"/></robot>', limits=limits)
-    assert finding.code == "URDF108"
+    assert finding.code == code
     assert finding.remedy is not None
     assert "--max-" in finding.remedy
-    assert word in f"{finding.message} {finding.found}"
+
+
+def test_a_number_has_a_limit_and_what_it_counts_for_no_robot_is_a_warning() -> None:
+    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/><origin xyz="0 0 {}"/></joint>'
+    mass = '<inertial><mass value="{}"/></inertial>'
+    text = '<robot name="r"><link name="a">{}</link><link name="b"/>' + joint + "</robot>"
+    for inside, origin, severity in (("", "1" * 9, "error"), (mass.format("1" * 9), "1", "warning")):
+        findings = check_text(text.format(inside, origin).encode(), limits=Limits(number=8))
+        assert ("URDF305", severity) in [(f.code, f.severity.value) for f in findings]
 
 
 def test_lines_beyond_65535_are_right() -> None:

@@ -1,7 +1,9 @@
 """Pinocchio takes an axis within 1e-12 of x, y or z for that one: the boundary, and what follows."""
 
 import itertools
+import pickle
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -9,8 +11,9 @@ import pytest
 
 import urdfkin
 from urdfkin.checking import check
+from urdfkin.diagnostics import Severity
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray
+from urdfkin.tree import FloatArray, KinematicTree, freed, with_tilts
 from urdfkin.verification.bounds import EPS
 
 KINDS = {"revolute": "R", "continuous": "RUB", "prismatic": "P"}
@@ -102,29 +105,99 @@ def test_directions_against_an_axis_are_taken_as_they_are(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(3))
-def test_without_the_finding_the_two_would_disagree_and_urdfkin_is_the_one_that_read_the_file(
-    kind: str, seed: int
-) -> None:
+def test_the_two_differ_by_the_tilt_and_urdfkin_is_the_one_that_read_the_file(kind: str, seed: int) -> None:
     tilt = 1e-12
     robot = loaded(text(kind, near(0.99 * tilt, seed)))
-    robot.unverifiable = None
-    with pytest.raises(urdfkin.VerificationError) as caught:
-        robot.placement([2.0], "l1")
-    ours, theirs = caught.value.ours, caught.value.theirs
-    assert 0.1 * tilt < np.abs(ours - theirs).max() < 3.0 * tilt
+    ours = robot.placement([2.0], "l1")
+    theirs = robot.oracle(None).placements(np.array([[2.0]]), ["l1"])[0, 0]
+    assert 0.1 * tilt < np.abs(ours - theirs).max() < 2.0 * tilt
     # Twice as long, the same direction is no longer taken for a coordinate axis: the two agree with ours.
     doubled = loaded(text(kind, 2.0 * near(0.99 * tilt, seed)))
     assert np.abs(doubled.placement([2.0], "l1") - ours).max() < 4.0 * EPS
     assert doubled.certificate().verified
 
 
+def untold(robot: Robot) -> Robot:
+    """The robot without what it was told of Pinocchio's axes."""
+    return Robot(with_tilts(robot.tree, {}), robot.urdf, origin=robot.origin)
+
+
 @pytest.mark.parametrize("kind", KINDS)
-def test_results_are_handed_out_and_said_not_to_be_verified(kind: str) -> None:
-    with pytest.warns(urdfkin.UrdfWarning, match="URDF514"):
-        robot = urdfkin.load(text(kind, near(1e-13, 1)))
-    with pytest.warns(urdfkin.NotVerifiedWarning, match="reads another robot"):
-        robot.jacobian([0.4], "l1")
-    assert not robot.certificate().verified
+@pytest.mark.parametrize("tilt", [1e-16, 1e-15, 1e-14, 1e-13, 0.99e-12])
+def test_a_robot_with_tilted_axes_is_verified_within_twice_the_tilts(kind: str, tilt: float) -> None:
+    # Every joint tilted, all of them far from zero.
+    robot = loaded(text(kind, *(near(tilt, seed) for seed in range(12))))
+    q, v = robot.sample(50, 1), robot.sample(50, 2)
+    for reference in ("local", "world", "local_world_aligned"):
+        robot.placement(q, "l12")
+        robot.velocity(q, v, "l12", reference)
+        robot.jacobian(q, "l12", reference)
+        robot.jacobian_rate(q, v, "l12", reference)
+        robot.acceleration(q, v, v, "l12", reference)
+    certificate = robot.certificate()
+    assert certificate.verified
+    assert all(line.share < 1.0 for line in certificate.lines)
+    if tilt > 1e-15:
+        assert max(line.share for line in certificate.lines) > 0.01  # the allowance is of the right size
+    if tilt > 1e-13:
+        with pytest.raises(urdfkin.VerificationError):
+            untold(robot).placement(q, "l12")
+
+
+@pytest.mark.parametrize("tilt", [1e-15, 1e-13])
+def test_a_slip_larger_than_the_tilts_allow_is_caught_behind_them_and_any_slip_before_them(
+    tilt: float,
+) -> None:
+    document = text("revolute", AXES[2], AXES[0], near(tilt, 2), AXES[1])
+    robot = loaded(document)
+    assert [joint.tilt > 0.0 for joint in robot.tree.joints] == [False, False, True, False]
+    q = robot.sample(20, 1)
+
+    def slipped(by: float) -> Robot:
+        joints = [
+            replace(joint, axis=joint.axis + (by * AXES[1] if i == 0 else 0.0))
+            for i, joint in enumerate(robot.tree.joints)
+        ]
+        tree = KinematicTree(robot.name, robot.tree.links, tuple(joints))
+        return Robot(tree, robot.urdf, origin=robot.origin)
+
+    allowed = 2.0 * tilt + 24.0 * 5 * EPS
+    with pytest.raises(urdfkin.VerificationError):
+        slipped(6.0 * allowed).placement(q, "l4")
+    with pytest.raises(urdfkin.VerificationError):
+        slipped(100.0 * 24.0 * EPS).placement(q, "l2")  # Pinocchio's axes on this path are the file's
+    slipped(0.0).placements(q)
+
+
+def test_the_tilt_is_read_from_the_text_and_not_from_the_tree_under_test() -> None:
+    robot = loaded(text("revolute", AXES[2], near(1e-13, 1)))
+    assert [round(joint.tilt, 16) for joint in robot.tree.joints] == [0.0, 1e-13]
+    assert freed(robot.tree).joints[1].tilt > 0.0
+    assert pickle.loads(pickle.dumps(robot)).tree.joints[1].tilt == robot.tree.joints[1].tilt
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_it_is_a_note_and_results_are_verified(kind: str) -> None:
+    document = text(kind, near(1e-13, 1))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", urdfkin.UrdfWarning)
+        robot = urdfkin.load(document)
+    (finding,) = (finding for finding in robot.findings if finding.code == "URDF514")
+    assert finding.severity is Severity.NOTE
+    assert finding.oracle is None
+    robot.jacobian([0.4], "l1")
+    assert robot.certificate().verified
+
+
+def test_tables_and_validation_take_tilted_axes_into_account() -> None:
+    document = text("revolute", *(near(0.99e-12, seed) for seed in (2, 0, 1, 2)))
+    robot = loaded(document)
+    robot.dh()
+    robot.dh(convention="modified")
+    robot.tree_parameters()
+    report = urdfkin.validate(robot, samples=20)
+    assert report.passed, report.robots[0].reason
+    assert report.robots[0].failed == 0
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -57,14 +57,15 @@ def test_an_axis_that_is_not_written_is_x() -> None:
     assert robot.tree.joints[0].axis.tolist() == [1.0, 0.0, 0.0]
 
 
-def test_an_axis_element_without_xyz_is_x_and_says_that_pinocchio_reads_another_robot() -> None:
-    """Urdfdom takes a zero vector, so that Pinocchio's rotation is none."""
-    with pytest.warns(urdfkin.UrdfWarning, match="URDF504"):
-        robot = urdfkin.load(arm(axis="<axis/>"))
-    assert robot.tree.joints[0].axis.tolist() == [1.0, 0.0, 0.0]
-    with pytest.warns(NotVerifiedWarning, match="URDF504"):
-        robot.placement(robot.neutral(), TIP)
-    assert not robot.certificate().verified
+@pytest.mark.parametrize("element", ["<axis/>", '<axis note="z"/>', "<axis><!-- 0 0 1 --></axis>"])
+def test_an_axis_element_without_xyz_is_refused_because_two_readers_see_two_robots(element: str) -> None:
+    """Urdfdom takes a zero vector, so that Pinocchio's rotation is none; the specification says 1 0 0."""
+    with pytest.raises(urdfkin.UrdfError, match="URDF504"):
+        urdfkin.load(arm(axis=element))
+
+
+def test_a_planar_joint_whose_axis_element_is_empty_moves_in_the_xy_plane_for_both() -> None:
+    everything(load(arm(axis="<axis/>", attributes='type="planar"')))
 
 
 def test_joints_stand_depth_first_and_siblings_by_name_not_as_in_the_file() -> None:

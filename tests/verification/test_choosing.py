@@ -9,7 +9,7 @@ import pytest
 
 import urdfkin
 from tests.laws.subjects import state
-from urdfkin import call, checks
+from urdfkin import checks
 from urdfkin.checks import Part
 from urdfkin.errors import InputError
 from urdfkin.oracle import Oracle
@@ -81,7 +81,7 @@ def lies(monkeypatch: pytest.MonkeyPatch) -> None:
         rows *= 1.0 + size.reshape(-1, *[1] * (theirs.ndim - 1))
         return theirs
 
-    monkeypatch.setattr(call, "pinocchios", wrong)
+    monkeypatch.setattr(checks, "pinocchios", wrong)
 
 
 BATCHES = [

@@ -46,6 +46,9 @@ _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "b
 @click.option("--max-bytes", type=Whole(1), default=DEFAULT_LIMITS.bytes, show_default=True)
 @click.option("--max-depth", type=Whole(1), default=DEFAULT_LIMITS.depth, show_default=True)
 @click.option("--max-elements", type=Whole(1), default=DEFAULT_LIMITS.elements, show_default=True)
+@click.option("--max-attributes", type=Whole(1), default=DEFAULT_LIMITS.attributes, show_default=True)
+@click.option("--max-name", type=Whole(1), default=DEFAULT_LIMITS.name, show_default=True)
+@click.option("--max-number", type=Whole(1), default=DEFAULT_LIMITS.number, show_default=True)
 def command(
     files: Sequence[str],
     style: str,
@@ -58,6 +61,9 @@ def command(
     max_bytes: int,
     max_depth: int,
     max_elements: int,
+    max_attributes: int,
+    max_name: int,
+    max_number: int,
 ) -> None:
     """Check URDFs and print what is wrong with them: code, place, what was found, what to do.
 
@@ -71,7 +77,7 @@ def command(
       urdfkin explain URDF502
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
     ignored = _codes(ignore)
-    limits = Limits(max_bytes, max_depth, max_elements)
+    limits = Limits(max_bytes, max_depth, max_elements, max_attributes, max_name, max_number)
     fold = style == "terminal" and not each
     findings: list[Finding] = []
     unreadable: list[UrdfkinError] = []

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from urdfkin.diagnostics.codes import text as codes
 from urdfkin.diagnostics.dialect import check_dialect
-from urdfkin.diagnostics.document import DEFAULT_LIMITS, Element, Limits, parse
+from urdfkin.diagnostics.document import Element, parse
 from urdfkin.diagnostics.encoding import utf8_bytes
 from urdfkin.diagnostics.extras import check_extras
 from urdfkin.diagnostics.finding import Finding
 from urdfkin.diagnostics.joints import check_joints
+from urdfkin.diagnostics.limits import DEFAULT_LIMITS, Limits
 from urdfkin.diagnostics.mimic import check_mimic
 from urdfkin.diagnostics.names import check_names
+from urdfkin.diagnostics.prefixes import check_prefixes
 from urdfkin.diagnostics.records import RobotRecord, read_robot
 from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.diagnostics.structure import check_structure
@@ -46,20 +48,21 @@ def check_text(
     >>> [finding.code for finding in check_text(b"<robot name='r'><link name='base'/></robot>")]
     []
     """
-    report = Reporter(file, data)
-    root = read_document(report, data, limits)
+    report = Reporter(file, data, limits)
+    root = read_document(report, data)
     if root is not None:
         check_robot(report, root, mimic=mimic, root_joint=root_joint)
     return report.findings(fold=fold)
 
 
-def read_document(report: Reporter, data: bytes, limits: Limits) -> Element | None:
+def read_document(report: Reporter, data: bytes) -> Element | None:
     """The root element of a file, or None after the finding that says why there is none."""
-    if len(data) > limits.bytes:
+    most = report.limits.bytes
+    if len(data) > most:
         report.add(
             codes.TOO_LARGE,
             "the file is too large",
-            found=f"{len(data)} bytes, more than {limits.bytes}",
+            found=f"{len(data)} bytes, more than {most}",
             remedy="raise the limit with --max-bytes if the file is right",
         )
         return None
@@ -67,7 +70,7 @@ def read_document(report: Reporter, data: bytes, limits: Limits) -> Element | No
     if text is None:
         return None
     report.data = text
-    return parse(report, text, limits)
+    return parse(report, text)
 
 
 def check_robot(
@@ -77,6 +80,7 @@ def check_robot(
     version = check_dialect(report, root)
     if version is None:
         return None
+    check_prefixes(report, root)
     check_vocabulary(report, root)
     robot = read_robot(report, root, version)
     check_names(report, robot, root_joint)

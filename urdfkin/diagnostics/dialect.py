@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TypeVar
 
 from urdfkin.diagnostics.codes import dialect as codes
 from urdfkin.diagnostics.codes import structure, text
 from urdfkin.diagnostics.document import Element
-from urdfkin.diagnostics.escape import quoted
+from urdfkin.diagnostics.escape import quoted, shortened
+from urdfkin.diagnostics.finding import Severity
 from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.diagnostics.vocabulary import OPAQUE
+
+_T = TypeVar("_T")
 
 #: What another root element is the sign of.
 _FORMATS = {
@@ -30,7 +35,7 @@ _SRDF = {"group", "group_state", "end_effector", "virtual_joint", "disable_colli
 
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 _XACRO_NAMESPACE = re.compile(r"https?://(www\.)?(ros|wiki\.ros)\.org/(wiki/)?xacro")
-_EXPRESSION = re.compile(r"\$\{[^}]*\}|\$\((find|arg|env|optenv|eval|anon|dirname)\b")
+_COMMAND = re.compile(r"\$\((find|arg|env|optenv|eval|anon|dirname)\b")
 _XINCLUDE = "http://www.w3.org/2001/XInclude"
 
 #: Newest version urdfdom 6 knows.
@@ -98,39 +103,87 @@ def _check_namespaces(report: Reporter, root: Element, prefixes: dict[str, str])
                 found=quoted(element.attributes.get("href", f"<{element.tag}>")),
                 remedy="write its content here; nothing was opened",
             )
-    _check_expressions(report, root, macros)
+    if not _check_macros(report, root, macros):
+        _check_expressions(report, root)
 
 
-def _check_expressions(report: Reporter, root: Element, macros: list[Element]) -> None:
-    remedy = "expand it first: xacro FILE > robot.urdf, or install urdfkin[xacro] and pass the .xacro file"
-    if macros:
-        more = f" and {len(macros) - 1} more" if len(macros) > 1 else ""
-        found = f"<{macros[0].tag}>{more}"
-        report.add(codes.XACRO, "xacro that was not expanded", macros[0], found=found, remedy=remedy)
-        return
-    for element in kinematic_elements(root):
-        for key, value in element.attributes.items():
-            if _EXPRESSION.search(value) and not key.startswith("xmlns"):
-                found = f"{key}={quoted(value)}"
-                report.add(
-                    codes.XACRO,
-                    "a xacro expression that was not expanded",
-                    element,
-                    attribute=key,
-                    found=found,
-                    remedy=remedy,
-                )
-                return
+_EXPAND = "expand it first: xacro FILE > robot.urdf, or install urdfkin[xacro] and pass the .xacro file"
+_HARMLESS = "; kinematics does not use it"
 
 
-def kinematic_elements(root: Element) -> list[Element]:
-    """Elements that say something about motion or bodies: not those inside extensions."""
-    found, stack = [], [root]
+def _check_macros(report: Reporter, root: Element, macros: list[Element]) -> bool:
+    """Report macros; whether one is missing where it may have held a part of the motion."""
+    missed, harmless = _parted(macros, lambda m: m.parent in (None, root) or m.holder.tag == "joint")
+    for group, severity in ((missed, None), (harmless, Severity.WARNING)):
+        if group:
+            report.add(
+                codes.XACRO,
+                f"xacro that was not expanded{_HARMLESS if severity else ''}",
+                group[0],
+                found=f"<{shortened(group[0].tag)}>{_more(group)}",
+                remedy=_EXPAND,
+                severity=severity,
+            )
+    return bool(missed)
+
+
+def _check_expressions(report: Reporter, root: Element) -> None:
+    """Expressions in the place of names and numbers: an error where motion depends on them."""
+    written = [
+        (element, key)
+        for element in _outside_extensions(root)
+        for key, value in element.attributes.items()
+        if "$" in value and is_expression(value) and not key.startswith("xmlns")
+    ]
+    used, harmless = _parted(written, lambda place: _moves(place[0]))
+    for group, severity in ((used, None), (harmless, Severity.WARNING)):
+        if group:
+            element, key = group[0]
+            report.add(
+                codes.XACRO,
+                f"a xacro expression that was not expanded{_HARMLESS if severity else ''}",
+                element,
+                attribute=key,
+                found=f"{shortened(key)}={quoted(element.attributes[key])}{_more(group)}",
+                remedy=_EXPAND,
+                severity=severity,
+            )
+
+
+def _moves(element: Element) -> bool:
+    """Whether motion depends on an element's attributes: those of a link's own tag, and all of a joint's."""
+    holder = element.holder
+    return holder.tag == "joint" or (holder is element and element.tag == "link")
+
+
+def _parted(these: Iterable[_T], chosen: Callable[[_T], bool]) -> tuple[list[_T], list[_T]]:
+    """Those that are chosen and the others, each in their order."""
+    parts: tuple[list[_T], list[_T]] = ([], [])
+    for one in these:
+        parts[not chosen(one)].append(one)
+    return parts
+
+
+def _more(group: Sequence[object]) -> str:
+    return f" and {len(group) - 1} more" if len(group) > 1 else ""
+
+
+def is_expression(value: str) -> bool:
+    """Whether a value holds something that xacro would have replaced.
+
+    >>> is_expression("${h} 0 0"), is_expression("$(arg side)/hand.stl"), is_expression("5 $")
+    (True, True, False)
+    """
+    start = value.find("${")
+    return (start >= 0 and "}" in value[start:]) or _COMMAND.search(value) is not None
+
+
+def _outside_extensions(root: Element) -> Iterator[Element]:
+    stack = [root]
     while stack:
         element = stack.pop()
-        found.append(element)
+        yield element
         stack += [child for child in reversed(element.children) if child.tag not in OPAQUE]
-    return found
 
 
 def _check_name(report: Reporter, root: Element) -> None:

@@ -8,43 +8,28 @@ with content stops it before the first entity could be expanded.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from xml.parsers import expat
 
 from urdfkin.diagnostics.codes import text as codes
-from urdfkin.diagnostics.escape import quoted
+from urdfkin.diagnostics.codes.base import Code
+from urdfkin.diagnostics.escape import QUOTED, quoted, shortened
+from urdfkin.diagnostics.limits import ORACLE_DEPTH
 from urdfkin.diagnostics.reporter import Reporter
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """How large a file may be before it is refused unread.
-
-    Attributes:
-        bytes: Size of the file.
-        depth: How deep elements may be nested; urdfdom's parser refuses more than 500.
-        elements: How many elements there may be.
-    """
-
-    bytes: int = 100_000_000
-    depth: int = 500
-    elements: int = 2_000_000
-
-
-DEFAULT_LIMITS = Limits()
 
 #: libxml2 refused deeper nesting for many years, and with it everything built on it.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
-#: urdfdom's XML parser, and with it Pinocchio, refuses deeper nesting.
-ORACLE_DEPTH = 500
-
 
 @dataclass(slots=True, eq=False)
 class Element:
-    """One element: tag and attributes as written, children in order, text without blanks, and its place."""
+    """One element: tag and attributes as written, children in order, the beginning of its text, its place.
+
+    Attributes:
+        above: The link, joint or other child of `<robot>` around it; None for those themselves.
+    """
 
     tag: str
     attributes: dict[str, str]
@@ -52,8 +37,16 @@ class Element:
     line: int
     column: int
     offset: int
-    children: list[Element] = field(default_factory=list)
+    above: Element | None = None
+    children: Sequence[Element] = ()
     text: str = ""
+
+    def append(self, child: Element) -> None:
+        """Add a child; most elements have none, and a list for each would double their size."""
+        if isinstance(self.children, list):
+            self.children.append(child)
+        else:
+            self.children = [child]
 
     def all(self, tag: str) -> list[Element]:
         """Children of one tag."""
@@ -74,10 +67,7 @@ class Element:
     @property
     def holder(self) -> Element:
         """The link, joint or other child of `<robot>` this element belongs to; itself at the top."""
-        element = self
-        while element.parent is not None and element.parent.parent is not None:
-            element = element.parent
-        return element
+        return self.above or self
 
     @property
     def owner(self) -> str:
@@ -90,19 +80,25 @@ class Element:
         return self.holder.attributes.get("name") if self.parent is not None else None
 
 
+#: Characters of an element's text that are kept: more than a message shows.
+_KEPT = 2 * QUOTED
+
+#: Attributes that name links and joints.
+_NAMES = frozenset({"name", "link", "joint"})
+
+
 class _Stop(Exception):  # noqa: N818 - not an error: the parser has been told enough
     """Ends the parse after a finding that makes the rest meaningless."""
 
 
-def parse(report: Reporter, data: bytes, limits: Limits = DEFAULT_LIMITS) -> Element | None:
+def parse(report: Reporter, data: bytes) -> Element | None:
     """The root element, or None after a finding that says why there is none.
 
     Args:
-        report: Where findings go.
+        report: Where findings go, and the limits.
         data: UTF-8 bytes, already checked by `urdfkin.diagnostics.encoding`, without a byte order mark.
-        limits: Depth and count of elements.
     """
-    builder = _Builder(report, limits)
+    builder = _Builder(report)
     parser = builder.parser
     try:
         parser.Parse(data, True)
@@ -126,10 +122,11 @@ def parse(report: Reporter, data: bytes, limits: Limits = DEFAULT_LIMITS) -> Ele
 class _Builder:
     """Handlers that grow the tree and watch the limits."""
 
-    def __init__(self, report: Reporter, limits: Limits) -> None:
-        self.report, self.limits = report, limits
+    def __init__(self, report: Reporter) -> None:
+        self.report, self.limits = report, report.limits
         self.root: Element | None = None
         self.open: list[Element] = []
+        self.begun = False
         self.count = self.deepest = 0
         self.deepest_element: Element | None = None
         self.parser = parser = expat.ParserCreate("utf-8")
@@ -138,6 +135,8 @@ class _Builder:
         parser.EndElementHandler = self.end
         parser.CharacterDataHandler = self.characters
         parser.StartDoctypeDeclHandler = self.doctype
+        parser.CommentHandler = self.comment
+        parser.ProcessingInstructionHandler = self.instruction
         parser.SkippedEntityHandler = self.skipped
 
     def here(self) -> tuple[int, int]:
@@ -149,38 +148,74 @@ class _Builder:
         parent = self.open[-1] if self.open else None
         element = Element(tag, attributes, parent, line, column, self.parser.CurrentByteIndex)
         if parent is None:
-            self.root = element
+            self.root, self.begun = element, True
+            self.parser.CommentHandler = None
         else:
-            parent.children.append(element)
+            element.above = None if parent is self.root else parent.holder
+            parent.append(element)
         self.open.append(element)
         self.count += 1
         if len(self.open) > self.deepest:
             self.deepest, self.deepest_element = len(self.open), element
-        if self.deepest > self.limits.depth:
-            self.refuse("nested too deep", f"more than {self.limits.depth} levels", "max-depth")
-        if self.count > self.limits.elements:
-            self.refuse("too many elements", f"more than {self.limits.elements}", "max-elements")
+        self.keep_limits(tag, attributes)
 
-    def refuse(self, what: str, found: str, option: str) -> None:
-        self.report.add(
-            codes.TOO_LARGE,
-            f"the file is {what}" if what.startswith("nested") else f"the file has {what}",
-            found=found,
-            remedy=f"raise the limit with --{option} if the file is right",
-            position=self.here(),
-        )
+    def keep_limits(self, tag: str, attributes: dict[str, str]) -> None:
+        most = self.limits
+        if self.deepest > most.depth:
+            self.refuse(
+                codes.TOO_DEEP, "depth", "elements are nested too deep", f"more than {most.depth} levels"
+            )
+        if self.count > most.elements:
+            self.refuse(
+                codes.TOO_MANY_ELEMENTS, "elements", "too many elements", f"more than {most.elements}"
+            )
+        if len(attributes) > most.attributes:
+            found = f"{len(attributes)} in <{shortened(tag)}>, more than {most.attributes}"
+            self.refuse(codes.TOO_MANY_ATTRIBUTES, "attributes", "an element has too many attributes", found)
+        if len(tag) > most.name:
+            self.refuse_name("an element", tag)
+        for key, value in attributes.items():
+            if len(key) > most.name:
+                self.refuse_name("an attribute", key)
+            if len(value) > most.name and key in _NAMES:
+                self.refuse_name("a link or joint", value)
+
+    def refuse_name(self, owner: str, name: str) -> None:
+        found = f"{quoted(name, 30)} of {len(name)} characters, more than {self.limits.name}"
+        self.refuse(codes.NAME_TOO_LONG, "name", f"the name of {owner} is too long", found)
+
+    def refuse(self, code: Code, limit: str, message: str, found: str) -> None:
+        remedy = f"raise the limit with --max-{limit} if the file is right"
+        self.report.add(code, message, found=found, remedy=remedy, position=self.here())
         raise _Stop
 
     def end(self, tag: str) -> None:
         element = self.open.pop()
-        element.text = element.text.strip()
+        if element.text:
+            element.text = element.text.strip()
 
     def characters(self, text: str) -> None:
-        if not text.isspace():
-            self.open[-1].text += text
+        element = self.open[-1]
+        if len(element.text) < _KEPT and not text.isspace():
+            element.text += (text if element.text else text.lstrip())[:_KEPT]
+
+    def comment(self, text: str) -> None:
+        self.begun = True
+
+    def instruction(self, target: str, text: str) -> None:
+        """Judge a processing instruction: urdfdom's parser allows them at the very beginning alone."""
+        if self.begun:
+            self.report.add(
+                codes.INSTRUCTION,
+                "a processing instruction stands after the beginning, where urdfdom refuses the file",
+                found=quoted(f"<?{target} {text}".strip() + "?>"),
+                remedy="remove it, or put it before everything but other instructions",
+                position=self.here(),
+            )
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
         """Judge a document type declaration before anything in it can act."""
+        self.begun = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
         if system is None and public is None and not has_subset:
@@ -234,20 +269,21 @@ class _Builder:
         self.report.add(
             codes.SYNTAX,
             f"not well-formed XML: {message}",
-            found=None if ended else self._around(error),
+            found=None if ended else self._around(),
             remedy=remedy,
             position=(error.lineno, error.offset + 1),
         )
 
     def _entity_name(self) -> str | None:
         """The first entity after the place of an error that XML itself does not define."""
-        names = _ENTITY.findall(self.report.data, self.parser.ErrorByteIndex)
-        return next((name.decode() for name in names if name not in _PREDEFINED), None)
+        found = _ENTITY.finditer(self.report.data, self.parser.ErrorByteIndex)
+        return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
 
-    def _around(self, error: expat.ExpatError) -> str | None:
-        """The text at the place of an error."""
-        line = self.report.data.splitlines()[error.lineno - 1 : error.lineno]
-        text = line[0].decode("utf-8", "replace")[error.offset :][:30] if line else ""
+    def _around(self) -> str | None:
+        """The text at the place of an error, up to the end of its line."""
+        start = self.parser.ErrorByteIndex
+        line = (self.report.data[start : start + 120].splitlines() or [b""])[0]
+        text = line.decode("utf-8", "replace")[:30]
         return quoted(text) if text.strip() else None
 
 

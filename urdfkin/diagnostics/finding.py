@@ -56,7 +56,7 @@ class Finding:
         name: The name of the link, joint or material the finding is about, or None.
         oracle: Set when Pinocchio refuses the file for this, or reads it differently: then nothing that is
             computed from the file can be verified against it.
-        also: Lines of further findings that say the same and were folded into this one.
+        also: The line of each further finding that says the same and was folded into this one.
     """
 
     code: str
@@ -81,11 +81,26 @@ class Finding:
         return tag if self.name is None else f"{tag} '{shortened(self.name)}'"
 
     @property
+    def count(self) -> int:
+        """How many findings it speaks for."""
+        return 1 + len(self.also)
+
+    @property
+    def _again(self) -> str:
+        """How many more there are, and on which lines."""
+        others = tuple(sorted(set(self.also) - {self.line}))
+        if len(others) == len(self.also):
+            return f"also on {_lines(others)}"
+        here = ("this line",) if self.line in self.also else ()
+        where = (*here, _lines(others)) if others else here
+        return f"{len(self.also)} more on {' and '.join(where)}"
+
+    @property
     def sentence(self) -> str:
         """Everything but the place and the code, in one line."""
         subject = f"{self.subject}: " if self.element and self.name is not None else ""
         found = f": found {self.found}" if self.found else ""
-        again = f" (also on {_lines(self.also)})" if self.also else ""
+        again = f" ({self._again})" if self.also else ""
         remedy = f"; {self.remedy}" if self.remedy else ""
         return f"{subject}{self.message}{found}{again}{remedy}"
 
@@ -122,7 +137,8 @@ class UrdfError(UrdfkinError, ValueError):
         self.findings = tuple(findings)
         errors = [finding for finding in self.findings if finding.severity is Severity.ERROR]
         file = self.findings[0].file if self.findings else "<text>"
-        count = "an error" if len(errors) == 1 else f"{len(errors)} errors"
+        total = sum(error.count for error in errors)
+        count = "an error" if total == 1 else f"{total} errors"
         super().__init__(
             f"the URDF has {count}",
             where=file,
@@ -132,8 +148,9 @@ class UrdfError(UrdfkinError, ValueError):
     def __str__(self) -> str:
         errors = [finding for finding in self.findings if finding.severity is Severity.ERROR]
         lines = [super().__str__(), *(f"  {finding}" for finding in errors[: self.SHOWN])]
-        if len(errors) > self.SHOWN:
-            lines.append(f"  ... and {len(errors) - self.SHOWN} more: see .findings or 'urdfkin check'")
+        rest = sum(error.count for error in errors[self.SHOWN :])
+        if rest:
+            lines.append(f"  ... and {rest} more: see .findings or 'urdfkin check'")
         return "\n".join(lines)
 
 

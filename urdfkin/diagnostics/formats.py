@@ -19,9 +19,7 @@ def summary(findings: Sequence[Finding], files: int) -> str:
     'no findings in 1 file'
     """
     where = f"{files} file" + ("" if files == 1 else "s")
-    counts = {
-        severity: sum(1 + len(f.also) for f in findings if f.severity is severity) for severity in Severity
-    }
+    counts = {severity: sum(f.count for f in findings if f.severity is severity) for severity in Severity}
     parts = [f"{count} {s.value}{'' if count == 1 else 's'}" for s, count in counts.items() if count]
     return f"{', '.join(parts)} in {where}" if parts else f"no findings in {where}"
 

@@ -9,7 +9,7 @@ from urdfkin.diagnostics.codes import joints as codes
 from urdfkin.diagnostics.document import Element
 from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.finding import Severity
-from urdfkin.diagnostics.records import AXIAL, JointRecord, LimitRecord, RobotRecord
+from urdfkin.diagnostics.records import AXIAL, FURTHER_LIMITS, JointRecord, LimitRecord, RobotRecord
 from urdfkin.diagnostics.reporter import Reporter
 
 #: Lengths whose square neither under- nor overflows.
@@ -34,7 +34,7 @@ def check_joints(report: Reporter, robot: RobotRecord) -> None:
         elif joint.kind == "planar":
             _check_planar(report, joint)
         if joint.limit is not None:
-            _check_limit(report, joint, joint.limit)
+            _check_limit(report, joint, joint.limit, robot.version)
 
 
 def _written(joint: JointRecord) -> str:
@@ -72,20 +72,36 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
+    if snapped := _snapped(axis):
+        unit, tilt = snapped
+        written = " ".join(f"{x:g}" for x in unit)
+        report.add(
+            codes.NEARLY_COORDINATE_AXIS,
+            f"the axis is {tilt:.2g} rad off {written}, and Pinocchio takes {written}",
+            element,
+            attribute="xyz",
+            found=_written(joint),
+            remedy=f'write xyz="{written}"; if the tilt is meant, write the vector twice as long',
+            weight=tilt,
+        )
+
+
+def tilts(robot: RobotRecord) -> dict[str, float]:
+    """By how much (rad) Pinocchio's axis is off the file's, for the joints where that is a finding."""
+    snapped = ((joint.name, _snapped(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
+    return {name: taken[1] for name, taken in snapped if taken is not None}
+
+
+def _snapped(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
+    """The coordinate axis that Pinocchio takes for another one, and how far off it is; mostly None."""
+    if axis is None:
+        return None
     for i in range(3):
         unit = tuple(float(i == k) for k in range(3))
         tilt = math.hypot(*(x for k, x in enumerate(axis) if k != i))
         if tilt > _TILT and _is_approx(axis, unit):
-            written = " ".join(f"{x:g}" for x in unit)
-            report.add(
-                codes.NEARLY_COORDINATE_AXIS,
-                f"the axis is {tilt:.2g} rad off {written}, and Pinocchio takes {written}",
-                element,
-                attribute="xyz",
-                found=_written(joint),
-                remedy=f'write xyz="{written}"; if the tilt is meant, write the vector twice as long',
-                weight=tilt,
-            )
+            return unit, tilt
+    return None
 
 
 def _is_approx(axis: Sequence[float], unit: Sequence[float]) -> bool:
@@ -109,12 +125,15 @@ def _check_planar(report: Reporter, joint: JointRecord) -> None:
     )
 
 
-def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord) -> None:
-    for attribute, value in (("effort", limit.effort), ("velocity", limit.velocity)):
+def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
+    strict = version >= (1, 2)  # from then on urdfdom asks the same of every joint, whatever its type
+    for attribute in ("effort", "velocity", *FURTHER_LIMITS):
+        value = getattr(limit, attribute)
         if value is not None and value < 0.0:
+            refused = strict or joint.kind in AXIAL
             report.add(
-                codes.NEGATIVE_LIMIT,
-                f"the limit of {attribute} is negative; Pinocchio refuses it",
+                codes.NEGATIVE_LIMIT if refused else codes.IGNORED,
+                f"the limit of {attribute} is negative; Pinocchio {'refuses' if refused else 'ignores'} it",
                 limit.element,
                 attribute=attribute,
                 found=quoted(limit.element.attributes[attribute]),
@@ -122,9 +141,10 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord) -> No
             )
     if joint.kind == "continuous":
         _check_continuous(report, limit)
-    if joint.kind not in ("revolute", "prismatic"):
-        return
+    bounded = joint.kind in ("revolute", "prismatic")
     written = {"lower", "upper"} & limit.element.attributes.keys()
+    if not bounded and not (strict and len(written) == 2):
+        return
     if any(getattr(limit, name) is None for name in written):
         return
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
@@ -138,7 +158,7 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord) -> No
             found=found if len(written) == 2 else f"{found} (what is not written is 0)",
             remedy="swap the two" if len(written) == 2 else "write both limits",
         )
-    elif lower == upper:
+    elif lower == upper and bounded:
         report.add(
             codes.EMPTY_RANGE,
             "the joint cannot move: its limits are equal",

@@ -16,8 +16,9 @@ from urdfkin.diagnostics.codes.base import Code
 from urdfkin.diagnostics.document import Element
 from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.reporter import Reporter
+from urdfkin.numerals import DECIMAL
 
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+#: No text can be split in two ways by this: one that is no number takes linear time too.
 _BLANKS = re.compile(r"[ \t\r\n]+")
 
 
@@ -40,11 +41,13 @@ class NumberReader:
         written = element.attributes.get(attribute)
         if written is None:
             return default
+        if self._is_too_long(element, attribute, written, self.report.limits.number):
+            return None
         value = self._number(element, attribute, _BLANKS.sub(" ", written).strip(" "))
         if value is not None and written != written.rstrip():
             self._refused(element, attribute, "a blank after the number")
         elif value is not None and self.report.has_raw_blanks:
-            self._check_raw(element, attribute, single=True)
+            self._check_raw(element, attribute, 1)
         return value
 
     def vector(self, element: Element, attribute: str, count: int = 3) -> tuple[float, ...] | None:
@@ -52,7 +55,12 @@ class NumberReader:
         written = element.attributes.get(attribute)
         if written is None:
             return None
+        longest = self.report.limits.number
+        if self._is_too_long(element, attribute, written, count * longest):
+            return None
         pieces = [piece for piece in _BLANKS.split(written) if piece]
+        if any(self._is_too_long(element, attribute, piece, longest) for piece in pieces):
+            return None
         values: list[float] = []
         for piece in pieces:
             value = self._number(element, attribute, piece)
@@ -70,11 +78,11 @@ class NumberReader:
             )
             return None
         if self.report.has_raw_blanks:
-            self._check_raw(element, attribute, single=False)
+            self._check_raw(element, attribute, count)
         return tuple(values)
 
     def _number(self, element: Element, attribute: str, piece: str) -> float | None:
-        value = float(piece) if _NUMBER.fullmatch(piece) and len(piece) <= _LONGEST else None
+        value = float(piece) if DECIMAL.fullmatch(piece) else None
         if value is not None and math.isfinite(value):
             if value == 0.0 and any(digit in _NOT_ZERO for digit in re.split("[eE]", piece)[0]):
                 self.report.add(
@@ -101,21 +109,37 @@ class NumberReader:
         )
         return None
 
-    def _check_raw(self, element: Element, attribute: str, *, single: bool) -> None:
+    def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
+        """Whether a text is longer than numbers are; what converts them takes time quadratic in theirs."""
+        if len(written) <= most:
+            return False
+        self.report.add(
+            codes.NUMBER_TOO_LONG,
+            f"{attribute} has more characters than numbers need",
+            element,
+            attribute=attribute,
+            found=f"{quoted(written, 30)} of {len(written)} characters, more than {most}",
+            remedy="write 17 digits, which tell every double; or raise the limit with --max-number",
+            severity=self.bad_number.severity,
+        )
+        return True
+
+    def _check_raw(self, element: Element, attribute: str, count: int) -> None:
         """Whether urdfdom, which sees tabs and line ends that XML turns into spaces, reads the value."""
         raw = self.report.raw(element, attribute)
-        if raw is None:
+        if raw is None or self._is_too_long(element, attribute, raw, count * self.report.limits.number):
             return
-        pieces = (
-            [html.unescape(raw)] if single else [piece for piece in html.unescape(raw).split(" ") if piece]
-        )
-        if not all(_NUMBER.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
+        seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw))
+        pieces = [seen] if count == 1 else [piece for piece in seen.split(" ") if piece]
+        if not all(DECIMAL.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
             self._refused(element, attribute, "a tab or line end between or after the numbers")
 
     def _refused(self, element: Element, attribute: str, what: str) -> None:
+        needed = self.bad_number is codes.BAD_NUMBER
         self.report.add(
-            codes.WHITESPACE,
-            f"{attribute} has {what}, which urdfdom refuses",
+            # Where no robot depends on the number, urdfdom drops what it cannot read and reads the file.
+            codes.WHITESPACE if needed else self.bad_number,
+            f"{attribute} has {what}, which urdfdom {'refuses' if needed else 'does not read'}",
             element,
             attribute=attribute,
             found=quoted(self.report.raw(element, attribute) or element.attributes[attribute]),
@@ -128,9 +152,8 @@ _NOT_ZERO = "123456789"
 #: Elements whose attributes need no further words.
 _PLAIN = ("origin", "axis", "limit")
 
-#: Longest number that is read; Python's conversion takes time quadratic in the length of absurd ones.
-_LONGEST = 2000
-
+#: Zeros that begin the number of a reference; Python's conversion refuses thousands of them.
+_LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
 #: What a piece of text looks like -> what to do about it; the first that matches.
 _REMEDIES = (

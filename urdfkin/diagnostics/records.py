@@ -13,11 +13,15 @@ from urdfkin.diagnostics.codes import joints as joint_codes
 from urdfkin.diagnostics.codes import structure as structure_codes
 from urdfkin.diagnostics.document import Element
 from urdfkin.diagnostics.escape import quoted
+from urdfkin.diagnostics.finding import Severity
 from urdfkin.diagnostics.numbers import NumberReader
 from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.diagnostics.vocabulary import JOINT_TYPES, nearest
 
 Vector = tuple[float, ...]
+
+#: Limits that count from version 1.2 on.
+FURTHER_LIMITS = ("acceleration", "deceleration", "jerk")
 
 #: Types whose motion has an axis.
 AXIAL = ("revolute", "continuous", "prismatic")
@@ -32,6 +36,9 @@ class LimitRecord:
     upper: float | None
     effort: float | None
     velocity: float | None
+    acceleration: float | None = None
+    deceleration: float | None = None
+    jerk: float | None = None
 
 
 @dataclass(slots=True)
@@ -240,15 +247,19 @@ class JointReader:
             numbers = NumberReader(self.report, joint_codes.IGNORED, joint_codes.IGNORED)
             numbers.vector(axis, "xyz")
             return
-        if "xyz" not in axis.attributes and not axis.text and not axis.children:
-            self.report.add(
-                joint_codes.EMPTY_AXIS,
-                "<axis> without xyz is read as 1 0 0, and by urdfdom as 0 0 0",
-                axis,
-                remedy='write <axis xyz="1 0 0"/>',
-            )
-        elif "xyz" in axis.attributes:
+        if "xyz" in axis.attributes:
             joint.axis = self.numbers.vector(axis, "xyz")
+            return
+        if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
+            return  # an error already: the value is written as text (URDF212)
+        self.report.add(
+            joint_codes.EMPTY_AXIS,
+            "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",
+            axis,
+            remedy='write <axis xyz="1 0 0"/>, or whichever is meant',
+            # A planar joint's axis changes nothing: it moves in the XY plane (URDF505).
+            severity=Severity.WARNING if joint.kind == "planar" else None,
+        )
 
     def _limit(self, joint: JointRecord) -> None:
         limit = joint.element.first("limit")
@@ -267,7 +278,8 @@ class JointReader:
         required = ("effort", "velocity") if self.version < (1, 2) else ("lower", "upper") if bounded else ()
         for attribute in required:
             self.required(limit, attribute, _EXAMPLE_LIMIT, number=True)
-        values = {name: self.numbers.scalar(limit, name) for name in ("lower", "upper", "effort", "velocity")}
+        names = ("lower", "upper", "effort", "velocity", *(FURTHER_LIMITS if self.version >= (1, 2) else ()))
+        values = {name: self.numbers.scalar(limit, name) for name in names}
         joint.limit = LimitRecord(limit, **values)
 
     def _mimic(self, joint: JointRecord) -> None:

@@ -6,6 +6,7 @@ The format is OASIS "Static Analysis Results Interchange Format (SARIF) Version 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -73,7 +74,10 @@ def _location(finding: Finding) -> dict[str, Any]:
 
 
 def _uri(file: str) -> str:
-    """A file's name as a URI reference: relative where it was given so, `stdin` for standard input."""
+    """A file's name as a URI reference: relative where it was given so, `stdin` for standard input.
+
+    A name is bytes, of whatever encoding; those that a URI cannot hold are written as %XX.
+    """
     if file.startswith("<"):
         return file.strip("<>")
-    return Path(file).as_uri() if Path(file).is_absolute() else quote(Path(file).as_posix())
+    return Path(file).as_uri() if Path(file).is_absolute() else quote(os.fsencode(Path(file).as_posix()))

@@ -116,8 +116,8 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if not children <= robot.links.keys():
         return False  # a joint that names no child, or a wrong one, has lost one of these: reported already
     parents = {joint.parent for joint in robot.joints}
-    # The root that carries most is the robot; the others are what fell off.
-    main = max(roots, key=lambda link: (link in parents, -list(robot.links).index(link)))
+    # The first root that carries something is the robot; the others are what fell off.
+    main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
         if root != main:
             report.add(

@@ -53,7 +53,7 @@ def check_suspicious(report: Reporter, robot: RobotRecord, *, sound: bool) -> No
 def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float]) -> None:
     origin = joint.origin_element
     if origin is not None and joint.quaternion is None:
-        written = origin.attributes.get("rpy", "").split()
+        written = origin.attributes.get("rpy", "").split(maxsplit=3)
         if any(abs(angle) >= 10.0 for angle in joint.rpy):
             _degrees(report, joint, "rpy", quoted(" ".join(written)))
         elif len(written) == 3:

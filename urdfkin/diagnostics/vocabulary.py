@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from functools import cache
+from functools import lru_cache
 
 from urdfkin.diagnostics.codes import dialect as codes
 from urdfkin.diagnostics.document import Element
@@ -122,11 +122,10 @@ def check_vocabulary(report: Reporter, root: Element) -> None:
         _check_attributes(report, element)
         _check_text(report, element)
         _check_repeats(report, element)
-        for child in reversed(element.children):
-            if child.tag in known:
-                stack.append(child)
-            elif child.tag not in OPAQUE and ":" not in child.tag:
+        for child in element.children:
+            if child.tag not in known and child.tag not in OPAQUE and ":" not in child.tag:
                 _check_unknown(report, child, known)
+        stack += [child for child in reversed(element.children) if child.tag in known]
 
 
 def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) -> None:
@@ -144,7 +143,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
         )
     if parts:
         return
-    close = nearest(element.tag, known)
+    close = None if report.is_full(codes.UNKNOWN_ELEMENT) else nearest(element.tag, known)
     parent = element.parent
     if parent is not None and parent.tag in _VECTORS and element.text and not parent.attributes:
         report.add(
@@ -180,7 +179,7 @@ def _outside_extensions(element: Element) -> list[Element]:
 
 def _is_part(element: Element) -> bool:
     """Whether an element is a link or joint of a robot, by more than its name."""
-    tag = nearest(element.tag, _PARTS)
+    tag = nearest(element.tag, _PARTS) if len(element.tag) < _LONGEST_PART else None
     if tag == "link":
         return "name" in element.attributes
     return tag == "joint" and (
@@ -189,6 +188,9 @@ def _is_part(element: Element) -> bool:
 
 
 _PARTS = frozenset({"link", "joint"})
+
+#: Longer words are like neither: difflib calls five of eight letters, and fewer, no match.
+_LONGEST_PART = 8
 
 #: The joint types of the specification.
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
@@ -201,7 +203,7 @@ def _check_attributes(report: Reporter, element: Element) -> None:
     for attribute in element.attributes:
         if attribute in known or ":" in attribute or attribute == "xmlns":
             continue
-        close = nearest(attribute, known)
+        close = None if report.is_full(codes.UNKNOWN_ATTRIBUTE) else nearest(attribute, known)
         report.add(
             codes.UNKNOWN_ATTRIBUTE,
             f"<{element.tag}> has no attribute of this name; it is skipped",
@@ -256,9 +258,17 @@ def _check_repeats(report: Reporter, element: Element) -> None:
         seen.setdefault(child.tag, child)
 
 
-@cache
 def nearest(word: str, known: frozenset[str]) -> str | None:
-    """The known word that `word` was probably meant to be."""
+    """The known word that `word` was probably meant to be; none for what is much longer than each."""
+    return _nearest(word, known) if len(word) <= _LONGEST else None
+
+
+#: Longer words are like none of URDF's.
+_LONGEST = 32
+
+
+@lru_cache(1024)
+def _nearest(word: str, known: frozenset[str]) -> str | None:
     folded = {name.lower(): name for name in known}
     close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.8)
     if close:

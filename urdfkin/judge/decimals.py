@@ -5,12 +5,26 @@ Names and order come from the tree that was read; the text was checked before (`
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as Xml
 from dataclasses import dataclass
+from xml.etree.ElementTree import Element
 
 from urdfkin.errors import InputError
-from urdfkin.judge.vectors import IDENTITY, ZERO, Matrix, Number, Vector, from_rpy, mp, unit
+from urdfkin.judge.vectors import (
+    IDENTITY,
+    ZERO,
+    Matrix,
+    Number,
+    Vector,
+    from_quaternion,
+    from_rpy,
+    mp,
+    unit,
+)
+from urdfkin.plain_xml import plain_xml
 from urdfkin.tree import JointKind, KinematicTree
+
+#: The version of URDF from which on `quat_xyzw` counts; in older files it is ignored.
+_WITH_QUATERNIONS = (1, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +56,9 @@ def read_exact(text: str, tree: KinematicTree) -> tuple[ExactJoint, ...]:
     Raises:
         InputError: the text and the tree are not of the same robot.
     """
-    elements = {str(element.get("name")): element for element in Xml.fromstring(text).findall("joint")}
+    root = plain_xml(text)
+    elements = {str(element.get("name")): element for element in root.findall("joint")}
+    quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _WITH_QUATERNIONS
     joints = []
     for joint in tree.joints:
         element = elements.get(joint.name)
@@ -55,7 +71,7 @@ def read_exact(text: str, tree: KinematicTree) -> tuple[ExactJoint, ...]:
         axis = _vector(element.find("axis"), "xyz", "1 0 0")
         joints.append(
             ExactJoint(
-                R=_rotation(element.find("origin")),
+                R=_rotation(element.find("origin"), quaternions),
                 p=_vector(element.find("origin"), "xyz", "0 0 0"),
                 axis=unit(axis) if joint.kind.has_axis else axis,
                 multiplier=multiplier,
@@ -65,21 +81,24 @@ def read_exact(text: str, tree: KinematicTree) -> tuple[ExactJoint, ...]:
     return tuple(joints)
 
 
-def _numbers(element: Xml.Element | None, name: str, default: str) -> tuple[Number, ...]:
+def _numbers(element: Element | None, name: str, default: str) -> tuple[Number, ...]:
     written = default if element is None else element.get(name, default)
     return tuple(mp.mpf(word) for word in written.split())
 
 
-def _vector(element: Xml.Element | None, name: str, default: str) -> Vector:
+def _vector(element: Element | None, name: str, default: str) -> Vector:
     x, y, z = _numbers(element, name, default)
     return x, y, z
 
 
-def _rotation(origin: Xml.Element | None) -> Matrix:
+def _rotation(origin: Element | None, quaternions: bool) -> Matrix:
+    """From roll, pitch and yaw, or the quaternion, of any length, that URDF 1.1 has in their place."""
+    if quaternions and origin is not None and "quat_xyzw" in origin.attrib:
+        return from_quaternion(*_numbers(origin, "quat_xyzw", ""))
     return from_rpy(_vector(origin, "rpy", "0 0 0"))
 
 
-def _rule(elements: dict[str, Xml.Element], name: str) -> tuple[Number, Number]:
+def _rule(elements: dict[str, Element], name: str) -> tuple[Number, Number]:
     """Multiplier and offset of a follower, chains followed to the joint that moves."""
     multiplier, offset = mp.mpf(1), mp.mpf(0)
     while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":

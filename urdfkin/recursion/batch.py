@@ -22,7 +22,7 @@ from urdfkin.tree import FloatArray
 #: A batch is spread over threads by itself only from here on: a thread costs some ten microseconds.
 _WORTH_THREADS = 4096
 
-#: Computes rows of inputs into rows of an output, (inputs, out); 0 where an input is not finite.
+#: Computes rows of inputs into rows of an output, (inputs, out); 0 where an input is not ordinary.
 Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
@@ -37,7 +37,7 @@ def _processors() -> int:
 
 
 def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> bool:
-    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...) for all; whether these are finite.
+    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...) for all; whether these are ordinary.
 
     Args:
         compute: A kernel for whole blocks; releases the interpreter's lock.

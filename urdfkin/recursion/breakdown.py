@@ -9,9 +9,10 @@ frame, and 7.125 names its terms; applied joint by joint from the last inwards t
     coriolis     2 w_{k-1} x u_k        what it does while the joints before it turn the link it sits on
     sliding      a_k z                  a prismatic joint speeds up
 
-with d from the joint's origin to the frame. The angular rows are those of 7.129: a_k z, and v_k w_{k-1} x z
-under coriolis. A planar or floating joint slides and turns at once, along axes that turn with it: its
-sliding velocity s then adds o x s, with o its own angular velocity, under coriolis too.
+with d from the joint's origin to the frame: not a difference of two places in the world, which far away from
+its origin has lost its digits, but of two places seen from the frame. The angular rows are those of 7.129:
+a_k z, and v_k w_{k-1} x z under coriolis. A planar or floating joint slides and turns at once, along axes
+that turn with it: its sliding velocity s then adds o x s, with o its own angular velocity, under coriolis.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urdfkin.errors import NotFiniteError
+from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.recursion.evaluate import placements, velocities
 from urdfkin.recursion.plan import make_plan
@@ -31,6 +32,9 @@ from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: The kinds of contribution, in the order in which they are kept.
 KINDS = ("transverse", "centripetal", "coriolis", "sliding")
+
+
+_OFFSET, _NOWHERE = slice(9, 12), np.zeros(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +77,7 @@ class _Moves(NamedTuple):
     turn: FloatArray
 
 
+@np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite is refused at the end
 def acceleration_breakdown(
     tree: KinematicTree,
     link: int,
@@ -98,13 +103,20 @@ def acceleration_breakdown(
 
     Raises:
         NotFiniteError: a number of q, v or a is not finite.
+        RangeError: a part leaves the range of double precision.
     """
     if not np.isfinite(a).all():  # the walks below, which look at their inputs themselves, take q and v
         raise NotFiniteError("q, v and a must be finite")
     path = [i for i in tree.path(link) if tree.joints[i].kind.nv]
     plan = make_plan(tree, [0, link, *(i + 1 for i in path), *(tree.joints[i].parent for i in path)])
     Ts, velocity = placements(plan, q, base=base), velocities(plan, q, v, base=base)
-    end = np.zeros((len(q), 3)) if reference is Reference.WORLD else Ts[:, 1, :3, 3]
+    end = _NOWHERE
+    if reference is not Reference.WORLD:
+        # The same walk with the world's origin at the frame: what it rounds is as small as the robot, and
+        # what the new start is off by is the same for all.
+        base = _moved(base, -Ts[:, 1, :3, 3])
+        Ts = placements(plan, q, base=base)
+        end = Ts[:, 1, :3, 3]
     terms = np.empty((len(q), len(path), len(KINDS), 6))
     for k, i in enumerate(path):
         R, d = Ts[:, 2 + k, :3, :3], end - Ts[:, 2 + k, :3, 3]
@@ -116,7 +128,18 @@ def acceleration_breakdown(
         back = Ts[:, 1, :3, :3].swapaxes(-1, -2)
         base_part = _turned(back, base_part)
         terms = _turned(back[:, np.newaxis, np.newaxis], terms)
+    if not (np.isfinite(base_part).all() and np.isfinite(terms).all()):
+        raise RangeError(
+            "a part of the acceleration leaves the range of double precision", remedy="give smaller numbers"
+        )
     return AccelerationBreakdown(tuple(tree.joints[i].name for i in path), base_part, terms)
+
+
+def _moved(base: FloatArray, by: FloatArray) -> FloatArray:
+    """(n, 24) the base's state with its place moved."""
+    moved = np.repeat(base, len(by), axis=0) if len(base) == 1 else base.copy()
+    moved[:, _OFFSET] += by
+    return moved
 
 
 def _terms(rate: _Moves, rate_2: _Moves, w_before: FloatArray, d: FloatArray) -> FloatArray:

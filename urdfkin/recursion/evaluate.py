@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from urdfkin.errors import NotFiniteError
+from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.recursion.batch import in_blocks
-from urdfkin.recursion.plan import Plan
+from urdfkin.recursion.plan import LARGE, Plan
 from urdfkin.recursion.scratch import scratch
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
@@ -90,7 +90,7 @@ def _motion(
         def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
             return motions(order, int(reference), packed, *x, part, scratch(plan))
 
-    _demand(in_blocks(compute, [base, *qva], out, threads))
+    _demand(in_blocks(compute, [base, *qva], out, threads), plan, [base, *qva], out)
 
 
 def jacobians(
@@ -111,7 +111,7 @@ def jacobians(
     def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
         return kernel(int(reference), packed, *x, part, scratch(plan))
 
-    _demand(in_blocks(compute, [base, q], out, threads))
+    _demand(in_blocks(compute, [base, q], out, threads), plan, [base, q], out)
     return out
 
 
@@ -134,10 +134,22 @@ def jacobian_rates(
     def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
         return kernel(int(reference), packed, *x, part, scratch(plan))
 
-    _demand(in_blocks(compute, [base, q, v], out, threads))
+    _demand(in_blocks(compute, [base, q, v], out, threads), plan, [base, q, v], out)
     return out
 
 
-def _demand(finite: bool) -> None:
-    if not finite:
+def _demand(ordinary: bool, plan: Plan, inputs: Sequence[FloatArray], out: FloatArray) -> None:
+    """Results that are finite, from inputs that are; where all is ordinary nothing needs to be looked at."""
+    base = inputs[0]
+    ordinary = ordinary and not plan.is_large
+    if ordinary and (base is STILL_STATE or float(np.abs(base).max(initial=0.0)) < LARGE):
+        return
+    if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")
+    finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))
+    if not finite.all():
+        raise RangeError(
+            "a result leaves the range of double precision",
+            where=f"sample {int(finite.argmin())} of {len(out)}" if len(out) > 1 else None,
+            remedy="give smaller numbers",
+        )

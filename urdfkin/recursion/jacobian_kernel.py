@@ -23,8 +23,8 @@ from urdfkin.recursion.transposing import fetch_output
 from urdfkin.recursion.walk import (
     REFERENCE,
     counted,
-    finite,
     frame_state,
+    ordinary,
     read_input,
     resume,
     rows_of,
@@ -96,12 +96,12 @@ def _jacobian_block(m, s, plan, b, reference, base, stride, q, to):
             frame_state(m, s, plan, f, order, reference == _LOCAL)
             _frame_jacobian(m, s, plan, f, b, reference, to)
             f += 1
-    return int(finite(q, b * plan.nq, m * plan.nq))
+    return int(ordinary(q, b * plan.nq, m * plan.nq))
 
 
 @kernel(INT, PLAN, ROWS, ROWS, output(4), SCRATCH)
 def jacobians(reference, packed, base, q, out, scratch):
-    """Velocity Jacobians (7.85) of frames: 1, or 0 where a coordinate is not finite.
+    """Velocity Jacobians (7.85) of frames: 1, or 0 where a coordinate is not ordinary.
 
     Shapes: base (1 or n, 24), q (n, nq), out (n, frames, 6, nv), scratch (rows * LANES,).
     """

@@ -47,8 +47,8 @@ from urdfkin.recursion.rows import (
 from urdfkin.recursion.steps import step
 from urdfkin.recursion.transposing import fetch_output
 from urdfkin.recursion.walk import (
-    finite,
     frame_state,
+    ordinary,
     read_inputs,
     resume,
     rows_of,
@@ -124,12 +124,12 @@ def _rate_block(m, s, plan, b, reference, base, stride, q, v, to):
             frame_state(m, s, plan, f, order, reference == _LOCAL)
             _frame_rates(m, s, plan, f, b, reference, to)
             f += 1
-    return int(finite(q, b * plan.nq, m * plan.nq) and finite(v, b * plan.nv, m * plan.nv))
+    return int(ordinary(q, b * plan.nq, m * plan.nq) and ordinary(v, b * plan.nv, m * plan.nv))
 
 
 @kernel(INT, PLAN, ROWS, ROWS, ROWS, output(4), SCRATCH)
 def jacobian_rates(reference, packed, base, q, v, out, scratch):
-    """Rates of the velocity Jacobians (7.126) of frames: 1, or 0 for an input that is not finite.
+    """Rates of the velocity Jacobians (7.126) of frames: 1, or 0 for an input that is not ordinary.
 
     Shapes: base (1 or n, 24), q (n, nq), v (n, nv), out (n, frames, 6, nv), scratch (rows * LANES,).
     """

@@ -22,7 +22,7 @@ from urdfkin.recursion.lanes import (
     sine_cosine,
     store,
 )
-from urdfkin.recursion.motion_kernel import inputs_finite, shapes_fit, write_motion
+from urdfkin.recursion.motion_kernel import inputs_ordinary, shapes_fit, write_motion
 from urdfkin.recursion.plan import GEOMETRY_WIDTH, OFFSET_WIDTH, STEP_WIDTH, Geometry, Motion, Step
 from urdfkin.recursion.rows import (
     ALPHA,
@@ -236,12 +236,12 @@ def _local_block(m, s, plan, b, order, base, stride, q, v, a, to):
             _turn_back_by_constant(m, s, FRAME, plan.offsets, OFFSET_WIDTH * f, order)
             write_motion(m, s, plan, f, b, order, to)
             f += 1
-    return inputs_finite(m, plan, b, order, q, v, a)
+    return inputs_ordinary(m, plan, b, order, q, v, a)
 
 
 @kernel(INT, PLAN, ROWS, ROWS, ROWS, ROWS, output(3), SCRATCH)
 def local_motions(order, packed, base, q, v, a, out, scratch):
-    """Velocities (order 1) or accelerations (2) of frames, in their own axes; 0 for an input not finite.
+    """Velocities (order 1) or accelerations (2) of frames, in their own axes; 0 for an input not ordinary.
 
     Shapes: base (1 or n, 24), q (n, nq), v and a (n, nv), out (n, frames, 6), scratch (rows * LANES,).
     """

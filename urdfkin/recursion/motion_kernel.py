@@ -23,8 +23,8 @@ from urdfkin.recursion.transposing import write_rows
 from urdfkin.recursion.walk import (
     REFERENCE,
     counted,
-    finite,
     frame_state,
+    ordinary,
     read_inputs,
     resume,
     rows_of,
@@ -78,13 +78,13 @@ def write_motion(m, s, plan, f, b, order, to):
 
 
 @lane_function
-def inputs_finite(m, plan, b, order, q, v, a):
-    """Whether all coordinates and rates are that motion of this order takes."""
-    good = finite(q, b * plan.nq, m * plan.nq)
+def inputs_ordinary(m, plan, b, order, q, v, a):
+    """Whether all coordinates and rates are that motion of this order takes: see `walk.ordinary`."""
+    good = ordinary(q, b * plan.nq, m * plan.nq)
     if order >= 1:
-        good &= finite(v, b * plan.nv, m * plan.nv)
+        good &= ordinary(v, b * plan.nv, m * plan.nv)
     if order >= 2:
-        good &= finite(a, b * plan.nv, m * plan.nv)
+        good &= ordinary(a, b * plan.nv, m * plan.nv)
     return int(good)
 
 
@@ -113,12 +113,12 @@ def _motion_block(m, s, plan, b, order, reference, base, stride, q, v, a, to):
                 _refer(m, s, order, reference)
             write_motion(m, s, plan, f, b, order, to)
             f += 1
-    return inputs_finite(m, plan, b, order, q, v, a)
+    return inputs_ordinary(m, plan, b, order, q, v, a)
 
 
 @kernel(INT, INT, PLAN, ROWS, ROWS, ROWS, ROWS, output(3), SCRATCH)
 def motions(order, reference, packed, base, q, v, a, out, scratch):
-    """Placements (order 0), velocities (1) or accelerations (2) of frames: 1, or 0 for an input not finite.
+    """Placements (order 0), velocities (1) or accelerations (2) of frames: 1, or 0 for an input not ordinary.
 
     Shapes: base (1 or n, 24), q (n, nq), v and a (n, nv), out (n, frames, 16 or 6), scratch (rows * LANES,).
     """

@@ -24,6 +24,11 @@ from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree
 IntArray = NDArray[np.int64]
 
 
+#: Where coordinates, rates, lengths and multipliers are smaller than this, no result overflows: with N joints
+#: a rate is less than LARGE^2, the path N LARGE^2, and so w^2 d, the largest product, N^3 LARGE^6.
+LARGE = 1e45
+
+
 class Step(IntEnum):
     """Columns of `Plan.steps` (whole numbers)."""
 
@@ -140,6 +145,7 @@ class Plan:
         lengths: (steps + frames,) metres: the sum of the lengths of all URDF offsets, fixed joints' too,
             from a step's parent to it, then from a frame's step to the frame (in the order of `frames`).
         depth: (frames,) in output order, how many URDF joints lie between a frame and the root.
+        tilts: (frames,) likewise, rad: their `Joint.tilt` added up.
     """
 
     nq: int
@@ -159,6 +165,7 @@ class Plan:
     parents: IntArray
     lengths: FloatArray
     depth: IntArray
+    tilts: FloatArray
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -172,6 +179,12 @@ class Plan:
     def areas(self) -> rows.Areas:
         """Where the rows of scratch begin that depend on the plan."""
         return rows.areas(self.nq, self.nv, self.slots, len(self.columns))
+
+    @cached_property
+    def is_large(self) -> bool:
+        """Whether results may overflow although coordinates and rates are ordinary."""
+        numbers = self.geometry, self.offsets, self.lengths
+        return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
     @cached_property
     def packed(self) -> IntArray:
@@ -237,6 +250,7 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
             + [end.length for end in ends]
         ),
         depth=np.array([len(path) for path in paths], dtype=np.int64),
+        tilts=np.array([math.fsum(tree.joints[i].tilt for i in path) for path in paths]),
     )
 
 

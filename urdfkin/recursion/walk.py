@@ -20,7 +20,7 @@ from urdfkin.recursion.lanes import (
     pointer_to,
     whole_numbers_at,
 )
-from urdfkin.recursion.plan import OFFSET_WIDTH, STEP_WIDTH, Packed, Step
+from urdfkin.recursion.plan import LARGE, OFFSET_WIDTH, STEP_WIDTH, Packed, Step
 from urdfkin.recursion.rows import FRAME, ONE, STATE_ROWS, ZERO
 from urdfkin.recursion.steps import carry, interorigin, turn_by_constant
 from urdfkin.recursion.transposing import fetch_inputs, read_rows
@@ -191,12 +191,12 @@ def frame_state(m, s, plan, f, order, turned):
 
 
 @jitted(forceinline=True, fastmath={"reassoc"})
-def finite(x, at, count):
-    """Whether `count` numbers are: 0 times one that is not is no number, and stays so in a sum.
+def ordinary(x, at, count):
+    """Whether `count` numbers are: none that is no number or infinite, and their sizes no more than `LARGE`.
 
     The order of this sum is left to the compiler.
     """
     total = 0.0
     for i in range(count):
-        total += 0.0 * x[at + i]
-    return total == 0.0
+        total += abs(x[at + i])
+    return total < LARGE

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,8 +51,8 @@ def read_tree(data: bytes, *, mimic: bool = True, root_joint: str | None = None)
         raise InputError(
             "a robot has one root link", where=robot.name, found=", ".join(sorted(roots)) or "none"
         )
-    leaders = {joint.name: joint for joint in robot.joints}
-    rows = [(_joint(joint, leaders if mimic else None), joint.parent, joint.child) for joint in robot.joints]
+    rules = _rules(robot.joints) if mimic else {}
+    rows = [(_joint(joint, rules.get(joint.name)), joint.parent, joint.child) for joint in robot.joints]
     tree = build_tree(robot.name, roots.pop(), rows)
     return tree if root_joint is None else with_root_joint(tree, _root_kind(root_joint))
 
@@ -70,9 +71,8 @@ def _root_kind(word: str) -> JointKind:
     return JointKind(word)
 
 
-def _joint(joint: yourdf.Joint, leaders: dict[str, yourdf.Joint] | None) -> Joint:
+def _joint(joint: yourdf.Joint, rule: Mimic | None) -> Joint:
     kind = JointKind(joint.type)
-    follows = leaders is not None and joint.mimic is not None and kind is not JointKind.FIXED
     return Joint(
         name=joint.name,
         kind=kind,
@@ -80,7 +80,7 @@ def _joint(joint: yourdf.Joint, leaders: dict[str, yourdf.Joint] | None) -> Join
         T_parent_joint=np.eye(4) if joint.origin is None else joint.origin,
         axis=_unit(joint.axis, joint.name) if kind.has_axis else np.array([1.0, 0.0, 0.0]),
         limit=_limit(joint.limit, kind),
-        mimic=_resolve(joint, leaders or {}) if follows else None,
+        mimic=rule,
     )
 
 
@@ -105,23 +105,34 @@ def _limit(limit: Any, kind: JointKind) -> Limit | None:
     )
 
 
-def _resolve(joint: yourdf.Joint, joints: dict[str, yourdf.Joint]) -> Mimic:
-    """Follow a chain of mimic joints to the one that moves: multipliers multiply, offsets add up."""
-    multiplier, offset = 1.0, 0.0
-    follower, met = joint, {joint.name}
-    while follower.mimic is not None and JointKind(follower.type) is not JointKind.FIXED:
-        rule = follower.mimic
-        offset += multiplier * rule.offset
-        multiplier *= rule.multiplier
-        if rule.joint not in joints:
-            raise UnknownNameError(
-                "mimic leader",
-                rule.joint,
-                joints,
-                where=f"joint {follower.name} (mimic=False, --no-mimic, lets it move freely)",
-            )
-        if rule.joint in met:
-            raise InputError("mimic joints follow each other in a circle", where=f"joint {joint.name}")
-        met.add(rule.joint)
-        follower = joints[rule.joint]
-    return Mimic(follower.name, multiplier, offset)
+def _rules(joints: Sequence[yourdf.Joint]) -> dict[str, Mimic]:
+    """Whom each follower follows in the end: along a chain multipliers multiply and offsets add up.
+
+    A chain is resolved from the joint that moves outwards: so each joint is looked at once, and the doubles
+    are those that the oracle has, which resolves them for itself.
+    """
+    named = {joint.name: joint for joint in joints}
+    resolved: dict[str, Mimic] = {}
+    for start in joints:
+        joint, waiting = start, {}
+        while _follows(joint) and joint.name not in resolved:
+            waiting[joint.name] = rule = joint.mimic
+            if rule.joint not in named:
+                raise UnknownNameError(
+                    "mimic leader",
+                    rule.joint,
+                    named,
+                    where=f"joint {joint.name} (mimic=False, --no-mimic, lets it move freely)",
+                )
+            if rule.joint in waiting:
+                raise InputError("mimic joints follow each other in a circle", where=f"joint {start.name}")
+            joint = named[rule.joint]
+        end = resolved.get(joint.name, Mimic(joint.name, 1.0, 0.0))
+        for follower, rule in reversed(waiting.items()):
+            offset = rule.multiplier * end.offset + rule.offset
+            end = resolved[follower] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
+    return resolved
+
+
+def _follows(joint: yourdf.Joint) -> bool:
+    return joint.mimic is not None and JointKind(joint.type) is not JointKind.FIXED

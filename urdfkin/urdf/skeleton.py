@@ -11,11 +11,13 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from urdfkin.diagnostics import joints
 from urdfkin.diagnostics.dialect import check_dialect
-from urdfkin.diagnostics.document import DEFAULT_LIMITS, Limits, parse
+from urdfkin.diagnostics.document import Element, parse
 from urdfkin.diagnostics.encoding import utf8_bytes
 from urdfkin.diagnostics.finding import UrdfError
-from urdfkin.diagnostics.records import JointRecord, LimitRecord, read_robot
+from urdfkin.diagnostics.limits import DEFAULT_LIMITS, Limits
+from urdfkin.diagnostics.records import JointRecord, LimitRecord, RobotRecord, read_robot
 from urdfkin.diagnostics.reporter import Reporter
 from urdfkin.rotation.arrays import FloatArray
 from urdfkin.rotation.euler import rpy_of
@@ -33,20 +35,33 @@ def skeleton(data: bytes, limits: Limits = DEFAULT_LIMITS) -> bytes:
     Raises:
         UrdfError: the file has errors that keep it from being read at all.
     """
-    report = Reporter("<text>", data)
-    text = utf8_bytes(report, data)
-    report.data = text or b""
-    root = None if text is None else parse(report, text, limits)
-    version = None if root is None else check_dialect(report, root)
-    if root is None or version is None:
-        raise UrdfError(report.findings())
-    robot = read_robot(report, root, version)
+    root, robot = _records(data, limits)
     lines = [f'<robot name="{attribute(root.attributes.get("name", ""))}">']
     lines += [f'<link name="{attribute(link)}"/>' for link in robot.links]
     for joint in robot.joints:
         lines += _joint(joint)
     lines.append("</robot>")
     return "\n".join(lines).encode()
+
+
+def tilts(data: bytes) -> dict[str, float]:
+    """How far off (rad) the axes are that Pinocchio takes for x, y or z, by joint: see URDF514.
+
+    Args:
+        data: As for `skeleton`.
+    """
+    return joints.tilts(_records(data, DEFAULT_LIMITS)[1])
+
+
+def _records(data: bytes, limits: Limits) -> tuple[Element, RobotRecord]:
+    report = Reporter("<text>", data, limits)
+    text = utf8_bytes(report, data)
+    report.data = text or b""
+    root = None if text is None else parse(report, text)
+    version = None if root is None else check_dialect(report, root)
+    if root is None or version is None:
+        raise UrdfError(report.findings())
+    return root, read_robot(report, root, version)
 
 
 def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:

@@ -30,7 +30,7 @@ from urdfkin.validation.portrait import Portrait
 from urdfkin.validation.tally import Key, Tally, tally
 from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Bound, Quantity
-from urdfkin.verification.magnitudes import Magnitudes, magnitudes
+from urdfkin.verification.magnitudes import magnitudes
 from urdfkin.verification.sampling import Samples, draw
 
 #: Samples in a chunk: small enough to spread a single robot over many workers.
@@ -218,7 +218,7 @@ class _Work:
         plan = make_plan(tree, [i + 1 for i in moving])
         size = magnitudes(plan, q_free, *(np.zeros((len(q_free), tree.nv)),) * 2, STILL_STATE)
         J = self.clock.ours(evaluate.jacobians, plan, q_free, Reference.WORLD)
-        bound = bounds.jacobian_bound(plan, _followed(size, self.size, moving), Reference.WORLD)
+        bound = bounds.jacobian_bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(moving) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
         ours = J[:, frame, :, column].swapaxes(0, 1)
@@ -255,9 +255,3 @@ def _leaders_spread(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> 
             own = joint.mimic.multiplier * own + joint.mimic.offset
         spread[:, free_at : free_at + joint.kind.nq] = own
     return spread
-
-
-def _followed(free: Magnitudes, coupled: Magnitudes, moving: list[int]) -> Magnitudes:
-    """The freed tree's magnitudes with the followers' angles counted, as they were rounded all the same."""
-    joints = coupled.joints[:, [i + 1 for i in moving]]
-    return Magnitudes(free.p, free.w, free.vel, free.alpha, free.acc, joints)

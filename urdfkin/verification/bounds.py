@@ -18,9 +18,21 @@ by its constant rotation and by its own turn, so that a rotated vector is off by
 | the axis: divided by its length; Rodrigues' formula where it is no coordinate axis | 0.5 | 2.0 |
 | | 8.1 | 13.1 |
 
-Pinocchio takes an axis within 1e-12 of a coordinate axis for that one. A tilt t turns a rotated vector by 2 t
-at most, and Rodrigues' formula is not needed there: its 2.0 hold a tilt up to eps. A larger one is a finding
-(URDF514), and such a robot is not compared.
+Pinocchio takes an axis within 1e-12 of a coordinate axis for that one. With Q the turn by the tilt t that
+brings one axis to the other, |Q R Q^T - R| <= 2 |Q - 1| <= 2 t: a vector turned by the joint, or slid along
+its axis, is off by 2 t at most, and so is each factor behind it. Rodrigues' formula is not needed there: its
+2.0 hold a tilt up to eps. A larger one is a finding (URDF514) and adds 2 t / eps to the roundings of each
+factor, for the frames behind that joint and for no others.
+
+A follower's angle counts nothing: urdfkin and the oracle compute fl(fl(m q) + c) with the same doubles m and
+c (rules that follow rules are multiplied out from the leader's end, by both), which IEEE 754 defines to the
+last bit, and neither fuses the two operations. What is left is sine and cosine, above, whose argument is
+reduced without loss however large it is. So a slip in a follower's angle shows as it is, at 1e12 rad too.
+
+Products below the smallest normal number lose bits one by one. Such a product is off by 2^-1075, half the
+smallest subnormal number, which is (eps/2) times the smallest normal number: counting every size that is not
+zero as that large at least (`magnitudes`) puts it among the roundings counted here, whatever it is multiplied
+with afterwards. The least unit is then eps times it, 2^-1074.
 
 Rotations do not stretch what was wrong before, so the error grows with the number of joints and no faster.
 Adding the joint's term to the sum and its cross product cost 2 eps at most on each side; counting one joint
@@ -47,16 +59,17 @@ import numpy as np
 from urdfkin.recursion.plan import Column, Plan
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
-from urdfkin.verification.magnitudes import Magnitudes
+from urdfkin.verification.magnitudes import Magnitudes, product
 
 EPS = float(np.finfo(np.float64).eps)
-SMALLEST = float(np.finfo(np.float64).tiny)
+#: The smallest unit: eps times the smallest normal number, which is the smallest number of all.
+LEAST_UNIT = float(np.finfo(np.float64).smallest_subnormal)
 #: Roundings for each joint and each factor, both computations together; derived above.
 ROUNDINGS = 24.0
 
 
 #: A scale beyond the range of doubles is inf; `disagreement` accepts nothing there.
-_BEYOND = np.errstate(over="ignore", invalid="ignore")
+_BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
 class Quantity(StrEnum):
@@ -67,6 +80,8 @@ class Quantity(StrEnum):
     JACOBIAN = "jacobian"
     JACOBIAN_RATE = "jacobian rate"
     ACCELERATION = "acceleration"
+    ANALYTICAL_JACOBIAN = "analytical jacobian"
+    ACCELERATION_BREAKDOWN = "acceleration breakdown"
     JOINT_JACOBIAN = "joint jacobian"
     JOINT_JACOBIAN_RATE = "joint jacobian rate"
     SCREWS = "screws"
@@ -79,6 +94,8 @@ _FACTORS = {
     Quantity.JACOBIAN: 2,
     Quantity.JACOBIAN_RATE: 3,
     Quantity.ACCELERATION: 3,
+    Quantity.ANALYTICAL_JACOBIAN: 2,
+    Quantity.ACCELERATION_BREAKDOWN: 3,
     Quantity.JOINT_JACOBIAN: 2,
     Quantity.JOINT_JACOBIAN_RATE: 3,
     Quantity.SCREWS: 2,
@@ -104,10 +121,15 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     return np.broadcast_to(k, leading)
 
 
-def roundings(quantity: Quantity, reference: Reference, joints: FloatArray) -> FloatArray:
-    """`k` for paths with so many joints."""
+def roundings(quantity: Quantity, reference: Reference, size: Magnitudes) -> FloatArray:
+    """`k` for each result: its factors, times what each may be off by."""
     extra = 0 if reference is Reference.LOCAL_WORLD_ALIGNED or quantity is Quantity.PLACEMENT else 1
-    return ROUNDINGS * (_FACTORS[quantity] + extra) * joints
+    return (_FACTORS[quantity] + extra) * _of_a_factor(size)
+
+
+def _of_a_factor(size: Magnitudes) -> FloatArray:
+    """How many roundings a rotated vector may be off by, both computations together."""
+    return ROUNDINGS * size.joints + 2.0 * size.tilt / EPS
 
 
 def placement_bound(size: Magnitudes) -> Bound:
@@ -115,26 +137,33 @@ def placement_bound(size: Magnitudes) -> Bound:
     scale = np.zeros((*size.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
     scale[..., :3, 3] = size.p[..., None]
-    k = roundings(Quantity.PLACEMENT, Reference.LOCAL_WORLD_ALIGNED, size.joints)
+    k = roundings(Quantity.PLACEMENT, Reference.LOCAL_WORLD_ALIGNED, size)
     return Bound(scale, k[..., None, None])
 
 
 @_BEYOND
 def velocity_bound(size: Magnitudes, reference: Reference) -> Bound:
     """For (n, frames, 6)."""
-    linear = size.vel + size.w * size.p if reference is Reference.WORLD else size.vel
-    return Bound(_six(linear, size.w), roundings(Quantity.VELOCITY, reference, size.joints)[..., None])
+    linear = size.vel + product(size.w, size.p) if reference is Reference.WORLD else size.vel
+    return Bound(_six(linear, size.w), roundings(Quantity.VELOCITY, reference, size)[..., None])
 
 
 @_BEYOND
 def acceleration_bound(size: Magnitudes, reference: Reference) -> Bound:
-    """For (n, frames, 6). Pinocchio goes through spatial accelerations, which differ by w x vel."""
-    linear = size.acc + size.w * size.vel
+    """For (n, frames, 6). Pinocchio goes through spatial accelerations, which differ by w x vel.
+
+    It is that of a breakdown's sum too. There the terms are gathered by joints: v_k z x (v_k z x d_k) and
+    2 w_{k-1} x (v_k z x d_k) with d_k from the joint to the frame have the lengths (w_k^2 - w_{k-1}^2) d_k, w
+    being the sum of the rates so far, and added over the joints they are w^2 times each link's own length, as
+    in 7.130. The d_k, differences of places seen from the frame, round as the sums of 7.77 do, and adding up
+    the 4 n parts rounds n + 3 times: both are less than the 2 eps that each joint has for sums.
+    """
+    shared = product(size.w, size.vel)
+    linear = size.acc + shared
     if reference is Reference.WORLD:
-        linear = linear + size.w * size.vel + (size.alpha + size.w**2) * size.p
-    return Bound(
-        _six(linear, size.alpha), roundings(Quantity.ACCELERATION, reference, size.joints)[..., None]
-    )
+        inward = product(size.w, product(size.w, size.p))
+        linear = linear + shared + product(size.alpha, size.p) + inward
+    return Bound(_six(linear, size.alpha), roundings(Quantity.ACCELERATION, reference, size)[..., None])
 
 
 def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
@@ -157,9 +186,9 @@ def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 def jacobian_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
     """For (n, frames, 6, nv): the path's length for turning columns, 1 for sliding ones, 0 for idle ones."""
     turning, sliding = column_weights(plan)
-    linear = turning * size.p[..., None] + sliding
+    linear = product(turning, size.p[..., None]) + sliding
     scale = _six_rows(linear, turning)
-    return Bound(scale, roundings(Quantity.JACOBIAN, reference, size.joints)[..., None, None])
+    return Bound(scale, roundings(Quantity.JACOBIAN, reference, size)[..., None, None])
 
 
 @_BEYOND
@@ -171,10 +200,53 @@ def jacobian_rate_bound(plan: Plan, size: Magnitudes, reference: Reference) -> B
     """
     turning, sliding = column_weights(plan)
     again = 2.0 if reference is Reference.LOCAL else 1.0
-    linear = turning * (again * size.w * size.p + size.vel)[..., None] + sliding * (again * size.w)[..., None]
-    angular = turning * (again * size.w)[..., None]
+    lever = again * product(size.w, size.p) + size.vel
+    angular = again * product(turning, size.w[..., None])
+    linear = product(turning, lever[..., None]) + again * product(sliding, size.w[..., None])
     scale = _six_rows(linear, angular)
-    return Bound(scale, roundings(Quantity.JACOBIAN_RATE, reference, size.joints)[..., None, None])
+    return Bound(scale, roundings(Quantity.JACOBIAN_RATE, reference, size)[..., None, None])
+
+
+@_BEYOND
+def euler_jacobian_bound(plan: Plan, size: Magnitudes, apart: FloatArray) -> Bound:
+    """For (n, frames, 6, nv): the positions' rows are those of the Jacobian; it grows near the singularity.
+
+    The rates of the outer angles are r . w, that of the middle one u . w, with the reciprocal basis of
+    the axes e_i, u and t = R e_k (`line_of_nodes`): |u| = 1, |r| = 1 / s, where s = |e_i x t| is the sine or
+    cosine of the middle angle. When t is off by no more than delta = k eps, u turns by delta / s, and r,
+    as -(r . du) u - (r . dt) r' shows, changes by 2 delta / s^2, with the least s there is: `apart` - delta.
+    With w off by delta of its size, the sums are 2 delta / s^2 + delta / s, at most 3 delta / s^2, and
+    delta / s + delta, at most 2 delta / s. In scales for the two factors of the Jacobian that is 1.5 / s^2
+    and 1 / s. What the angles' own arithmetic rounds (some 3 eps for arctan2 and its sine, 10 eps for
+    products and quotients, on either side) is held by the joint counted more: there is no offset to add here.
+
+    Args:
+        plan: The walk.
+        size: Of the frames.
+        apart: (n, frames) s of Pinocchio's rotation.
+    """
+    s = apart - EPS * _of_a_factor(size)
+    s = np.where(s > 0.0, s, 0.0)  # where rounding hides the singularity nothing is accepted
+    bound = jacobian_bound(plan, size, Reference.LOCAL_WORLD_ALIGNED)
+    with np.errstate(divide="ignore"):
+        bound.scale[..., [3, 5], :] *= (1.5 / (s * s))[..., None, None]
+        bound.scale[..., 4, :] *= (1.0 / s)[..., None]
+    return bound
+
+
+def quaternion_jacobian_bound(plan: Plan, size: Magnitudes) -> Bound:
+    """For (n, frames, 7, nv): the positions' rows are those of the Jacobian; there is no singularity.
+
+    A row of 4 q q^T is linear in R, off by less than 4.6 delta and at least 2 long, so that q is off by
+    2.3 delta, half the product of w and q by (2.3 + 1) / 2 delta of w: less than the Jacobian's two factors.
+    """
+    bound = jacobian_bound(plan, size, Reference.LOCAL_WORLD_ALIGNED)
+    return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
+
+
+def nearest_singularity(plan: Plan) -> float:
+    """From where on (rad) rounding leaves Euler rates a digit: four times what R may be off by."""
+    return 4.0 * float((EPS * ROUNDINGS * (plan.depth + 1) + 2.0 * plan.tilts).max(initial=0.0))
 
 
 def column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
@@ -192,8 +264,7 @@ def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArr
 
     A result that is not finite, or that a scale beyond all numbers would excuse, disagrees by inf.
     """
-    # Below the smallest normal number rounding is no longer relative: products simply lose their last bits.
-    unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, SMALLEST), 0.0)
+    unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, LEAST_UNIT), 0.0)
     with np.errstate(all="ignore"):
         difference = np.abs(ours - theirs)
         units = difference / unit

@@ -25,7 +25,7 @@ class VerificationError(UrdfkinError):
     Attributes:
         quantity: What was compared.
         frame: Of which frame.
-        reference: In which reference.
+        reference: In which reference; of an analytical Jacobian, in which representation.
         index: Position of the worst sample in the batch.
         ours: urdfkin's value of that sample.
         theirs: Pinocchio's.

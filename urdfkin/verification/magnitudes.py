@@ -7,6 +7,10 @@ small because large terms cancel.
 One term is Pinocchio's alone: where 7.129 has v_i w_{i-1} x z it has v_i w_i x z. The joint's own share of
 w_i is parallel to z and adds nothing but rounding, v_i^2 |z x z|, which fast joints about an axis askew do
 show: the scale of alpha counts it.
+
+Nothing but zero counts as smaller than `SMALLEST`, the smallest normal number. Below it a product is off by
+half the smallest subnormal number, not by half an eps of itself, and so as much as `SMALLEST` would be; and a
+product that is zero because two small numbers were multiplied may still meet a large one.
 """
 
 from __future__ import annotations
@@ -17,6 +21,8 @@ import numpy as np
 
 from urdfkin.recursion.plan import Geometry, Motion, Plan, Step
 from urdfkin.tree import FloatArray
+
+SMALLEST = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +35,9 @@ class Magnitudes:
         vel: (n, frames) m/s.
         alpha: (n, frames) rad/s^2.
         acc: (n, frames) m/s^2.
-        joints: (n, frames) how many joints' worth of rounding lies on the path: one for each URDF joint,
-            and for a follower its angle as well, which is itself rounded before its sine is taken.
+        joints: (n, frames) how many joints' worth of rounding lies on the path: one for each URDF joint, and
+            one more.
+        tilt: (n, frames) rad: by how much Pinocchio's axes on the path are off the file's, added up.
     """
 
     p: FloatArray
@@ -39,9 +46,10 @@ class Magnitudes:
     alpha: FloatArray
     acc: FloatArray
     joints: FloatArray
+    tilt: FloatArray
 
 
-@np.errstate(over="ignore", invalid="ignore")
+@np.errstate(over="ignore", under="ignore", invalid="ignore")
 def magnitudes(
     plan: Plan, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: FloatArray
 ) -> Magnitudes:
@@ -51,79 +59,85 @@ def magnitudes(
     """
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
-    state = [_norm(base[:, at : at + 3]) for at in (9, 12, 15, 18, 21)]
-    states = [[*state, np.zeros(1)]]
+    states = [[_norm(base[:, at : at + 3]) for at in (9, 12, 15, 18, 21)]]
+    lengths = _counted(plan.lengths)
     for i in range(len(plan.steps)):
         state = states[plan.parents[i] + 1]
-        states.append(_place(plan, i, state, q) if v is None or a is None else _step(plan, i, state, q, v, a))
+        moved = (
+            _place(plan, i, state, lengths[i], q)
+            if v is None or a is None
+            else _step(plan, i, state, lengths[i], q, v, a)
+        )
+        states.append(moved)
     carry = _carry if v is not None else _carry_place
-    out = np.empty((6, len(q), len(plan.frames)))
+    out = np.empty((7, len(q), len(plan.frames)))
     for f, (step, place) in enumerate(plan.frames):
-        for row, values in zip(out, carry(states[step + 1], plan.lengths[len(plan.steps) + f]), strict=True):
+        carried = carry(states[step + 1], lengths[len(plan.steps) + f])
+        for row, values in zip(out, carried, strict=False):
             row[:, place] = values  # what is the same for all configurations is one number
-    out[5] += plan.depth + 1
+    out[5], out[6] = plan.depth + 1, plan.tilts
     return Magnitudes(*out)
 
 
+def product(x: FloatArray | float, y: FloatArray | float) -> FloatArray:
+    """`x y` for numbers that are not negative, and no less than `SMALLEST` unless one of them is zero."""
+    xy = np.asarray(np.multiply(x, y))
+    small = xy < SMALLEST
+    if not small.any():
+        return xy
+    return np.where(small & (np.not_equal(x, 0.0) & np.not_equal(y, 0.0)), SMALLEST, xy)
+
+
+def _counted(x: FloatArray) -> FloatArray:
+    """What is not zero counts as `SMALLEST` at least."""
+    return np.where(x == 0.0, 0.0, np.maximum(x, SMALLEST))
+
+
 def _norm(x: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt((x * x).sum(axis=-1)))
+    # hypot neither under- nor overflows where squares would.
+    return _counted(np.hypot.reduce(x, axis=-1))
 
 
 def _carry(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
-    p, w, vel, alpha, acc, angles = state
-    return [p + d, w, vel + w * d, alpha, acc + (alpha + w * w) * d, angles]
+    p, w, vel, alpha, acc = state
+    turning = product(w, d)
+    return [p + d, w, vel + turning, alpha, acc + product(alpha, d) + product(w, turning)]
 
 
 def _carry_place(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
     return [state[0] + d, *state[1:]]
 
 
-def _own(plan: Plan, i: int, q: FloatArray) -> FloatArray:
-    """The size of a single coordinate."""
-    multiplier, constant = plan.geometry[i, Geometry.MULTIPLIER :]
-    own: FloatArray = np.abs(multiplier * q[:, plan.steps[i, Step.Q]]) + abs(constant)
-    return own
-
-
-def _followed(plan: Plan, i: int, angles: FloatArray, q: FloatArray) -> FloatArray:
-    """A follower's angle is itself rounded."""
-    leads = plan.geometry[i, Geometry.MULTIPLIER] == 1.0 and plan.geometry[i, Geometry.CONSTANT] == 0.0
-    return angles if leads else angles + _own(plan, i, q)
-
-
 def _slid(plan: Plan, i: int, q: FloatArray) -> FloatArray:
     """How far a joint slides."""
     kind, at = int(plan.steps[i, Step.KIND]), int(plan.steps[i, Step.Q])
-    return (
-        _own(plan, i, q)
-        if kind == Motion.SLIDE
-        else _norm(q[:, at : at + (2 if kind == Motion.PLANAR else 3)])
-    )
+    if kind != Motion.SLIDE:
+        return _norm(q[:, at : at + (2 if kind == Motion.PLANAR else 3)])
+    multiplier, constant = np.abs(plan.geometry[i, Geometry.MULTIPLIER :])
+    return product(multiplier, np.abs(q[:, at])) + _counted(constant)
 
 
-def _place(plan: Plan, i: int, state: list[FloatArray], q: FloatArray) -> list[FloatArray]:
-    if plan.steps[i, Step.KIND] == Motion.TURN:
-        *state, angles = _carry_place(state, plan.lengths[i])
-        return [*state, _followed(plan, i, angles, q)]
-    return _carry_place(state, plan.lengths[i] + _slid(plan, i, q))
+def _place(plan: Plan, i: int, state: list[FloatArray], length: float, q: FloatArray) -> list[FloatArray]:
+    turns = plan.steps[i, Step.KIND] == Motion.TURN
+    return _carry_place(state, length if turns else length + _slid(plan, i, q))
 
 
 def _step(
-    plan: Plan, i: int, state: list[FloatArray], q: FloatArray, v: FloatArray, a: FloatArray
+    plan: Plan, i: int, state: list[FloatArray], length: float, q: FloatArray, v: FloatArray, a: FloatArray
 ) -> list[FloatArray]:
     kind, rate_at = int(plan.steps[i, Step.KIND]), int(plan.steps[i, Step.V])
+    d = length if kind == Motion.TURN else length + _slid(plan, i, q)
+    p, w, vel, alpha, acc = _carry(state, d)
     if kind in (Motion.TURN, Motion.SLIDE):
-        multiplier = plan.geometry[i, Geometry.MULTIPLIER]
-        rate, rate_2 = np.abs(multiplier * v[:, rate_at]), np.abs(multiplier * a[:, rate_at])
+        multiplier = abs(plan.geometry[i, Geometry.MULTIPLIER])
+        rate, rate_2 = (product(multiplier, np.abs(x[:, rate_at])) for x in (v, a))
         if kind == Motion.TURN:
-            p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i])
-            turned = alpha + rate_2 + rate * (w + rate)
-            return [p, w + rate, vel, turned, acc, _followed(plan, i, angles, q)]
-        p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i] + _slid(plan, i, q))
-        return [p, w, vel + rate, alpha, acc + rate_2 + 2.0 * rate * w, angles]
+            return [p, w + rate, vel, alpha + rate_2 + product(rate, w + rate), acc]
+        return [p, w, vel + rate, alpha, acc + rate_2 + 2.0 * product(rate, w)]
     slides, turns = (2, 1) if kind == Motion.PLANAR else (3, 3)
-    p, w, vel, alpha, acc, angles = _carry(state, plan.lengths[i] + _slid(plan, i, q))
-    u, o = _norm(v[:, rate_at : rate_at + slides]), _norm(v[:, rate_at + slides : rate_at + slides + turns])
-    u_rate = _norm(a[:, rate_at : rate_at + slides])
-    o_rate = _norm(a[:, rate_at + slides : rate_at + slides + turns])
-    return [p, w + o, vel + u, alpha + o_rate + (w + o) * o, acc + u_rate + (2.0 * w + o) * u, angles]
+    (u, o), (u_rate, o_rate) = (
+        (_norm(x[:, rate_at : rate_at + slides]), _norm(x[:, rate_at + slides : rate_at + slides + turns]))
+        for x in (v, a)
+    )
+    turned = alpha + o_rate + product(w + o, o)
+    return [p, w + o, vel + u, turned, acc + u_rate + product(2.0 * w + o, u)]

@@ -176,11 +176,12 @@ def _sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> _Sizes:
     """Everything from the root to either end counts: Pinocchio goes there and back."""
     n = len(samples.q)
     reach, rates, accelerations, joints = np.zeros(n), np.zeros(n), np.zeros(n), 0
-    slides = 0.0
+    slides = tilt = 0.0
     for link in {tree.frame_link(table.base_frame), tree.frame_link(table.tip_frame)}:
         for i in tree.path(link):
             joint = tree.joints[i]
             joints += 1
+            tilt += joint.tilt
             reach += float(np.linalg.norm(joint.T_parent_joint[:3, 3]))
             factor = abs(joint.mimic.multiplier) if joint.mimic else 1.0
             v_at, q_at = tree.v_index[i], tree.q_index[i]
@@ -193,7 +194,10 @@ def _sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> _Sizes:
                 reach += offset + factor * np.abs(samples.q[:, q_at : q_at + joint.kind.nq]).sum(axis=-1)
     # A table in strict rows may be far longer than the robot, and rounds accordingly.
     reach = np.maximum(reach, table.span + float(np.linalg.norm(table.base[:3, 3])))
-    return _Sizes(reach, slides, rates, accelerations, _EPS * (8.0 + 8.0 * (joints + len(table.rows))))
+    # An axis that Pinocchio takes for another turns each factor by twice the tilt (`verification.bounds`), of
+    # which the acceleration seen from the base has four.
+    rounding = _EPS * (8.0 + 8.0 * (joints + len(table.rows))) + 8.0 * tilt
+    return _Sizes(reach, slides, rates, accelerations, rounding)
 
 
 class _Slack:

@@ -11,7 +11,7 @@ import numpy as np
 
 from urdfkin.recursion.compiling import ROWS, SCRATCH, helper, kernel
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import EPS, SMALLEST
+from urdfkin.verification.bounds import EPS, LEAST_UNIT
 
 
 def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
@@ -52,7 +52,7 @@ def _largest(ours, theirs, scale, i):
     for j in range(ours.shape[1]):
         size, difference = scale[i, j], abs(ours[i, j] - theirs[i, j])
         must_be_equal = math.inf if difference > 0.0 else 0.0
-        units = difference / max(EPS * size, SMALLEST) if size > 0.0 else must_be_equal
+        units = difference / max(EPS * size, LEAST_UNIT) if size > 0.0 else must_be_equal
         largest = max(largest, units)
     return largest
 

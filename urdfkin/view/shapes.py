@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
-from xml.etree import ElementTree as ET
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from urdfkin.catalogue import catalogue
+from urdfkin.plain_xml import plain_xml
 from urdfkin.robot import Robot
 from urdfkin.rotation import rotation_from_rpy
 from urdfkin.tree import FloatArray
@@ -52,7 +53,7 @@ def shapes(robot: Robot) -> list[Shape]:
 
     What is malformed about a visual is skipped: it says nothing about motion.
     """
-    root = ET.fromstring(robot.urdf)
+    root = plain_xml(robot.urdf)
     beside = _file_of(robot)
     materials = {m.get("name"): _rgba(m) for m in root.findall("material") if m.find("color") is not None}
     found = []
@@ -76,7 +77,7 @@ def _file_of(robot: Robot) -> Path | None:
 
 def _shape(
     link: str,
-    visual: ET.Element,
+    visual: Element,
     materials: dict[str | None, tuple[float, float, float, float] | None],
     beside: Path | None,
 ) -> Shape | None:
@@ -93,7 +94,7 @@ def _shape(
     return Shape(link, element.tag, size, T, colour, file)
 
 
-def _size(element: ET.Element) -> tuple[float, ...] | None:
+def _size(element: Element) -> tuple[float, ...] | None:
     names = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
     if element.tag == "mesh":
         return _numbers(element.get("scale", "1 1 1"), 3)
@@ -111,7 +112,7 @@ def _numbers(words: str, count: int) -> tuple[float, ...] | None:
     return values if len(values) == count and all(map(math.isfinite, values)) else None
 
 
-def _pose(origin: ET.Element | None) -> FloatArray | None:
+def _pose(origin: Element | None) -> FloatArray | None:
     T = np.eye(4)
     if origin is not None:
         xyz, rpy = (_numbers(origin.get(name, "0 0 0"), 3) for name in ("xyz", "rpy"))
@@ -121,7 +122,7 @@ def _pose(origin: ET.Element | None) -> FloatArray | None:
     return T
 
 
-def _rgba(material: ET.Element) -> tuple[float, float, float, float] | None:
+def _rgba(material: Element) -> tuple[float, float, float, float] | None:
     color = material.find("color")
     values = None if color is None else _numbers(color.get("rgba", ""), 4)
     if values is None:

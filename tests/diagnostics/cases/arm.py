@@ -69,3 +69,5 @@ def fixed(name: str, parent: str, child: str) -> str:
 
 
 SPHERE = '<visual><geometry><sphere radius="1"/></geometry></visual>'
+
+MESH = '<link name="base"><visual><geometry><mesh filename="{}"/></geometry></visual></link>'

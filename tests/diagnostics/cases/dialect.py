@@ -1,6 +1,6 @@
 """Other formats, xacro, versions, elements and attributes."""
 
-from tests.diagnostics.cases.arm import ACCEPT, LIMIT, REJECT, SPHERE, WARN, Case, arm, fixed
+from tests.diagnostics.cases.arm import ACCEPT, LIMIT, MESH, REJECT, SPHERE, WARN, Case, arm, fixed
 
 
 def dialect_cases() -> list[Case]:
@@ -23,6 +23,14 @@ def dialect_cases() -> list[Case]:
             "xacro-expression", arm(robot=xacro, origin='<origin xyz="0 0 ${h}"/>'), REJECT, [("URDF202", 6)]
         ),
         Case("xacro-expression-in-name", arm(base='<link name="${p}base"/>'), REJECT, [("URDF202", 3)]),
+        Case("xacro-expression-in-mesh", arm(base=MESH.format("$(arg side)/a.stl")), WARN, [("URDF202", 3)]),
+        Case("xacro-expression-in-material", arm(more='<material name="${c}"/>'), WARN, [("URDF202", 8)]),
+        Case("xacro-expression-in-robot", arm(robot='name="$(arg name)"'), WARN, [("URDF202", 2)]),
+        Case("xacro-expression-in-leader", arm(follow='<mimic joint="${p}j1"/>'), REJECT, [("URDF202", 7)]),
+        Case("xacro-expressions-both", arm(base=MESH.format("${m}"), axis='<axis xyz="${a}"/>'), REJECT),
+        Case("xacro-macro-in-link", arm(base='<link name="base"><xacro:mass m="1"/></link>'), WARN),
+        Case("xacro-macro-in-joint", arm(inside="<xacro:origin/>"), REJECT, [("URDF202", 6)]),
+        Case("xacro-never-closed", arm(more='<material name="${"/>'), ACCEPT),
         Case("dollar-in-gazebo", arm(more='<gazebo><plugin name="$(arg x)"/></gazebo>'), ACCEPT),
         Case("version-1.1", arm(robot='name="r" version="1.1"'), WARN, [("URDF204", 2)]),
         Case("version-1.2", arm(robot='name="r" version="1.2"'), WARN, [("URDF204", 2)]),

@@ -21,7 +21,8 @@ XACRO = Code(
     "the file holds xacro macros or expressions that were not expanded",
     why="Readers skip elements they do not know, so what a macro would have produced is missing from the"
     " robot in silence. Expand the file first (`xacro robot.urdf.xacro > robot.urdf`), or install the extra"
-    " `urdfkin[xacro]` and pass the .xacro file itself.",
+    " `urdfkin[xacro]` and pass the .xacro file itself. Where kinematics does not look (the file name of a"
+    " mesh, the name of the robot, what stands inside a <link>), the finding is a warning.",
     bad='<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">\n  <link name="base"/>\n'
     '  <xacro:leg prefix="left"/>\n</robot>\n',
     good='<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">\n  <link name="base"/>\n</robot>\n',
@@ -164,4 +165,17 @@ NAMESPACE = Code(
     bad='<robot name="r" xmlns="http://example.org/urdf">\n  <link name="base"/>\n</robot>\n',
     good='<robot name="r">\n  <link name="base"/>\n</robot>\n',
     others="Pinocchio reads it; yourdfpy reads it: a robot without links.",
+)
+
+UNDECLARED_PREFIX = Code(
+    "URDF214",
+    "undeclared-prefix",
+    WARNING,
+    "a prefix that no xmlns declares",
+    why="urdfdom takes <drake:x> for a name like any other. Readers that know namespaces, which most XML"
+    " libraries are, refuse the whole file or repair it by guessing.",
+    bad='<robot name="r">\n  <link name="base"/>\n  <drake:joint name="j"/>\n</robot>\n',
+    good='<robot name="r" xmlns:drake="http://drake.mit.edu">\n  <link name="base"/>\n'
+    '  <drake:joint name="j"/>\n</robot>\n',
+    others="Pinocchio reads it; yourdfpy reads it: a second parser recovers what it can.",
 )

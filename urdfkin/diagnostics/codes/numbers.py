@@ -58,3 +58,16 @@ UNDERFLOW = Code(
     good=_origin('xyz="0 0 1e-4"'),
     others="Pinocchio reads it as zero; yourdfpy reads it as zero.",
 )
+
+NUMBER_TOO_LONG = Code(
+    "URDF305",
+    "number-too-long",
+    ERROR,
+    "a number has more characters than the limit allows",
+    why="The limit is 2,000 characters for each number of an attribute. Seventeen digits tell every double;"
+    " what converts longer ones takes time that grows with the square of their length. It can be raised:"
+    " --max-number, or `Limits` in the library.",
+    bad=_origin(f'xyz="0 0 0.{"3" * 2000}"'),
+    good=_origin('xyz="0 0 0.3333333333333333"'),
+    others="Pinocchio reads it; yourdfpy reads it.",
+)

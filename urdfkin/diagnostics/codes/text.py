@@ -92,12 +92,13 @@ TOO_LARGE = Code(
     "URDF108",
     "too-large",
     ERROR,
-    "the file is larger, deeper or has more elements than the limits allow",
-    why="The limits keep a hostile or broken file from taking all memory. No real robot comes near them;"
-    " each can be raised: --max-bytes, --max-depth, --max-elements, or `Limits` in the library.",
-    bad='<robot name="example">\n  <link name="base"/>\n' + "<a>" * 500 + "</a>" * 500 + "\n</robot>\n",
+    "the file is larger than the limit allows",
+    why="The limit, 100,000,000 bytes, keeps a hostile or broken file from taking all memory and time. No"
+    " real robot comes near it; it can be raised: --max-bytes, or `Limits` in the library. The example is"
+    " checked with a limit of 100 bytes.",
+    bad='<robot name="example">\n  <link name="base"/>\n' + 4 * f"  <!-- {'-+' * 10} -->\n" + "</robot>\n",
     good=_ROBOT,
-    others="Pinocchio refuses it: 500 levels are the most its parser takes; yourdfpy reads it.",
+    others="Pinocchio reads it; yourdfpy reads it.",
 )
 
 DEEP_NESTING = Code(
@@ -106,10 +107,10 @@ DEEP_NESTING = Code(
     WARNING,
     "elements are nested deeper than common readers accept",
     why="The robot can be computed, but programs built on an older libxml2 refuse more than 256 levels, and"
-    " urdfdom refuses more than 500.",
+    " urdfdom refuses more than 498.",
     bad='<robot name="example">\n  <link name="base"/>\n' + "<a>" * 300 + "</a>" * 300 + "\n</robot>\n",
     good=_ROBOT,
-    others="Pinocchio reads it: up to 500 levels; yourdfpy reads it.",
+    others="Pinocchio reads it: up to 498 levels; yourdfpy reads it.",
 )
 
 TOO_DEEP_FOR_ORACLE = Code(
@@ -158,4 +159,70 @@ BYTE_ORDER_MARK = Code(
     bad="\ufeff" + _ROBOT,
     good=_ROBOT,
     others="Pinocchio reads it; yourdfpy reads it.",
+)
+
+TOO_MANY_ELEMENTS = Code(
+    "URDF114",
+    "too-many-elements",
+    ERROR,
+    "there are more elements than the limit allows",
+    why="The limit, 1,000,000 elements, keeps a hostile or broken file from taking all memory: an element of"
+    " a few bytes takes some hundred while it is checked. No real robot comes near it; it can be raised:"
+    " --max-elements, or `Limits` in the library. The example is checked with a limit of 10 elements.",
+    bad='<robot name="example">\n' + "".join(f'  <link name="l{i}"/>\n' for i in range(11)) + "</robot>\n",
+    good=_ROBOT,
+    others="Pinocchio refuses it: its links are not connected; yourdfpy reads it.",
+)
+
+TOO_DEEP = Code(
+    "URDF115",
+    "too-deep",
+    ERROR,
+    "elements are nested deeper than the limit allows",
+    why="The limit, 498 levels, is that of urdfdom's parser. A URDF needs seven; it can be raised:"
+    " --max-depth, or `Limits` in the library, and then nothing can be verified (URDF110).",
+    bad='<robot name="example">\n  <link name="base"/>\n' + "<a>" * 500 + "</a>" * 500 + "\n</robot>\n",
+    good=_ROBOT,
+    others="Pinocchio refuses it: 498 levels are the most its parser takes; yourdfpy reads it.",
+)
+
+TOO_MANY_ATTRIBUTES = Code(
+    "URDF116",
+    "too-many-attributes",
+    ERROR,
+    "an element has more attributes than the limit allows",
+    why="The limit, 200, is far from the seven that an element of URDF has at most. Extensions that need more"
+    " can raise it: --max-attributes, or `Limits` in the library.",
+    bad='<robot name="example">\n  <link name="base"/>\n  <gazebo\n'
+    + "".join(f'    a{i}=""\n' for i in range(201))
+    + "  />\n</robot>\n",
+    good=_ROBOT,
+    others="Pinocchio reads it; yourdfpy reads it.",
+)
+
+NAME_TOO_LONG = Code(
+    "URDF117",
+    "name-too-long",
+    ERROR,
+    "a name is longer than the limit allows",
+    why="The limit, 10,000 characters, holds for names of links, joints, elements and attributes, which are"
+    " compared with others to find the one that was meant. It can be raised: --max-name, or `Limits` in the"
+    " library. From 200 characters on, a name is odd (URDF405).",
+    bad=f'<robot name="example">\n  <link name="{"very_" * 2001}long"/>\n</robot>\n',
+    good='<robot name="example">\n  <link name="long"/>\n</robot>\n',
+    others="Pinocchio reads it; yourdfpy reads it.",
+)
+
+INSTRUCTION = Code(
+    "URDF118",
+    "processing-instruction",
+    WARNING,
+    "a processing instruction after the beginning of the file",
+    why="XML allows <?...?> anywhere. urdfdom's parser takes each for a declaration, which may only stand"
+    " before every element, comment and document type, and refuses the whole file. The robot is computed, but"
+    " Pinocchio cannot read it, so nothing can be verified.",
+    bad='<robot name="example">\n  <link name="base"/>\n  <?editor tab=2?>\n</robot>\n',
+    good="<?editor tab=2?>\n" + _ROBOT,
+    others="Pinocchio refuses it; yourdfpy reads it.",
+    oracle=REFUSES,
 )

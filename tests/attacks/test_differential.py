@@ -1,0 +1,296 @@
+"""What `check` lets pass, Pinocchio reads, and as the same robot; what is said to be refused, it refuses.
+
+Documents are put together from pieces that are odd one by one: each slot is plain mostly, so that many
+documents have no error.
+"""
+
+import random
+from collections.abc import Iterator
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from urdfkin.diagnostics import Finding, Oracle, Severity, check_text
+from urdfkin.tree import JointKind, KinematicTree
+from urdfkin.urdf.reader import read_tree
+
+#: Slot -> what may stand there; the first is plain.
+SLOTS: dict[str, list[str]] = {
+    "head": [
+        '<?xml version="1.0"?>\n',
+        "",
+        "\n \n",
+        "\ufeff",
+        '<?xml version="1.0" encoding="utf-8" standalone="yes"?>',
+        '<?xml version="1.1"?>',
+        '<?xml version="1.0"?>\n<?xml-stylesheet href="a"?>\n<?b?>',
+        "<?a > <robot> ?>",
+        "<!-- a comment > <robot> -->\n",
+        "<!---->",
+        "<!DOCTYPE robot>",
+        "<!DOCTYPE robot ><!-- c -->",
+        "<?a?><!DOCTYPE robot>",
+        '<?xml version="1.0"?><!-- c --><?late?>',
+        "<!DOCTYPE robot><?late?>",
+        "<!-- c --><?late?>\n",
+        "text ",
+        "<![CDATA[text]]>",
+        '<!DOCTYPE robot [<!ENTITY e "1">]>',
+    ],
+    "robot": [
+        'name="r"',
+        "name='r'",
+        'name=""',
+        "",
+        'name="a&amp;b&#x43;"',
+        'name="r" xmlns:d="http://d"',
+        'name="r" xmlns="http://d"',
+        'name="r" d:version="3"',
+        *(f'name="r" version="{v}"' for v in ("1.0", "1.1", "1.2", "01.0", "+1.0", " 1.0", "1.00", "1.02")),
+        *(f'name="r" version="{v}"' for v in ("1.0 ", "1.3", "2.0", "1", "", "1.1.0", "0.9", "1.-1", "1,0")),
+        *(f'name="r" version="{v}"' for v in ("1.0a", "١.٠", "1. 1", "1.+1", "0x1.0", "1e0.0", "&#49;.0")),
+    ],
+    "between": [
+        "",
+        "<!-- <joint/> -->",
+        "<!-- > -->",
+        "text",
+        "&lt;&#x41;",
+        "<![CDATA[ <joint> ]] ]>]]>",
+        "<?late?>",
+        "<gazebo><?late?></gazebo>",
+        "<d:x/>",
+        "<d:joint d:name='a'><d:parent/></d:joint>",
+        '<gazebo reference="b"><joint name="j" type="x"/><link/></gazebo>',
+        '<transmission name="t"><joint name="j"><x/></joint></transmission>',
+        "<unknown/>",
+        "<Ünknown Ä='1'/>",
+        "<x.y-z_0/>",
+        '<material name="m"/>',
+        '<material name="m"><color rgba="1 0 0 1"/></material>',
+        '<material name="m"><color rgba="x"/></material>',
+        '<material name="m"><texture/></material>',
+        "<material/>",
+        '<material name="m"/><material name="m"/>',
+        "<a>" * 400 + "</a>" * 400,
+        "<a>" * 497 + "</a>" * 497,
+        "<a>" * 498 + "</a>" * 498,
+        "<robot/>",
+        '<group><link name="q"/></group>',
+    ],
+    "link": [
+        "",
+        "<visual/>",
+        '<visual><origin xyz="x"/><geometry><sphere radius="1"/></geometry></visual>',
+        '<visual name="v"><geometry><box size="1 1"/></geometry></visual>',
+        '<visual><geometry><mesh filename="$(arg a).stl" scale="1"/></geometry></visual>',
+        "<visual><geometry/></visual><visual><geometry><cone/></geometry></visual>",
+        '<visual><geometry><capsule radius="1" length="1"/></geometry><material name="n"/></visual>',
+        '<collision><geometry><cylinder radius="x" length=""/></geometry></collision>',
+        '<inertial><mass value="-1"/></inertial>',
+        '<inertial><origin rpy="1 2"/><mass value="1 "/><inertia ixx="x"/></inertial>',
+        "<inertial/>",
+        "<inertial>text<?late?></inertial>",
+        "<origin xyz='x'/>",
+    ],
+    "kind": ["revolute", "continuous", "prismatic", "fixed", "planar", "floating", "Revolute", "screw", ""],
+    "name": [
+        "j",
+        "j k",
+        " j ",
+        "ä",
+        "&#x6a;",
+        "j&#10;",
+        "link",
+        "b",
+        "<",
+        "j&quot;",
+        "root_joint",
+        "universe",
+    ],
+    "ends": [
+        '<parent link="a"/><child link="b"/>',
+        '<child link="b" x="1"/><!-- c --><parent link="a"></parent>',
+        '<parent link="a"/><parent link="q"/><child link="b"/>',
+        '<parent link="a "/><child link="b"/>',
+        '<parent link="&#97;"/><child link="b"/>',
+    ],
+    "origin": [
+        '<origin xyz="1 2 3" rpy="0.1 0.2 0.3"/>',
+        "",
+        "<origin/>",
+        '<origin xyz="1 2 3"/>',
+        "<origin rpy='0.1 0.2 0.3'></origin>",
+        '<origin xyz=""/>',
+        '<origin rpy=""/>',
+        '<origin xyz=" 1  2 3 "/>',
+        '<origin xyz="1\t2 3"/>',
+        '<origin xyz="1\n2 3"/>',
+        '<origin xyz="1&#32;2&#x20;3"/>',
+        '<origin xyz="1&#9;2 3"/>',
+        '<origin xyz="&#49; 2 3"/>',
+        '<origin xyz="+1. .5e0 -0"/>',
+        '<origin xyz="1e400 0 0"/>',
+        '<origin xyz="1e-400 4e-320 0"/>',
+        '<origin xyz="0x1 0 0"/>',
+        '<origin xyz="nan inf 0"/>',
+        '<origin xyz="1,0 0 0"/>',
+        f'<origin xyz="0.{"3" * 500} 0 0"/>',
+        f'<origin xyz="{"1" * 3000} 0 0"/>',
+        '<origin xyz="1 2 3">text</origin>',
+        "<origin>1 2 3</origin>",
+        '<origin quat_xyzw="0 0 0.6 0.8"/>',
+        '<origin quat_xyzw="0 0 0 1" rpy="0 0 1"/>',
+        '<origin xyz="1 2 3"/><origin xyz="3 2 1"/>',
+        '<origin xyz="1 2 3" rpyy="1 1 1"/>',
+    ],
+    "axis": [
+        '<axis xyz="0 0.6 0.8"/>',
+        "",
+        "<axis/>",
+        "<axis>0 0 1</axis>",
+        "<axis><!-- 0 0 1 --></axis>",
+        '<axis a="1"/>',
+        '<axis xyz=""/>',
+        '<axis xyz="0 0 0"/>',
+        '<axis xyz="0 0 2"/>',
+        '<axis xyz="0 0 1e-9"/>',
+        '<axis xyz="0 0 1e200"/>',
+        '<axis xyz="0 0"/>',
+        '<axis xyz="x"/>',
+        '<axis xyz="0 0 1 "/>',
+        '<axis xyz="0 0 1"/><axis xyz="1 0 0"/>',
+    ],
+    "limit": [
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/>',
+        "",
+        "<limit/>",
+        '<limit effort="1" velocity="1"/>',
+        '<limit lower="-1" upper="1"/>',
+        '<limit lower="1" upper="-1" effort="1" velocity="1"/>',
+        '<limit lower="-1" upper="1" effort="-1" velocity="1"/>',
+        '<limit lower="-1 " upper="1" effort="1" velocity="1"/>',
+        '<limit lower=" -1" upper="1" effort="1" velocity="1"/>',
+        '<limit lower="" upper="1" effort="1" velocity="1"/>',
+        '<limit lower="-1" upper="1" effort="1" velocity="0"/>',
+        '<limit lower="-1" upper="1" effort="1" velocity="1" acceleration="x"/>',
+        '<limit lower="-1" upper="1" effort="1" velocity="1" acceleration="1" jerk="1"/>',
+        '<limit lower="-1" upper="1" effort="1e400" velocity="1"/>',
+    ],
+    "others": [
+        "",
+        "<dynamics/>",
+        '<dynamics damping="0"/>',
+        '<dynamics friction="x"/>',
+        '<dynamics damping="1 "/>',
+        '<dynamics damping=""/>',
+        "<calibration/>",
+        '<calibration rising="x"/>',
+        '<calibration reference_position="x" falling=" 1"/>',
+        "<safety_controller/>",
+        '<safety_controller k_velocity="1"/>',
+        '<safety_controller k_velocity="1" k_position="x"/>',
+        '<safety_controller k_velocity=""/>',
+        "<unknown><parent link='q'/></unknown>",
+        "text",
+        '<mimic joint="j"/>',
+        '<mimic multiplier="x"/>',
+        "<![CDATA[<axis/>]]>",
+    ],
+    "tail": ["\n", "", "<!-- the end -->", "<?late?>", "text", "\0", "<robot/>", " \n\t"],
+}
+
+PLAIN = 0.8
+
+
+def assembled(part: dict[str, str]) -> bytes:
+    joint = f"{part['origin']}{part['ends']}{part['axis']}{part['limit']}{part['others']}"
+    return (
+        f"{part['head']}<robot {part['robot']}>{part['between']}"
+        f'<link name="a">{part["link"]}</link><link name="b"/>'
+        f'<joint name="{part["name"]}" type="{part["kind"]}">{joint}</joint>'
+        f"</robot>{part['tail']}"
+    ).encode()
+
+
+def some_odd_pieces(choose: random.Random) -> bytes:
+    return assembled(
+        {
+            slot: pieces[0] if choose.random() < PLAIN else choose.choice(pieces)
+            for slot, pieces in SLOTS.items()
+        }
+    )
+
+
+def every_odd_piece() -> Iterator[bytes]:
+    """Each piece alone among plain ones, for each kind of joint and each version that counts."""
+    plain = {slot: pieces[0] for slot, pieces in SLOTS.items()}
+    for kind in SLOTS["kind"][:6]:
+        for version in ("", ' version="1.1"', ' version="1.2"'):
+            for slot, pieces in SLOTS.items():
+                for piece in pieces:
+                    yield assembled({**plain, "kind": kind, "robot": f'name="r"{version}', slot: piece})
+
+
+def judged(data: bytes) -> None:
+    findings = check_text(data, fold=False)
+    if any(finding.severity is Severity.ERROR for finding in findings):
+        return
+    marks = {finding.oracle for finding in findings} - {None}
+    model = read_by_pinocchio(data)
+    if Oracle.REFUSES in marks:
+        assert model is None, (data, said(findings))
+        return
+    assert model is not None, (data, said(findings))
+    if not marks:
+        assert_same(read_tree(data), model, data)
+
+
+def said(findings: tuple[Finding, ...]) -> list[str]:
+    return [str(finding) for finding in findings]
+
+
+def read_by_pinocchio(data: bytes) -> pin.Model | None:
+    try:
+        return pin.buildModelFromXML(data.decode("utf-8-sig"))
+    except (ValueError, RuntimeError):
+        return None
+
+
+NV = {JointKind.FIXED: 0, JointKind.PLANAR: 3, JointKind.FLOATING: 6}
+
+
+def assert_same(tree: KinematicTree, model: pin.Model, data: bytes) -> None:
+    """Names, kinds, places, axes and limits."""
+    (joint,) = tree.joints
+    assert model.name == tree.name, data
+    assert model.nv == NV.get(joint.kind, 1), data
+    assert {frame.name for frame in model.frames} == {"universe", *tree.links, joint.name}, data
+    pin_data = model.createData()
+    pin.framesForwardKinematics(model, pin_data, pin.neutral(model))
+    place = pin_data.oMf[model.getFrameId(tree.links[1], pin.FrameType.BODY)].homogeneous
+    np.testing.assert_allclose(place, joint.T_parent_joint, rtol=1e-14, atol=1e-14, err_msg=repr(data))
+    if joint.kind.has_axis:
+        frame = model.getFrameId(tree.links[1], pin.FrameType.BODY)
+        J = pin.computeFrameJacobian(model, pin_data, pin.neutral(model), frame, pin.LOCAL).reshape(6)
+        moved = J[:3] if joint.kind is JointKind.PRISMATIC else J[3:]
+        np.testing.assert_allclose(moved, joint.axis, rtol=1e-14, atol=1e-14, err_msg=repr(data))
+    if joint.kind in (JointKind.REVOLUTE, JointKind.PRISMATIC):
+        assert joint.limit is not None
+        read = (model.lowerPositionLimit[0], model.upperPositionLimit[0])
+        assert read == (joint.limit.lower, joint.limit.upper), data
+
+
+@pytest.mark.slow
+def test_each_odd_piece_alone_is_read_by_both_or_told() -> None:
+    for data in every_odd_piece():
+        judged(data)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_odd_pieces_together_are_read_by_both_or_told(seed: int) -> None:
+    choose = random.Random(seed)
+    for _ in range(500):
+        judged(some_odd_pieces(choose))

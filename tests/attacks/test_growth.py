@@ -1,0 +1,218 @@
+"""Time and memory of a check grow with the file and no faster, whatever the file is made of."""
+
+import re
+import signal
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+
+import urdfkin
+from scripts.growing.kinds import KINDS
+from tests.diagnostics.cases.arm import arm
+from urdfkin.diagnostics import Finding, Severity, UrdfError, check_text
+from urdfkin.diagnostics.document import parse
+from urdfkin.diagnostics.reporter import ERRORS_SHOWN, WRITTEN_OUT, Reporter
+from urdfkin.followers import with_rules_of_text
+from urdfkin.nearest import nearest
+from urdfkin.urdf.reader import read_tree
+
+#: Four times the size takes four times the time; sixteen times would be the square. Between them, and in
+#: seconds, there is room for a busy machine.
+TIMES, MORE, ENOUGH = 10.0, 0.3, 30.0
+
+
+@contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    """End what takes more processor time than that, so that the square of something does not hang the run."""
+
+    def end(*_: object) -> None:
+        raise AssertionError(f"more than {seconds:g} s of processor time")
+
+    before = signal.signal(signal.SIGVTALRM, end)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
+
+
+def grows_like_its_size(work: Callable[[int], object], size: int) -> None:
+    def seconds(of: int) -> float:
+        start = time.process_time()
+        work(of)
+        return time.process_time() - start
+
+    with at_most(ENOUGH):
+        small = min(seconds(size) for _ in range(2))
+        large = min(seconds(4 * size) for _ in range(2))
+    assert large < TIMES * small + MORE, (small, large)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_document_four_times_as_long_takes_about_four_times_the_time(kind: str) -> None:
+    documents = {size: KINDS[kind](size) for size in (100_000, 400_000)}
+    grows_like_its_size(lambda size: check_text(documents[size], fold=False), 100_000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_document_four_times_as_long_takes_about_four_times_the_memory(kind: str) -> None:
+    def megabytes(size: int) -> float:
+        document = KINDS[kind](size)
+        tracemalloc.start()
+        try:
+            check_text(document, fold=False)
+            return tracemalloc.get_traced_memory()[1] / 1e6
+        finally:
+            tracemalloc.stop()
+
+    with at_most(ENOUGH):
+        assert megabytes(100_000) < 6.0 * megabytes(25_000) + 1.0
+
+
+@pytest.mark.slow
+def test_a_chain_of_followers_is_read_in_linear_time_both_times() -> None:
+    documents = {size: KINDS["a chain of followers"](size) for size in (100_000, 400_000)}
+
+    def read(size: int) -> None:
+        tree = read_tree(documents[size])
+        assert with_rules_of_text(tree, documents[size].decode()).joints[-1].mimic == tree.joints[-1].mimic
+
+    grows_like_its_size(read, 100_000)
+
+
+def test_a_chain_of_followers_is_multiplied_out() -> None:
+    rules = [('<mimic joint="j0" multiplier="2" offset="3"/>', 0), ('<mimic joint="j1" multiplier="5"/>', 1)]
+    joint = (
+        '<joint name="j{i}" type="continuous"><parent link="l{i}"/><child link="l{c}"/>'
+        '<axis xyz="0 0 1"/>{rule}</joint>'
+    )
+    rows = [joint.format(i=i, c=i + 1, rule=rule) for i, rule in enumerate(["", *(r for r, _ in rules)])]
+    links = "".join(f'<link name="l{i}"/>' for i in range(4))
+    text = f'<robot name="r">{links}{"".join(reversed(rows))}</robot>'
+    tree = read_tree(text.encode())
+    for read in (tree, with_rules_of_text(tree, text)):
+        mimic = read.joints[2].mimic
+        assert mimic is not None
+        assert (mimic.leader, mimic.multiplier, mimic.offset) == ("j0", 10.0, 15.0)
+
+
+def test_of_a_text_only_the_beginning_is_kept() -> None:
+    root = parse(Reporter("f"), b"<robot>" + b"some &lt; words " * 10_000 + b"</robot>")
+    assert root is not None
+    assert root.text.startswith("some < words some")
+    assert len(root.text) < 1_000
+
+
+def test_a_text_that_begins_with_many_blanks_is_not_lost() -> None:
+    (finding,) = check_text(arm(more=" \n" * 5_000 + "hello").encode())
+    assert (finding.code, finding.found) == ("URDF212", '"hello"')
+
+
+def test_a_number_written_by_references_of_thousands_of_digits_is_told_and_does_not_crash() -> None:
+    codes = {size: codes_of(f'xyz="&#{"0" * size}49; 0 0"') for size in (10, 3_000, 10_000)}
+    assert codes == {10: set(), 3_000: set(), 10_000: {"URDF305"}}
+
+
+def codes_of(origin: str) -> set[str]:
+    return {finding.code for finding in urdfkin.check(arm(origin=f"<origin {origin}/>"))}
+
+
+@pytest.mark.parametrize(
+    ("origin", "code"),
+    [
+        (f'xyz="{"1" * 200_000}e+ 0 0"', "URDF305"),
+        (f'xyz="{"1" * 1_998}e+ 0 0"', "URDF301"),
+        (f'xyz="0.{"1" * 1_998} 0 0"', None),
+        (f'xyz="0.{"1" * 1_999} 0 0"', "URDF305"),
+        (f'xyz="{"1 " * 100_000}"', "URDF305"),
+    ],
+)
+def test_a_number_longer_than_any_number_is_refused_as_such(origin: str, code: str | None) -> None:
+    with at_most(ENOUGH):
+        assert codes_of(origin) == ({code} if code else set())
+
+
+MANY = 3 * WRITTEN_OUT
+DOUBLES = "<robot name='r'>" + "<link name='a'/>\n" * MANY + "</robot>"
+
+
+def told(findings: list[Finding], code: str) -> int:
+    return sum(finding.count for finding in findings if finding.code == code)
+
+
+@pytest.mark.slow
+def test_errors_of_one_kind_are_summed_up_and_none_is_lost() -> None:
+    findings = urdfkin.check(DOUBLES, fold=True)
+    assert len(findings) == ERRORS_SHOWN
+    assert told(findings, "URDF402") == MANY - 1
+    last = str(findings[-1])
+    assert f"(also on lines 102, 103, 104, 105 and {MANY - 105} more)" in last
+    assert sum(len(str(finding)) for finding in findings) < 50_000
+
+
+@pytest.mark.slow
+def test_without_folding_findings_are_complete_up_to_the_stated_number_and_the_rest_by_line() -> None:
+    findings = urdfkin.check(DOUBLES)
+    assert len(findings) == WRITTEN_OUT
+    assert [finding.line for finding in findings] == list(range(2, WRITTEN_OUT + 2))
+    assert findings[-1].also == tuple(range(WRITTEN_OUT + 2, MANY + 1))
+
+
+@pytest.mark.slow
+def test_the_message_of_a_refused_robot_stays_short_and_counts_everything() -> None:
+    with pytest.raises(UrdfError) as refused:
+        urdfkin.load(DOUBLES)
+    message = str(refused.value)
+    assert message.startswith(f"<text>: the URDF has {MANY - 1} errors")
+    assert f"... and {MANY - 6} more" in message
+    assert len(message) < 2_000
+
+
+def test_errors_of_another_kind_are_not_hidden_by_many_of_one() -> None:
+    findings = urdfkin.check(DOUBLES.replace("</robot>", "<joint name='j' type='x'/></robot>"), fold=True)
+    assert {"URDF402", "URDF501", "URDF210"} <= {finding.code for finding in findings}
+
+
+def test_many_on_one_line_are_counted_too() -> None:
+    text = "<robot name='r'>" + "<link name='a'/>" * 150 + "</robot>"
+    findings = urdfkin.check(text, fold=True)
+    assert told(findings, "URDF402") == 149
+    assert "(49 more on this line)" in str(findings[-1])
+
+
+def test_a_warning_speaks_for_those_on_its_own_line() -> None:
+    (finding,) = urdfkin.check(arm(more="<a/><b/><c/><d/>\n<e/>"), fold=True)
+    assert (finding.count, finding.severity) == (5, Severity.WARNING)
+    assert "(4 more on this line and line 9)" in str(finding)
+
+
+def test_an_attribute_among_many_is_found_on_its_line_and_column() -> None:
+    attributes = "".join(f'\n  a{i}="ä" b{i}="1"' for i in range(50))
+    findings = urdfkin.check(f'<robot name="r"><link name="l"{attributes}/></robot>')
+    assert [(f.line, f.column) for f in findings] == [
+        place for i in range(50) for place in ((i + 2, 3), (i + 2, 9 + len(str(i))))
+    ]
+
+
+def test_who_is_nearest_is_found_without_comparing_for_ever() -> None:
+    known = ["ab" * 30 + str(i) for i in range(100_000)]
+    with at_most(ENOUGH):
+        assert len(nearest("ba" * 30, known)) == 3
+    assert nearest("elbwo", ["shoulder", "elbow", "wrist"]) == ["elbow"]
+
+
+def test_limits_are_kept_before_anything_else_reads_the_file() -> None:
+    for text, code in (
+        (arm(origin=f'<origin xyz="{"1" * 200_000} 0 0"/>'), "URDF305"),
+        (arm(base=f'<link name="{"n" * 20_000}"/>'), "URDF117"),
+        (arm(more="<gazebo " + " ".join(f'a{i}=""' for i in range(201)) + "/>"), "URDF116"),
+        (arm(more="<a>" * 600 + "</a>" * 600), "URDF115"),
+    ):
+        with pytest.raises(UrdfError, match=re.escape(code)):
+            urdfkin.load(text)

@@ -1,0 +1,51 @@
+"""The judge reads a rotation as URDF 1.1 may write it: its true errors are those of the same robot."""
+
+import numpy as np
+import pytest
+
+import urdfkin
+from urdfkin.judge import judge
+from urdfkin.judge.decimals import read_exact
+from urdfkin.judge.vectors import mp
+
+pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+
+
+def text(origins: list[str], version: str) -> str:
+    """A chain whose joints have these origins."""
+    joints = "".join(
+        f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'
+        f'<child link="l{i + 1}"/><origin xyz="0.3 0.2 0.1" {origin}/><axis xyz="0 1 0"/></joint>'
+        for i, origin in enumerate(origins)
+    )
+    return f'<robot name="r" {version}><link name="l0"/>{joints}</robot>'
+
+
+def quaternions(scale: float) -> list[str]:
+    rng = np.random.default_rng(4)
+    written = (" ".join(f"{x:.9g}" for x in scale * rng.normal(size=4)) for _ in range(5))
+    return [f'quat_xyzw="{words}"' for words in written]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-9, 3e20])
+@pytest.mark.parametrize("version", ["1.1", "1.2"])
+def test_true_errors_of_robots_with_quaternions_are_rounding(version: str, scale: float) -> None:
+    robot = urdfkin.load(text(quaternions(scale), f'version="{version}"'))
+    for line in judge(robot, samples=3).lines:
+        assert line.urdfkin.worst < 24.0
+        assert line.pinocchio.worst < 24.0
+
+
+@pytest.mark.parametrize("version", ["", 'version="1.0"'])
+def test_in_files_without_them_they_are_ignored_as_they_are_by_the_two_that_are_judged(version: str) -> None:
+    robot = urdfkin.load(text(['rpy="0.1 0.2 0.3" quat_xyzw="0 0 0.6 0.8"'], version))
+    for line in judge(robot, samples=3).lines:
+        assert line.urdfkin.worst < 10.0
+        assert line.pinocchio.worst < 10.0
+
+
+def test_its_decimals_are_read_as_they_are_written() -> None:
+    robot = urdfkin.load(text(['quat_xyzw="0 0 0.6 0.8"'], 'version="1.1"'))
+    R = read_exact(robot.urdf, robot.tree)[0].R
+    assert abs(R[0][0] - mp.mpf("0.28")) < mp.mpf("1e-49")
+    assert abs(R[1][0] - mp.mpf("0.96")) < mp.mpf("1e-49")

@@ -1,0 +1,109 @@
+"""A prefix that nobody declared is legal for urdfdom, so the robot is computed, checked and told about it."""
+
+import warnings
+import xml.etree.ElementTree as Xml
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import urdfkin
+from tests.diagnostics.cases.arm import arm
+from urdfkin.diagnostics import Finding, Severity
+from urdfkin.judge import judge
+from urdfkin.robot import Robot
+from urdfkin.view.shapes import shapes
+
+UNDECLARED = "URDF214"
+FOLLOWS = '<mimic joint="j1" multiplier="-2" offset="0.1"/>'
+SPHERE = '<link name="base"><visual><geometry><sphere radius="1"/></geometry></visual></link>'
+
+
+def load(text: str) -> Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(text)
+
+
+def told(text: str) -> list[Finding]:
+    return [finding for finding in urdfkin.check(text) if finding.code == UNDECLARED]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("more", ["<drake:x/>", '<gazebo drake:a="1"/>'])
+def test_a_follower_beside_an_undeclared_prefix_is_verified(more: str) -> None:
+    robot = load(arm(follow=FOLLOWS, more=more))
+    T = robot.placement([0.3], "tool")
+    assert robot.certificate().verified
+    assert (load(arm(follow=FOLLOWS)).placement([0.3], "tool") == T).all()
+
+
+@pytest.mark.slow
+def test_the_judge_reads_a_file_with_an_undeclared_prefix() -> None:
+    with_prefix, without = (judge(load(arm(follow=FOLLOWS, more=more)), samples=2) for more in ("<d:x/>", ""))
+    assert with_prefix.lines[0] == without.lines[0]
+
+
+def test_the_viewer_finds_the_shapes_of_a_file_with_an_undeclared_prefix() -> None:
+    (shape,) = shapes(load(arm(base=SPHERE, more="<drake:x/>")))
+    assert (shape.link, shape.kind) == ("base", "sphere")
+
+
+def test_each_undeclared_prefix_is_told_once_with_its_first_place_and_how_often_it_stands() -> None:
+    more = '<a:x/><b:x/>\n  <a:y/><gazebo c:u="1" xmlns:d="http://d"/><d:z/>'
+    found = told(arm(more=more))
+    assert [(f.line, f.column, f.severity) for f in found] == [
+        (8, 3, Severity.WARNING),
+        (8, 9, Severity.WARNING),
+        (9, 17, Severity.WARNING),
+        (9, 45, Severity.WARNING),
+    ]
+    assert [f.found for f in found] == ['"<a:x>" and 1 more', '"<b:x>"', '"c:u"', '"<d:z>"']
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        '<d:x xmlns:d="http://d"/>',
+        '<gazebo xmlns:d="http://d"><d:x d:y="1"/></gazebo>',
+        '<gazebo xml:lang="en"/>',
+        "<gazebo>a:b</gazebo>",
+        '<gazebo a="b:c"/>',
+    ],
+)
+def test_a_prefix_that_is_declared_is_not_told(more: str) -> None:
+    assert told(arm(more=more)) == []
+
+
+def test_what_is_left_of_xacro_is_told_as_xacro_alone() -> None:
+    found = urdfkin.check(arm(more='<xacro:leg prefix="left"/>'))
+    assert [finding.code for finding in found if finding.severity is not Severity.NOTE] == ["URDF202"]
+
+
+PARTS = [
+    '<gazebo xmlns:a="http://a">',
+    '<gazebo xmlns:b="http://b" a:u="1">',
+    "<a:x>",
+    "<b:x>",
+    '<x b:u="1">',
+]
+
+
+def _nested(parts: list[str]) -> str:
+    """Some of the parts in one another, the others behind one another."""
+    if not parts:
+        return ""
+    tag = parts[0][1:-1].split(" ")[0]
+    cut = len(parts) // 2
+    return f"{parts[0]}{_nested(parts[1 : cut + 1])}</{tag}>{_nested(parts[cut + 1 :])}"
+
+
+@given(st.lists(st.sampled_from(PARTS), max_size=7))
+def test_it_is_told_whenever_readers_that_know_namespaces_refuse(parts: list[str]) -> None:
+    text = f'<robot name="r"><link name="base"/>{_nested(parts)}</robot>'
+    try:
+        Xml.fromstring(text)
+        refused = False
+    except Xml.ParseError:
+        refused = True
+    assert bool(told(text)) == refused
