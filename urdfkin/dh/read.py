@@ -12,7 +12,8 @@ from typing import Any
 
 from urdfkin.dh.rows import table_from_mapping
 from urdfkin.dh.table import DHTable
-from urdfkin.errors import InputError, SourceError, UrdfkinError
+from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.files import read_text
 
 
 def read_table(path: str | os.PathLike[str]) -> DHTable:
@@ -22,7 +23,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
         SourceError: the file cannot be read.
         InputError: another ending, broken syntax, or anything `table_from_mapping` rejects, with the file.
     """
-    return table_from_text(_text(Path(path)), Path(path).suffix.lower(), where=str(path))
+    return table_from_text(read_text(Path(path)), Path(path).suffix.lower(), where=str(path))
 
 
 def table_from_text(text: str, suffix: str, where: str = "table") -> DHTable:
@@ -53,13 +54,6 @@ def mapping_from_text(text: str, suffix: str, where: str) -> Mapping[str, Any]:
             "a table is a mapping with convention and rows", where=where, found=type(data).__name__
         )
     return data
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise SourceError("cannot read the table", where=str(path), found=str(error)) from None
 
 
 def _from_csv(text: str) -> dict[str, Any]:
