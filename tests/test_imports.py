@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).parent.parent / "urdfkin"
 #: Every part of the package, in the order in which they may build on one another: a module imports what
 #: stands in its own row or above it. Imports inside functions count; those for types alone do not.
 LAYERS = (
-    ("errors", "nearest", "numerals"),
+    ("errors", "nearest", "numerals", "frame_names"),
     ("demands", "forking"),
     ("files", "rotation", "motion", "equations", "resources", "keeping", "sealed", "figure", "plain_xml"),
     ("columns",),
@@ -24,8 +24,8 @@ LAYERS = (
     ("diagnostics", "urdf"),
     ("dh",),
     ("catalogue", "sources", "origin", "deep_stack"),
-    ("oracle", "verification"),
-    ("checks", "call", "prepared", "manipulator", "tables", "robot"),
+    ("oracle_frames", "oracle_layout", "oracle_base", "oracle", "verification"),
+    ("asked", "checks", "call", "prepared", "manipulator", "tables", "robot"),
     ("loading", "from_table", "checking", "description", "unwrapping", "trajectory", "frame_motion"),
     ("judge", "validation"),
     ("plot", "report", "view"),

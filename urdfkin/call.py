@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.checks import Part, held_against
+from urdfkin.asked import Question
+from urdfkin.checks import Part, axes_of, held_against
+from urdfkin.demands import words
 from urdfkin.errors import InputError, NotFiniteError, RangeError
 from urdfkin.recursion.base import STILL_STATE, BaseMotion
 from urdfkin.recursion.plan import IntArray
@@ -43,22 +44,26 @@ class NotVerifiedWarning(UserWarning):
     """Results are handed out that Pinocchio could not check; the message says why."""
 
 
+def _every_link(robot: Robot) -> tuple[str, ...]:
+    return tuple(robot.tree.frame_name(link) for link in range(len(robot.tree.links)))
+
+
 class Call:
     """One call's inputs as flat batches, and the way back to the caller's shape.
 
     Args:
-        robot: The robot.
-        frames: Names of links or joints.
-        reference: For all but placements.
-        base: How the base moves; None if it stands still.
-        inputs: q, v and a, as many as the call takes.
+        robot: Who is asked.
+        frames: Names; None means every link.
+        reference: A member or its name.
+        base: How the root link moves; None if it stands still.
+        inputs: q, v and a, as far as the quantity needs them.
         options: What else the call was given, by the method's names for it.
     """
 
     def __init__(
         self,
         robot: Robot,
-        frames: Sequence[str],
+        frames: Sequence[str] | None,
         reference: Reference | str,
         base: BaseMotion | None,
         *inputs: ArrayLike,
@@ -66,7 +71,11 @@ class Call:
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
             raise InputError("base is a BaseMotion or None", found=type(base).__name__)
-        self.robot, self.frames, self.base = robot, tuple(frames), base
+        self.robot, self.base = robot, base
+        self.frames = _every_link(robot) if frames is None else words(frames, "frames")
+        self.question = Question(
+            robot.tree.link_frames if frames is None else frames, reference, base, inputs
+        )
         self.reference = Reference.of(reference)
         self.links = tuple(robot.tree.frame_link(frame) for frame in self.frames)
         self.plan = robot.plan(self.links)
@@ -101,19 +110,6 @@ class Call:
         """How many results the call hands out."""
         return self.n * len(self.links)
 
-    @cached_property
-    def flat_base(self) -> BaseMotion | None:
-        """The base with one flat batch axis, for the oracle."""
-        if self.base is None or not self.base.batch_shape:
-            return self.base
-        fields = (self.base.placement, 2), (self.base.velocity, 1), (self.base.acceleration, 1)
-        return BaseMotion(
-            *(
-                np.broadcast_to(x, (*self.shape, *x.shape[-own:])).reshape(self.n, *x.shape[-own:])
-                for x, own in fields
-            )
-        )
-
     def flat(self, out: FloatArray | None, *own: int, every: bool = False) -> FloatArray | None:
         """`out`, for one frame or for every one, as the kernels write it: (n, frames, ...)."""
         if out is None:
@@ -125,7 +121,7 @@ class Call:
                 f"out must be a writable C-contiguous float64 array of shape {wanted}",
                 found=f"{getattr(out, 'dtype', type(out).__name__)} {getattr(out, 'shape', '')}",
             )
-        if any(np.may_share_memory(out, array) for array in (self.q, *self.rates)):
+        if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a: they are read again for the check")
         return out.reshape(self.n, len(self.links), *own)
 
@@ -150,8 +146,13 @@ class Call:
         """Which results are to be checked; None leaves it to the robot."""
         return checked_choice(self.robot.verify if verify is None else verify)
 
-    def verify(self, quantity: Quantity, results: FloatArray, verify: Verify | None) -> None:
-        """Have (n, frames, ...) results checked and entered in the ledger, or raise VerificationError."""
+    def verify(self, quantity: Quantity, handed_out: FloatArray, verify: Verify | None) -> None:
+        """Have results checked, in the shape in which the user gets them, and entered in the ledger.
+
+        Raises:
+            VerificationError: Pinocchio computes something else.
+            OracleError: they have another shape than what was asked.
+        """
         robot, ledger, wanted = self.robot, self.robot.ledger, self.wanted(verify)
         if wanted is False:
             ledger.unchecked(quantity, self.results)
@@ -160,6 +161,7 @@ class Call:
             warnings.warn(f"not verified: {reason}", NotVerifiedWarning, stacklevel=3)
             ledger.unchecked(quantity, self.results, reason)
             return
+        results = self.question.flat(handed_out, axes_of(quantity))
         total, worst = Comparison.of_nothing(), None
         for part in parts(wanted, self.n, results[:1].size):
             comparison, failure = self._compare(quantity, results[part], part)
@@ -174,13 +176,11 @@ class Call:
 
     def part(self, part: slice | IntArray) -> Part:
         """Some of its configurations, for the check."""
-        base = self.flat_base
-        if base is not None and base.batch_shape:
-            base = BaseMotion(base.placement[part], base.velocity[part], base.acceleration[part])
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
         representation = str(self.options.get("representation", ""))
-        return Part(self.plan, self.frames, self.reference, self.q[part], rates, base, state, representation)
+        asked = self.question.rows(part)
+        return Part(self.plan, self.reference, self.q[part], rates, state, asked, representation)
 
     def _compare(
         self, quantity: Quantity, ours: FloatArray, part: slice | IntArray
@@ -225,9 +225,7 @@ class Call:
         options = self.options if reference is None else {"reference": reference, **self.options}
         # The command line has no words for a moving base, and none for the rest.
         words = [*map(repr, values.values()), repr(frame), *(f"{x}={y!r}" for x, y in options.items())]
-        if self.base is not None:
-            base = self.flat_base or self.base
-            fields = ((base.placement, 2), (base.velocity, 1), (base.acceleration, 1))
-            motion = (repr((x if x.ndim == own else x[k]).tolist()) for x, own in fields)
-            words.append(f"base=urdfkin.BaseMotion({', '.join(motion)})")
+        if (asked := self.question.rows(np.array([k])).base) is not None:
+            fields = asked.placement, asked.velocity, asked.acceleration
+            words.append(f"base=urdfkin.BaseMotion({', '.join(repr(x[0].tolist()) for x in fields)})")
         return f"{self.robot.origin.python}.{str(quantity).replace(' ', '_')}({', '.join(words)})"

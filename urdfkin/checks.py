@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from urdfkin.asked import Rows
 from urdfkin.oracle import Oracle
-from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.plan import Plan
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
@@ -29,42 +29,47 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
 
 class Part(NamedTuple):
-    """Some configurations of a call.
+    """Some configurations of a call, as urdfkin sees them and as the user asked for them.
 
     Attributes:
         plan: The walk.
-        frames: Names, in the order of the results.
         reference: For all but placements.
         q: (n, nq).
         rates: (n, nv) v, and a, as far as the call was given them.
-        base: How the base moves, with one batch axis or none; None if it stands still.
-        state: (n or 1, 24) the same for the kernels.
+        state: (n or 1, 24) how the base moves.
+        asked: The same configurations in the user's own numbers and names.
         representation: Of an analytical Jacobian's orientation.
     """
 
     plan: Plan
-    frames: tuple[str, ...]
     reference: Reference
     q: FloatArray
     rates: tuple[FloatArray, ...]
-    base: BaseMotion | None
     state: FloatArray
+    asked: Rows
     representation: str = ""
+
+
+def axes_of(quantity: Quantity) -> int:
+    """How many axes one result has: two for a matrix, one for [linear; angular]."""
+    sixes = Quantity.VELOCITY, Quantity.ACCELERATION, Quantity.ACCELERATION_BREAKDOWN
+    return 1 if quantity in sixes else 2
 
 
 def held_against(quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray) -> tuple[FloatArray, Bound]:
     """The same results computed by Pinocchio, and what the two are measured against."""
     if quantity is Quantity.ANALYTICAL_JACOBIAN:
         return _analytical(oracle, x, ours)
-    return pinocchios(quantity, oracle, x), bound_of(quantity, x)
+    return pinocchios(quantity, oracle, x.asked), bound_of(quantity, x)
 
 
 def _analytical(oracle: Oracle, x: Part, ours: FloatArray) -> tuple[FloatArray, Bound]:
     """From Pinocchio's rotation and Jacobian, by `line_of_nodes`."""
-    J_v = oracle.jacobians(x.q, x.frames, [_ALIGNED], x.base)[:, :, 0]
+    q, frames, base = x.asked.inputs[0], x.asked.frames, x.asked.base
+    J_v = oracle.jacobians(q, frames, [_ALIGNED], base)[:, :, 0]
     size = magnitudes(x.plan, x.q, None, None, x.state)
     if x.representation == "quaternion":
-        quat = oracle.quaternions(x.q, x.frames, x.base)
+        quat = oracle.quaternions(q, frames, base)
         bound = bounds.quaternion_jacobian_bound(x.plan, size)
         theirs, hidden = quaternion_jacobian(quat, J_v), 1.5 * EPS * result_k(bound, quat.shape[:-1])
         # Of q and -q the one with qw >= 0 counts; where rounding hides the sign of qw, either does.
@@ -72,16 +77,17 @@ def _analytical(oracle: Oracle, x: Part, ours: FloatArray) -> tuple[FloatArray, 
         turned = with_other & (np.abs(quat[..., 3]) <= hidden)
         theirs[..., 3:, :] *= np.where(turned, -1.0, 1.0)[..., np.newaxis, np.newaxis]
         return theirs, bound
-    R = oracle.placements(x.q, x.frames, x.base)[..., :3, :3]
+    R = oracle.placements(q, frames, base)[..., :3, :3]
     theirs, apart = euler_jacobian(x.representation, R, J_v)
     return theirs, bounds.euler_jacobian_bound(x.plan, size, apart)
 
 
 @np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite disagrees
-def pinocchios(quantity: Quantity, oracle: Oracle, x: Part) -> FloatArray:
-    """(n, frames, ...) the same results, computed by Pinocchio."""
+def pinocchios(quantity: Quantity, oracle: Oracle, asked: Rows) -> FloatArray:
+    """(n, frames, ...) the same results, computed by Pinocchio for what the user asked."""
+    q, *given = asked.inputs
     if quantity is Quantity.PLACEMENT:
-        return oracle.placements(x.q, x.frames, x.base)
+        return oracle.placements(q, asked.frames, asked.base)
     in_references: dict[Quantity, Callable[..., FloatArray]] = {
         Quantity.VELOCITY: oracle.velocities,
         Quantity.JACOBIAN: oracle.jacobians,
@@ -89,8 +95,8 @@ def pinocchios(quantity: Quantity, oracle: Oracle, x: Part) -> FloatArray:
         Quantity.ACCELERATION: oracle.accelerations,
         Quantity.ACCELERATION_BREAKDOWN: oracle.accelerations,
     }
-    rates, compute = x.rates[: _RATES[quantity]], in_references[quantity]
-    return compute(x.q, *rates, x.frames, [x.reference], x.base)[:, :, 0]
+    rates, compute = given[: _RATES[quantity]], in_references[quantity]
+    return compute(q, *rates, asked.frames, [asked.reference], asked.base)[:, :, 0]
 
 
 def bound_of(quantity: Quantity, x: Part) -> Bound:

@@ -88,6 +88,10 @@ class UnknownNameError(UrdfkinError, LookupError):
         self.nearest = tuple(close)
 
 
+class OracleError(UrdfkinError):
+    """Pinocchio refuses a robot, or reads another robot from the same text."""
+
+
 class SourceError(UrdfkinError, OSError):
     """A file that cannot be read or written."""
 

@@ -6,38 +6,29 @@ wrong on both sides, and agree. `urdfkin.plain_xml` reads it a second time.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Collection
 
-from urdfkin.errors import InputError
 from urdfkin.plain_xml import plain_xml
-from urdfkin.tree import KinematicTree, Mimic
+from urdfkin.tree import Mimic
 
 
-def with_rules_of_text(tree: KinematicTree, text: str) -> KinematicTree:
-    """The tree, its followers following as the text says.
+def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
+    """Whom each follower follows as the text says, chains followed to the joint that moves by itself.
 
     Args:
-        tree: urdfkin's reading; which joints follow is taken from it, whom and how is not.
         text: The URDF.
+        joints: The joints that move; others follow nobody, whatever the text says.
 
     Raises:
-        InputError: the text lets a follower of the tree move freely.
+        InputError: a rule's numbers are no numbers.
     """
-    if not any(joint.mimic for joint in tree.joints):
-        return tree
     rules = {
-        joint.get("name", ""): Mimic(
-            rule.get("joint", ""), float(rule.get("multiplier", "1")), float(rule.get("offset", "0"))
-        )
+        name: Mimic(rule.get("joint", ""), float(rule.get("multiplier", "1")), float(rule.get("offset", "0")))
         for joint in plain_xml(text).iterfind("joint")
-        if (rule := joint.find("mimic")) is not None
+        if (rule := joint.find("mimic")) is not None and (name := joint.get("name", "")) in joints
     }
-    missing = [joint.name for joint in tree.joints if joint.mimic and joint.name not in rules]
-    if missing:
-        raise InputError("the URDF has no mimic rule for a joint", where=f"joint {missing[0]}")
     known: dict[str, Mimic] = {}
-    joints = (replace(j, mimic=_to_the_end(j.name, rules, known)) if j.mimic else j for j in tree.joints)
-    return KinematicTree(tree.name, tree.links, tuple(joints))
+    return {follower: _to_the_end(follower, rules, known) for follower in rules}
 
 
 def _to_the_end(follower: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> Mimic:

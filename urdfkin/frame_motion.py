@@ -129,7 +129,7 @@ def frame_motion(
 def _checks(call: Call, ours: dict[Quantity, FloatArray]) -> dict[Quantity, Check]:
     oracle, x = call.robot.oracle(None), call.part(slice(0, call.n))
     return {
-        quantity: _check(results, pinocchios(quantity, oracle, x), bound_of(quantity, x))
+        quantity: _check(results, pinocchios(quantity, oracle, x.asked), bound_of(quantity, x))
         for quantity, results in ours.items()
     }
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.call import Call
-from urdfkin.demands import real_number, word, words
+from urdfkin.demands import real_number, word
 from urdfkin.errors import RangeError
 from urdfkin.motion.representation import analytical_jacobian
 from urdfkin.recursion import evaluate
@@ -60,13 +60,14 @@ class Manipulator:
             VerificationError: Pinocchio computes something else.
         """
         robot = _robot(self)
-        call = Call(robot, _names(robot, frames), _ALIGNED, base, q)
+        call = Call(robot, frames, _ALIGNED, base, q)
         to = call.flat(out, 4, 4, every=True)
         result = call.compute(
             evaluate.placements, call.plan, call.q, base=call.state, out=to, threads=threads
         )
-        call.verify(Quantity.PLACEMENT, result, verify)
-        return call.every(result, out)
+        handed_out = call.every(result, out)
+        call.verify(Quantity.PLACEMENT, handed_out, verify)
+        return handed_out
 
     def velocities(
         self,
@@ -85,12 +86,13 @@ class Manipulator:
         Arguments and errors as `placements`.
         """
         robot = _robot(self)
-        call = Call(robot, _names(robot, frames), reference, base, q, v)
+        call = Call(robot, frames, reference, base, q, v)
         to = call.flat(out, 6, every=True)
         walk = call.plan, call.q, *call.rates, call.reference
         result = call.compute(evaluate.velocities, *walk, base=call.state, out=to, threads=threads)
-        call.verify(Quantity.VELOCITY, result, verify)
-        return call.every(result, out)
+        handed_out = call.every(result, out)
+        call.verify(Quantity.VELOCITY, handed_out, verify)
+        return handed_out
 
     def jacobians(
         self,
@@ -108,13 +110,14 @@ class Manipulator:
         Arguments and errors as `placements`.
         """
         robot = _robot(self)
-        call = Call(robot, _names(robot, frames), reference, base, q)
+        call = Call(robot, frames, reference, base, q)
         to = call.flat(out, 6, robot.nv, every=True)
         result = call.compute(
             evaluate.jacobians, call.plan, call.q, call.reference, base=call.state, out=to, threads=threads
         )
-        call.verify(Quantity.JACOBIAN, result, verify)
-        return call.every(result, out)
+        handed_out = call.every(result, out)
+        call.verify(Quantity.JACOBIAN, handed_out, verify)
+        return handed_out
 
     def accelerations(
         self,
@@ -134,7 +137,7 @@ class Manipulator:
         Arguments and errors as `placements`.
         """
         robot = _robot(self)
-        call = Call(robot, _names(robot, frames), reference, base, q, v, a)
+        call = Call(robot, frames, reference, base, q, v, a)
         to = call.flat(out, 6, every=True)
         result = call.compute(
             evaluate.accelerations,
@@ -146,8 +149,9 @@ class Manipulator:
             out=to,
             threads=threads,
         )
-        call.verify(Quantity.ACCELERATION, result, verify)
-        return call.every(result, out)
+        handed_out = call.every(result, out)
+        call.verify(Quantity.ACCELERATION, handed_out, verify)
+        return handed_out
 
     def jacobian_rate(
         self,
@@ -194,8 +198,9 @@ class Manipulator:
             out=call.flat(out, 6, robot.nv),
             threads=threads,
         )
-        call.verify(Quantity.JACOBIAN_RATE, result, verify)
-        return call.one(result, out)
+        handed_out = call.one(result, out)
+        call.verify(Quantity.JACOBIAN_RATE, handed_out, verify)
+        return handed_out
 
     def analytical_jacobian(
         self,
@@ -245,7 +250,7 @@ class Manipulator:
             J = analytical_jacobian(representation, R, call.one(J_v, None), nearest)
         if not np.isfinite(J).all():
             raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
-        call.verify(Quantity.ANALYTICAL_JACOBIAN, J.reshape(call.n, 1, *J.shape[-2:]), verify)
+        call.verify(Quantity.ANALYTICAL_JACOBIAN, J, verify)
         return J
 
     def acceleration_breakdown(
@@ -277,14 +282,11 @@ class Manipulator:
             call.reference,
             call.state,
         )
-        call.verify(Quantity.ACCELERATION_BREAKDOWN, parts.total[:, np.newaxis], verify)
-        return AccelerationBreakdown(parts.joints, call.every(parts.base), call.every(parts.terms))
+        breakdown = AccelerationBreakdown(parts.joints, call.every(parts.base), call.every(parts.terms))
+        call.verify(Quantity.ACCELERATION_BREAKDOWN, breakdown.total, verify)
+        return breakdown
 
 
 def _robot(manipulator: Manipulator) -> Robot:
     # The only subclass is Robot, which lives below and cannot be imported here.
     return cast("Robot", manipulator)
-
-
-def _names(robot: Robot, frames: Sequence[str] | None) -> Sequence[str]:
-    return robot.link_names if frames is None else words(frames, "frames")

@@ -1,8 +1,12 @@
 """Everything that asks Pinocchio: the only module that imports it.
 
 The oracle reads the URDF text itself, with its own parser, so that nothing of urdfkin's reading is shared.
+Nor is anything between a user's arguments and the result: which frame a name means (`urdfkin.oracle_frames`),
+which number of q is whose (`urdfkin.oracle_layout`), how the base moves (`urdfkin.oracle_base`) are all found
+here anew, from Pinocchio's model and the numbers as they were given.
+
 Its model is built without mimic joints (with them, Pinocchio 4.1 refuses four of the robots it ships with);
-followers are coupled here, by the rules as `urdfkin.followers` reads them from the text once more:
+followers are coupled by the rules as `urdfkin.followers` reads them from the text once more:
 q_full = G q + g_0, v_full = G v, J = J_full G.
 """
 
@@ -16,14 +20,16 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.configuration import pinocchio_blocks
 from urdfkin.deep_stack import with_stack
-from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.followers import with_rules_of_text
-from urdfkin.recursion.base import BaseMotion
-from urdfkin.recursion.plan import IntArray
+from urdfkin.errors import InputError, OracleError
+from urdfkin.followers import rules_of_text
+from urdfkin.oracle_base import BaseNumbers, free_flyer, free_flyer_rates, free_flyer_second_rates
+from urdfkin.oracle_frames import Frames
+from urdfkin.oracle_layout import Layout
 from urdfkin.reference import Reference
-from urdfkin.tree import FloatArray, JointKind, KinematicTree
+from urdfkin.tree import FloatArray, KinematicTree, Mimic
+
+__all__ = ["MOST_RATES", "Oracle", "OracleError", "version"]
 
 #: Pinocchio recurses over links: less than 4 kB of stack for each was measured (4.1.0), room for more.
 _STACK_FOR_A_LINK = 16_384
@@ -32,12 +38,8 @@ _SHALLOW = 100
 #: Pinocchio's workspace takes about 64 bytes times the cube of the rates (4.1.0 measured): at most 2 GB.
 MOST_RATES = 315
 
-#: What carries a robot whose base moves; no URDF joint is called so by accident.
-_BASE = "moving base (urdfkin)"
-
-
-class OracleError(UrdfkinError):
-    """Pinocchio refuses a robot, or reads another robot from the same text."""
+#: What carries a robot whose base moves.
+_BASE = "base"
 
 
 def version() -> str:
@@ -48,11 +50,13 @@ def version() -> str:
 class Oracle:
     """Pinocchio's answers for one robot, in urdfkin's layout of q, v and Jacobian columns.
 
-    Every method takes flat batches (n, nq), (n, nv) and frames by name, as `KinematicTree.frame_link` does.
+    Every method takes flat batches (n, nq), (n, nv) and frames by name, as the user gave them.
 
     Args:
         text: The URDF, as Pinocchio is to read it.
-        tree: urdfkin's reading of the same text: names and layout only are taken from it.
+        tree: urdfkin's reading of the same text: it must have the same joints in the same order, the same
+            ones following; nothing is taken from it.
+        mimic: Whether followers follow; False: the user wants them free.
         moving_base: Build the model on a free-flyer, so that a base's motion can be given.
         root_joint: `"floating"` or `"planar"` when the tree was hung from such a joint, which the text does
             not know. The names alone do not tell: a file may use them itself.
@@ -62,7 +66,13 @@ class Oracle:
     """
 
     def __init__(
-        self, text: str, tree: KinematicTree, *, moving_base: bool = False, root_joint: str | None = None
+        self,
+        text: str,
+        tree: KinematicTree,
+        *,
+        mimic: bool = True,
+        moving_base: bool = False,
+        root_joint: str | None = None,
     ) -> None:
         import pinocchio as pin  # noqa: PLC0415  heavy: only when something is checked
 
@@ -70,17 +80,16 @@ class Oracle:
         self._tree = tree
         self._moving_base = moving_base
         self._root_joint = root_joint
-        self._root = 0  # Pinocchio's index of the frame that the robot stands on
         self._model = self._build(text)
-        self._layout = _Layout(
-            self._model, self._coupled(text), 7 if moving_base else 0, 6 if moving_base else 0
-        )
+        names = list(self._model.names)[1:]
+        self._frames = Frames(self._model, pin, stands_on_world=root_joint is not None)
+        joints, self._index = list(range(1, len(names) + 1)), list(range(self._model.nframes))
+        if moving_base:
+            joints, self._index = self._put_on_free_flyer(joints)
+        rules = self._rules(text, names) if mimic else {}
+        self._layout = Layout(self._model, joints, names, rules)
+        self._demand_the_same_joints(names)
         self._local = threading.local()
-        self._references = {
-            Reference.LOCAL: pin.LOCAL,
-            Reference.WORLD: pin.WORLD,
-            Reference.LOCAL_WORLD_ALIGNED: pin.LOCAL_WORLD_ALIGNED,
-        }
 
     def _build(self, text: str) -> Any:
         """The model; what would end the process, for want of memory or stack, is refused or avoided."""
@@ -96,14 +105,25 @@ class Oracle:
             return self._parse(text)
         return with_stack(depth * _STACK_FOR_A_LINK, lambda: self._parse(text))
 
-    def _coupled(self, text: str) -> KinematicTree:
-        """The tree with the text's own mimic rules; urdfkin's reading of them is under test too."""
+    def _rules(self, text: str, joints: Sequence[str]) -> dict[str, Mimic]:
+        """The text's own mimic rules; urdfkin's reading of them is under test too."""
         try:
-            return with_rules_of_text(self._tree, text)
+            return rules_of_text(text, set(joints))
         except (InputError, ValueError) as error:
             raise OracleError(
                 "the mimic rules read differently", where=self._tree.name, found=str(error)
             ) from error
+
+    def _demand_the_same_joints(self, theirs: Sequence[str]) -> None:
+        """Names, order and who has coordinates: where these differ, a q does not mean the same to the two."""
+        joints = self._tree.joints
+        for what, other, own in (
+            ("other joints", theirs, [joint.name for joint in joints if joint.kind.nv]),
+            ("other coordinates", self._layout.coordinates, [joint.name for joint in joints if joint.nv]),
+        ):
+            if list(other) != own:
+                found = ", ".join(sorted(set(other) ^ set(own))[:5]) or "the same in another order"
+                raise OracleError(f"Pinocchio finds {what} in this robot", where=self._tree.name, found=found)
 
     def _parse(self, text: str) -> Any:
         pin, tree = self._pin, self._tree
@@ -117,15 +137,29 @@ class Oracle:
             raise OracleError(
                 "Pinocchio does not accept this robot", where=tree.name, found=str(error).strip()
             ) from error
-        return self._on_free_flyer(model) if self._moving_base else model
+        return model
 
-    def _on_free_flyer(self, model: Any) -> Any:
-        """The model carried by a joint that can be given the base's motion; a root joint moves on top."""
-        pin, nowhere = self._pin, self._pin.SE3.Identity()
+    def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
+        """Have the model carried by a joint that can be given the base's motion; a root joint moves on top.
+
+        Returns:
+            Where its joints and its frames have gone to; the world has gone to the base.
+        """
+        pin, model, nowhere = self._pin, self._model, self._pin.SE3.Identity()
+        # Numbers for names: a link may be called as a joint, or as the carrier, and appendModel refuses both.
+        for j in joints:
+            model.names[j] = f"joint {j}"
+        for i in range(1, model.nframes):
+            model.frames[i].name = str(i)
         carrier = pin.Model()
         joint = carrier.addJoint(0, pin.JointModelFreeFlyer(), nowhere, _BASE)
-        self._root = carrier.addFrame(pin.Frame(_BASE, joint, 0, nowhere, pin.FrameType.BODY))
-        return pin.appendModel(carrier, model, self._root, nowhere)
+        base = carrier.addFrame(pin.Frame(_BASE, joint, 0, nowhere, pin.FrameType.BODY))
+        self._model = pin.appendModel(carrier, model, base, nowhere)
+        to = {frame.name: i for i, frame in enumerate(self._model.frames)}
+        return (
+            [int(self._model.getJointId(f"joint {j}")) for j in joints],
+            [base, *(to[str(i)] for i in range(1, model.nframes))],
+        )
 
     @property
     def _data(self) -> Any:
@@ -134,7 +168,7 @@ class Oracle:
             self._local.data = self._model.createData()
         return self._local.data
 
-    def _moving(self, q: FloatArray, base: BaseMotion | None) -> Iterator[tuple[int, FloatArray]]:
+    def _moving(self, q: FloatArray, base: BaseNumbers | None) -> Iterator[tuple[int, FloatArray]]:
         """Numbered configurations; none for a robot without rates.
 
         Its Jacobians have no columns, and Pinocchio 4.1 kills the process when asked for one.
@@ -142,23 +176,17 @@ class Oracle:
         return enumerate(self.configurations(q, base) if self._model.nv else ())
 
     def _frame(self, name: str) -> int:
-        """Pinocchio's index of a frame; it answers `nframes` for a name it does not know."""
-        types, tree = self._pin.FrameType, self._tree
-        link = tree.frame_link(name)
-        own, kind = tree.links[link], types.BODY
-        if link == 0 and own == "universe":  # Pinocchio's own root, which is no body
-            return self._root
-        if link > 0 and name not in (own, f"link:{own}"):
-            joint = tree.joints[link - 1]
-            own, kind = joint.name, types.JOINT if joint.kind.nv else types.FIXED_JOINT
-        index = int(self._model.getFrameId(own, kind))
-        if index == self._model.nframes:
-            raise OracleError("Pinocchio has no such frame", where=tree.name, found=repr(name))
-        return index
+        """Pinocchio's index of a frame."""
+        return self._index[self._frames.index(name)]
+
+    def _reference(self, reference: Reference | str) -> Any:
+        """Pinocchio's own member of that name."""
+        name = reference.name if isinstance(reference, Reference) else str(reference).upper()
+        return self._pin.ReferenceFrame.names[name]
 
     # -- quantities ----------------------------------------------------------------------------------
 
-    def placements(self, q: FloatArray, frames: Sequence[str], base: BaseMotion | None = None) -> FloatArray:
+    def placements(self, q: FloatArray, frames: Sequence[str], base: BaseNumbers | None = None) -> FloatArray:
         """(n, frames, 4, 4) T_world_frame: `updateFramePlacements`."""
         pin, model, data = self._pin, self._model, self._data
         ids = [self._frame(frame) for frame in frames]
@@ -169,7 +197,9 @@ class Oracle:
                 out[k, f] = pin.updateFramePlacement(model, data, frame).homogeneous
         return out
 
-    def quaternions(self, q: FloatArray, frames: Sequence[str], base: BaseMotion | None = None) -> FloatArray:
+    def quaternions(
+        self, q: FloatArray, frames: Sequence[str], base: BaseNumbers | None = None
+    ) -> FloatArray:
         """(n, frames, 4) orientations as Pinocchio's quaternions, scalar last, with qw >= 0."""
         R = self.placements(q, frames, base)[..., :3, :3]
         quats = [self._pin.Quaternion(np.array(one)).coeffs() for one in R.reshape(-1, 3, 3)]
@@ -181,8 +211,8 @@ class Oracle:
         q: FloatArray,
         v: FloatArray,
         frames: Sequence[str],
-        references: Sequence[Reference],
-        base: BaseMotion | None = None,
+        references: Sequence[Reference | str],
+        base: BaseNumbers | None = None,
     ) -> FloatArray:
         """(n, frames, references, 6): `getFrameVelocity`."""
         pin = self._pin
@@ -200,8 +230,8 @@ class Oracle:
         v: FloatArray,
         a: FloatArray,
         frames: Sequence[str],
-        references: Sequence[Reference],
-        base: BaseMotion | None = None,
+        references: Sequence[Reference | str],
+        base: BaseNumbers | None = None,
     ) -> FloatArray:
         """(n, frames, references, 6): `getFrameClassicalAcceleration`."""
         pin = self._pin
@@ -217,8 +247,8 @@ class Oracle:
         self,
         q: FloatArray,
         frames: Sequence[str],
-        references: Sequence[Reference],
-        base: BaseMotion | None = None,
+        references: Sequence[Reference | str],
+        base: BaseNumbers | None = None,
     ) -> FloatArray:
         """(n, frames, references, 6, nv): `computeJointJacobians`, then `getFrameJacobian`."""
         pin, inputs = self._pin, (self.configurations(q, base),)
@@ -231,8 +261,8 @@ class Oracle:
         q: FloatArray,
         v: FloatArray,
         frames: Sequence[str],
-        references: Sequence[Reference],
-        base: BaseMotion | None = None,
+        references: Sequence[Reference | str],
+        base: BaseNumbers | None = None,
     ) -> FloatArray:
         """(n, frames, references, 6, nv): `getFrameJacobianTimeVariation`."""
         pin, inputs = self._pin, (self.configurations(q, base), self.rates(v, base))
@@ -250,7 +280,7 @@ class Oracle:
         ids, joints, wanted = (
             [self._frame(f) for f in frames],
             self._layout.joint_ids,
-            self._references[reference],
+            self._reference(reference),
         )
         of_frames = np.empty((len(q), len(ids), 6, model.nv))
         of_joints = np.empty((len(q), len(joints), 6, model.nv))
@@ -266,7 +296,7 @@ class Oracle:
     def joint_jacobians(self, q: FloatArray, references: Sequence[Reference]) -> FloatArray:
         """(n, joints, references, 6, nv): `getJointJacobian` of every moving joint, in the tree's order."""
         pin, model, data = self._pin, self._model, self._data
-        wanted = [self._references[reference] for reference in references]
+        wanted = [self._reference(reference) for reference in references]
         joints = self._layout.joint_ids
         full = np.empty((len(q), len(joints), len(wanted), 6, model.nv))
         for k, q_k in self._moving(q, None):
@@ -290,7 +320,7 @@ class Oracle:
         compute: Callable[..., object],
         get: Callable[..., FloatArray],
         frames: Sequence[str],
-        references: Sequence[Reference],
+        references: Sequence[Reference | str],
     ) -> FloatArray:
         """(n, frames, references, ...): `compute` for each of the inputs, then `get` for each of the wanted.
 
@@ -299,7 +329,7 @@ class Oracle:
         """
         model, data, n = self._model, self._data, len(inputs[0])
         ids = [self._frame(frame) for frame in frames]
-        wanted = list(product(ids, (self._references[reference] for reference in references)))
+        wanted = list(product(ids, map(self._reference, references)))
         own = (6, model.nv) if compute is not self._pin.forwardKinematics else (6,)
         out = np.empty((n, len(ids), len(references), *own))
         if not all(own):  # Pinocchio 4.1 kills the process when asked for a Jacobian without columns
@@ -319,35 +349,25 @@ class Oracle:
 
     # -- layout --------------------------------------------------------------------------------------
 
-    def configurations(self, q: FloatArray, base: BaseMotion | None = None) -> FloatArray:
+    def configurations(self, q: FloatArray, base: BaseNumbers | None = None) -> FloatArray:
         """Pinocchio's configurations for urdfkin's, with the base as a free-flyer where there is one."""
         full = self._layout.configurations(q)
         if self._moving_base:
-            motion = base or BaseMotion()
-            T = np.broadcast_to(motion.placement, (len(q), 4, 4))
-            full[:, :3] = T[:, :3, 3]
-            for k, R in enumerate(T[:, :3, :3]):
-                full[k, 3:7] = self._pin.Quaternion(np.array(R)).coeffs()
+            full[:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if base is None else free_flyer(base)
         return full
 
-    def rates(self, v: FloatArray, base: BaseMotion | None = None) -> FloatArray:
+    def rates(self, v: FloatArray, base: BaseNumbers | None = None) -> FloatArray:
         """Pinocchio's rates; a free-flyer's are those of the base in its own axes."""
         full = self._layout.rates(v)
         if self._moving_base and base is not None:
-            full[:, :6] = _in_own_axes(base, base.velocity, len(v))
+            full[:, :6] = free_flyer_rates(base)
         return full
 
-    def second_rates(self, a: FloatArray, base: BaseMotion | None = None) -> FloatArray:
-        """Rates of the rates; a free-flyer's are spatial: acc - w x vel, in its own axes."""
+    def second_rates(self, a: FloatArray, base: BaseNumbers | None = None) -> FloatArray:
+        """Rates of the rates; a free-flyer's are spatial, in its own axes."""
         full = self._layout.rates(a)
         if self._moving_base and base is not None:
-            spatial = np.array(
-                np.broadcast_to(
-                    base.acceleration, np.broadcast_shapes(base.acceleration.shape, base.velocity.shape)
-                )
-            )
-            spatial[..., :3] -= np.cross(base.velocity[..., 3:], base.velocity[..., :3])
-            full[:, :6] = _in_own_axes(base, spatial, len(a))
+            full[:, :6] = free_flyer_second_rates(base)
         return full
 
 
@@ -359,85 +379,6 @@ def _depth(tree: KinematicTree) -> int:
     return max(depths)
 
 
-def _in_own_axes(base: BaseMotion, six: FloatArray, n: int) -> FloatArray:
-    R = np.broadcast_to(base.placement[..., :3, :3], (n, 3, 3))
-    pairs = np.broadcast_to(six, (n, 6)).reshape(n, 2, 3)
-    turned: FloatArray = np.einsum("nji,npj->npi", R, pairs).reshape(n, 6)
-    return turned
-
-
 def _columns(J: FloatArray) -> FloatArray:
     """(6, nv), also for a robot of one rate, whose single column Pinocchio hands out as a plain vector."""
     return J if J.ndim > 1 else J.reshape(6, 1)
-
-
-class _Layout:
-    """Where each joint's coordinates and rates stand in Pinocchio's model: by name, here and nowhere else."""
-
-    def __init__(self, model: Any, tree: KinematicTree, q_base: int, v_base: int) -> None:
-        self._tree, self._model, self._q_base, self._v_base = tree, model, q_base, v_base
-        moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
-        theirs = {name: j for j, name in enumerate(model.names) if j > (1 if q_base else 0)}
-        ours = {tree.joints[i].name for i in moving}
-        if set(theirs) != ours:
-            raise OracleError(
-                "Pinocchio finds other joints in this robot",
-                where=tree.name,
-                found=", ".join(sorted(set(theirs) ^ ours)[:5]),
-            )
-        self._moving = [(i, theirs[tree.joints[i].name]) for i in moving]
-        self.joint_ids = [joint for _, joint in self._moving]
-        #: Pinocchio's column of each rate, in the order of the tree's moving joints.
-        self.rate_columns = [
-            model.joints[j].idx_v + c for i, j in self._moving for c in range(tree.joints[i].kind.nv)
-        ]
-        self._rate_index, self._rate_factor = self._rate_rules()
-        #: Whether Pinocchio's rates are the robot's: the same ones, in the same order.
-        self._alike = np.array_equal(self._rate_index, np.arange(tree.nv)) and not v_base
-        self._alike &= bool((self._rate_factor == 1.0).all())
-        #: Whether Pinocchio has other coordinates for a joint, or in another order.
-        self._otherwise = model.nq != tree.nq or any(
-            tree.joints[i].mimic
-            or tree.joints[i].kind in (JointKind.CONTINUOUS, JointKind.PLANAR)
-            or tree.q_index[i] != model.joints[j].idx_q
-            for i, j in self._moving
-        )
-
-    def _rate_rules(self) -> tuple[IntArray, FloatArray]:
-        """For each of Pinocchio's rates: whose it is in urdfkin's `v`, and the factor (G)."""
-        index, factor = np.zeros(self._model.nv, dtype=np.int64), np.zeros(self._model.nv)
-        for i, j in self._moving:
-            joint = self._tree.joints[i]
-            at = self._model.joints[j].idx_v
-            for c in range(joint.kind.nv):
-                index[at + c] = self._tree.v_index[i] + c
-                factor[at + c] = joint.mimic.multiplier if joint.mimic else 1.0
-        return index, factor
-
-    def configurations(self, q: FloatArray) -> FloatArray:
-        if not self._otherwise:
-            return np.array(q)
-        full = np.zeros((len(q), self._model.nq))
-        q_at = {i: self._model.joints[j].idx_q for i, j in self._moving}
-        for i, block in pinocchio_blocks(self._tree, q, mimic=False):
-            full[:, q_at[i] : q_at[i] + block.shape[-1]] = block
-        return full
-
-    def rates(self, v: FloatArray) -> FloatArray:
-        if not self._tree.nv:
-            return np.zeros((len(v), self._model.nv))
-        full: FloatArray = v[:, self._rate_index] * self._rate_factor
-        return full
-
-    def couple(self, full: FloatArray) -> FloatArray:
-        """J_full G: columns of followers are added to their leaders'."""
-        if self._alike:
-            return full
-        own = full[..., self._v_base :] * self._rate_factor[self._v_base :]
-        index = self._rate_index[self._v_base :]
-        if len(index) == self._tree.nv and np.array_equal(index, np.arange(len(index))):
-            return np.ascontiguousarray(own)
-        coupled = np.zeros((*full.shape[:-1], self._tree.nv))
-        for column, at in enumerate(index):
-            coupled[..., at] += own[..., column]
-        return coupled

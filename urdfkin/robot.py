@@ -84,7 +84,8 @@ class Robot(Manipulator, Tables):
 
     def __getstate__(self) -> dict[str, Any]:
         # Pinocchio's models are rebuilt where they are needed; compiled plans are cheap to rebuild too.
-        return {**self.__dict__, "_plans": {}, "_oracles": {}, "_prepared": {}}
+        # A copy, in this process or another, has handed out nothing yet: its ledger is empty.
+        return {**self.__dict__, "ledger": Ledger(), "_plans": {}, "_oracles": {}, "_prepared": {}}
 
     def __repr__(self) -> str:
         return f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>"
@@ -143,9 +144,12 @@ class Robot(Manipulator, Tables):
 
     @property
     def all_frames(self) -> tuple[str, ...]:
-        """Every link and every joint once, as `link:NAME` and `joint:NAME`: no name stands for two."""
-        links = tuple(f"link:{name}" for name in self.tree.links)
-        return links + tuple(f"joint:{joint.name}" for joint in self.tree.joints)
+        """Every link and every joint once, as `link:NAME` and `joint:NAME`.
+
+        No name stands for two: each is a `FrameName`, which means the link or joint NAME even where another
+        is itself called `link:NAME`.
+        """
+        return (*self.tree.link_frames, *self.tree.joint_frames)
 
     @property
     def tip_frame(self) -> str:
@@ -221,8 +225,9 @@ class Robot(Manipulator, Tables):
         call = Call(self, (frame,), _ALIGNED, base, q)
         to = call.flat(out, 4, 4)
         poses = call.compute(evaluate.placements, call.plan, call.q, base=call.state, out=to, threads=threads)
-        call.verify(Quantity.PLACEMENT, poses, verify)
-        return call.one(poses, out)
+        result = call.one(poses, out)
+        call.verify(Quantity.PLACEMENT, result, verify)
+        return result
 
     def velocity(
         self,
@@ -242,8 +247,9 @@ class Robot(Manipulator, Tables):
         call = Call(self, (frame,), reference, base, q, v)
         walk, to = (call.plan, call.q, *call.rates, call.reference), call.flat(out, 6)
         sixes = call.compute(evaluate.velocities, *walk, base=call.state, out=to, threads=threads)
-        call.verify(Quantity.VELOCITY, sixes, verify)
-        return call.one(sixes, out)
+        result = call.one(sixes, out)
+        call.verify(Quantity.VELOCITY, result, verify)
+        return result
 
     def jacobian(
         self,
@@ -265,8 +271,9 @@ class Robot(Manipulator, Tables):
         call = Call(self, (frame,), reference, base, q)
         walk, to = (call.plan, call.q, call.reference), call.flat(out, 6, self.nv)
         Js = call.compute(evaluate.jacobians, *walk, base=call.state, out=to, threads=threads)
-        call.verify(Quantity.JACOBIAN, Js, verify)
-        return call.one(Js, out)
+        result = call.one(Js, out)
+        call.verify(Quantity.JACOBIAN, result, verify)
+        return result
 
     def acceleration(
         self,
@@ -290,8 +297,9 @@ class Robot(Manipulator, Tables):
         call = Call(self, (frame,), reference, base, q, v, a)
         walk, to = (call.plan, call.q, *call.rates, call.reference), call.flat(out, 6)
         sixes = call.compute(evaluate.accelerations, *walk, base=call.state, out=to, threads=threads)
-        call.verify(Quantity.ACCELERATION, sixes, verify)
-        return call.one(sixes, out)
+        result = call.one(sixes, out)
+        call.verify(Quantity.ACCELERATION, result, verify)
+        return result
 
     def prepare(self, frame: str, reference: Reference | str = _ALIGNED) -> PreparedFrame:
         """One frame in one reference, for one configuration after the other, without a check: see there.
@@ -301,7 +309,9 @@ class Robot(Manipulator, Tables):
         """
         # The hash of an enumeration's member takes longer than the rest of this. With its type in the key,
         # 1, which is equal to a member, is not taken for it.
-        key = frame if reference is _ALIGNED else (frame, type(reference), reference)
+        # Nor is `LinkFrame("link:a")` the frame of a link that is called so.
+        plain = reference is _ALIGNED and type(frame) is str
+        key = frame if plain else (type(frame), frame, type(reference), reference)
         try:
             prepared = self._prepared.get(key)
         except TypeError:  # no hash, and so hardly a name
@@ -332,7 +342,11 @@ class Robot(Manipulator, Tables):
         moving = base is not None
         if moving not in self._oracles:
             self._oracles[moving] = Oracle(
-                self.urdf, self.tree, moving_base=moving, root_joint=self.root_joint
+                self.urdf,
+                self.tree,
+                mimic=self.mimic is not False,
+                moving_base=moving,
+                root_joint=self.root_joint,
             )
         return self._oracles[moving]
 

@@ -165,7 +165,7 @@ def verified_tree(
         return None
     q = draw(robot.tree, samples, np.random.default_rng(seed), with_special=True).q
     ours = parameters.placements(q)
-    theirs = robot.oracle(None).placements(q, [f"link:{name}" for name in robot.tree.links[1:]])
+    theirs = robot.oracle(None).placements(q, robot.tree.link_frames[1:])
     error = np.abs(ours - theirs)[..., :3, :]
     reach = parameters.reach(q)
     units = max(

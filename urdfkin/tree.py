@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.demands import shown
 from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.frame_names import FrameName, JointFrame, LinkFrame
 from urdfkin.rotation.arrays import FloatArray, floats
 
 __all__ = [
@@ -266,38 +267,73 @@ class KinematicTree:
             names += [joint.name, child]
         return tuple(dict.fromkeys(names))
 
+    @cached_property
+    def link_frames(self) -> tuple[LinkFrame, ...]:
+        """Every link, root first, under a name that stands for nothing else."""
+        return tuple(LinkFrame.of(name) for name in self.links)
+
+    @cached_property
+    def joint_frames(self) -> tuple[JointFrame, ...]:
+        """Every joint, likewise."""
+        return tuple(JointFrame.of(joint.name) for joint in self.joints)
+
     def frame_link(self, name: str) -> int:
-        """Index of the link that carries the frame called `name`, a link's or a joint's name.
+        """Index of the link that carries the frame called `name`.
+
+        A link or joint that is called exactly so comes first; else `link:NAME` and `joint:NAME` say which of
+        the two is meant.
 
         Raises:
             UnknownNameError: nothing is called so; the nearest names are offered.
-            InputError: a link and a joint elsewhere share the name; say `link:NAME` or `joint:NAME`.
+            InputError: a link and a joint elsewhere share the name.
         """
         if not isinstance(name, str):
             raise InputError("a frame is the name of a link or joint", where=self.name, found=shown(name))
-        prefix, _, rest = name.partition(":")
-        if prefix == "link" and rest in self._link_index:
-            return self._link_index[rest]
-        if prefix == "joint" and rest in self._joint_index:
-            return self._joint_index[rest] + 1
+        if isinstance(name, FrameName):
+            return self._meant(name)
         link, joint = self._link_index.get(name), self._joint_index.get(name)
-        if joint is None:
-            if link is None:
+        if link is None and joint is None:
+            meant = self._with_prefix(name)
+            if meant is None:
                 raise UnknownNameError("frame", name, self.frame_names, where=self.name)
-            return link
-        if link is not None and link != joint + 1:
+            return self._meant(meant)
+        if link is not None and joint is not None and link != joint + 1:
+            frames = self.link_frames, self.joint_frames
+            ways = [
+                *self._spelled(frames[0][link], *frames[1][link - 1 : link]),
+                *self._spelled(frames[1][joint], frames[0][joint + 1]),
+            ]
             raise InputError(
                 f"frame {name!r} is the name of a link and of a joint in another place",
                 where=self.name,
-                remedy=f"say 'link:{name}' or 'joint:{name}'",
+                remedy=f"say {' or '.join(map(repr, ways))}" if ways else "rename one of the two",
             )
-        return joint + 1
+        return link if link is not None else self._joint_index[name] + 1
+
+    def _meant(self, frame: FrameName) -> int:
+        return self.link_index(frame.own) if isinstance(frame, LinkFrame) else self.joint_index(frame.own) + 1
+
+    def _with_prefix(self, name: str) -> FrameName | None:
+        """`link:NAME` or `joint:NAME` as it is meant, if there is such a link or joint."""
+        kinds: tuple[tuple[type[FrameName], dict[str, int]], ...] = (
+            (LinkFrame, self._link_index),
+            (JointFrame, self._joint_index),
+        )
+        for kind, known in kinds:
+            if name.startswith(kind.prefix) and name.removeprefix(kind.prefix) in known:
+                return kind(name)
+        return None
+
+    def _spelled(self, *names: FrameName) -> list[str]:
+        """The first of the names of a frame that, written out, is no other's own name."""
+        known = self._link_index.keys() | self._joint_index.keys()
+        return [str(name) for name in names if name not in known][:1]
 
     def frame_name(self, link: int) -> str:
-        """A name by which `frame_link` finds a link: its own, or `link:NAME` where a joint has it too."""
+        """A name by which `frame_link` finds a link: its own, or a `LinkFrame` where a joint has it too."""
         name = self.links[link]
         joint = self._joint_index.get(name)
-        return name if joint is None or joint + 1 == link else f"link:{name}"
+        return name if joint is None or joint + 1 == link else self.link_frames[link]
 
     # -- walks ---------------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import urdfkin
 from urdfkin.errors import RangeError
-from urdfkin.recursion.base import BaseMotion
+from urdfkin.recursion.base import STILL_STATE, BaseMotion
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
 from urdfkin.verification.bounds import EPS, LEAST_UNIT, Quantity, velocity_bound
@@ -113,7 +113,7 @@ def test_rates_whose_squares_vanish_are_verified_and_their_slips_are_not_excused
     assert robot.certificate().verified
     plan = robot.plan([1])
     bound = velocity_bound(
-        magnitudes(plan, q[np.newaxis], v[np.newaxis], None, np.zeros((1, 24))),
+        magnitudes(plan, q[np.newaxis], v[np.newaxis], None, STILL_STATE),
         urdfkin.Reference.LOCAL_WORLD_ALIGNED,
     )
     allowed = float((bound.k * np.maximum(EPS * bound.scale, LEAST_UNIT)).max())

@@ -15,7 +15,7 @@ from tests.diagnostics.cases.arm import arm
 from urdfkin.diagnostics import Finding, Severity, UrdfError, check_text
 from urdfkin.diagnostics.document import parse
 from urdfkin.diagnostics.reporter import ERRORS_SHOWN, WRITTEN_OUT, Reporter
-from urdfkin.followers import with_rules_of_text
+from urdfkin.followers import rules_of_text
 from urdfkin.nearest import nearest
 from urdfkin.urdf.reader import read_tree
 
@@ -81,7 +81,8 @@ def test_a_chain_of_followers_is_read_in_linear_time_both_times() -> None:
 
     def read(size: int) -> None:
         tree = read_tree(documents[size])
-        assert with_rules_of_text(tree, documents[size].decode()).joints[-1].mimic == tree.joints[-1].mimic
+        names = {joint.name for joint in tree.joints}
+        assert rules_of_text(documents[size].decode(), names)[tree.joints[-1].name] == tree.joints[-1].mimic
 
     grows_like_its_size(read, 100_000)
 
@@ -96,8 +97,8 @@ def test_a_chain_of_followers_is_multiplied_out() -> None:
     links = "".join(f'<link name="l{i}"/>' for i in range(4))
     text = f'<robot name="r">{links}{"".join(reversed(rows))}</robot>'
     tree = read_tree(text.encode())
-    for read in (tree, with_rules_of_text(tree, text)):
-        mimic = read.joints[2].mimic
+    again = rules_of_text(text, [joint.name for joint in tree.joints])
+    for mimic in (tree.joints[2].mimic, again[tree.joints[2].name]):
         assert mimic is not None
         assert (mimic.leader, mimic.multiplier, mimic.offset) == ("j0", 10.0, 15.0)
 

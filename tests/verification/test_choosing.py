@@ -10,7 +10,7 @@ import pytest
 import urdfkin
 from tests.laws.subjects import state
 from urdfkin import checks
-from urdfkin.checks import Part
+from urdfkin.asked import Rows
 from urdfkin.errors import InputError
 from urdfkin.oracle import Oracle
 from urdfkin.recursion.base import BaseMotion
@@ -73,9 +73,9 @@ def lies(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pinocchio is off by a millionth where the finger stands at the mark, and by more where it is beyond."""
     right = checks.pinocchios
 
-    def wrong(quantity: Quantity, oracle: Oracle, x: Part) -> FloatArray:
-        theirs = right(quantity, oracle, x)
-        size = np.where(np.abs(x.q[:, 7] - MARK) < 1e-3, 1e-6 + np.abs(x.q[:, 7] - MARK), 0.0)
+    def wrong(quantity: Quantity, oracle: Oracle, asked: Rows) -> FloatArray:
+        theirs, finger = right(quantity, oracle, asked), asked.inputs[0][:, 7]
+        size = np.where(np.abs(finger - MARK) < 1e-3, 1e-6 + np.abs(finger - MARK), 0.0)
         # Numbers that must agree exactly stay as they are: wherever they do not, there is nothing worse.
         rows = theirs[..., :3, :] if quantity is Quantity.PLACEMENT else theirs
         rows *= 1.0 + size.reshape(-1, *[1] * (theirs.ndim - 1))

@@ -31,7 +31,7 @@ def to_tree(table: DHTable) -> KinematicTree:
     Args:
         table: Any table.
     """
-    joints, here = list[tuple[Joint, str, str]](), _link_names(table)
+    joints, here = list[tuple[Joint, str, str]](), link_names(table)
     for i, (row, T) in enumerate(zip(table.rows, frame_poses(table)[:-1], strict=True)):
         axis = np.array([0.0, 0.0, float(row.sense)])
         joint = Joint(row.joint, _kind(row), 0, T, axis, _limit(row), row.mimic)
@@ -49,7 +49,7 @@ def to_tree(table: DHTable) -> KinematicTree:
 
 def free_tree(table: DHTable) -> KinematicTree:
     """The same tree with followers set free: one coordinate a row, in row order."""
-    joints, here = list[tuple[Joint, str, str]](), _link_names(table)
+    joints, here = list[tuple[Joint, str, str]](), link_names(table)
     poses = frame_poses(table)
     for i, row in enumerate(table.rows):
         axis = np.array([0.0, 0.0, float(row.sense)])
@@ -74,7 +74,7 @@ def frame_poses(table: DHTable) -> list[FloatArray]:
     return [table.base @ ways[0], *ways[1:], np.array(table.tool)]
 
 
-def _link_names(table: DHTable) -> list[str]:
+def link_names(table: DHTable) -> list[str]:
     """The base, a link for each row, the tip; no name twice."""
     names = [table.base_frame]
     names += [_new(f"{row.joint}_link", [*names, table.tip_frame]) for row in table.rows]

@@ -15,7 +15,6 @@ import numpy as np
 from urdfkin.judge import recursion as exact_recursion
 from urdfkin.judge.decimals import ExactJoint, read_exact
 from urdfkin.judge.vectors import Number, exact
-from urdfkin.oracle import Oracle
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.reference import Reference
@@ -126,9 +125,9 @@ class _Work:
     def __init__(self, robot: Robot, x: Samples) -> None:
         self.tree, self.x = robot.tree, x
         self.links = range(len(robot.tree.links))
-        self.frames = [f"link:{name}" for name in robot.tree.links]
+        self.frames = robot.tree.link_frames
         self.plan = robot.plan(self.links)
-        self.oracle = Oracle(robot.urdf, robot.tree, root_joint=robot.root_joint)
+        self.oracle = robot.oracle(None)
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
         self.motions = self._motions(read_exact(robot.urdf, robot.tree))
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.rotation.quaternion import quaternion_of, rotation_of
+from urdfkin.rotation.nearest import nearest_rotation
 from urdfkin.tree import FloatArray, frozen
 
 
@@ -16,10 +16,12 @@ from urdfkin.tree import FloatArray, frozen
 class BaseMotion:
     """How the robot's root link moves in the text's frame -1, which then is the world.
 
-    Every field may carry leading batch axes, which broadcast against the configuration's.
+    Every field may carry leading batch axes, which broadcast against the configuration's. The fields keep
+    the numbers as they were given: Pinocchio is asked about those.
 
     Attributes:
-        placement: (..., 4, 4) T_world_base.
+        placement: (..., 4, 4) T_world_base. Its rotation may be one to nine digits; what is meant is the
+            rotation nearest to it (`urdfkin.rotation.nearest_rotation`).
         velocity: (..., 6) [linear; angular] of the base's origin, world axes, m/s and rad/s.
         acceleration: (..., 6) [linear; angular], classical, world axes, m/s^2 and rad/s^2.
 
@@ -30,6 +32,7 @@ class BaseMotion:
     placement: FloatArray = field(default_factory=lambda: np.eye(4))
     velocity: FloatArray = field(default_factory=lambda: np.zeros(6))
     acceleration: FloatArray = field(default_factory=lambda: np.zeros(6))
+    _rotation: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, shape in (("placement", (4, 4)), ("velocity", (6,)), ("acceleration", (6,))):
@@ -47,10 +50,8 @@ class BaseMotion:
             raise InputError("the batch shapes of the base's fields do not fit", found=shapes) from None
         if (self.placement[..., 3, :] != [0.0, 0.0, 0.0, 1.0]).any():
             raise InputError("the last row of the base's placement is 0 0 0 1")
-        # Through the quaternion and back: a rotation given to nine digits becomes one to the last digit.
-        placement = np.array(self.placement)
-        placement[..., :3, :3] = rotation_of(quaternion_of(placement[..., :3, :3]))
-        object.__setattr__(self, "placement", frozen(placement))
+        R = nearest_rotation(self.placement[..., :3, :3], "the rotation of the base's placement")
+        object.__setattr__(self, "_rotation", frozen(R))
 
     def __reduce__(self) -> tuple[type[BaseMotion], tuple[Any, ...]]:
         return type(self), (self.placement, self.velocity, self.acceleration)
@@ -66,7 +67,7 @@ class BaseMotion:
         """(n, 24) rows [R, p, w, v, alpha, a] for the kernels, one row if the base is the same for all."""
         shape = batch_shape if self.batch_shape else ()
         parts = (
-            self.placement[..., :3, :3].reshape(*self.placement.shape[:-2], 9),
+            self._rotation.reshape(*self.placement.shape[:-2], 9),
             self.placement[..., :3, 3],
             self.velocity[..., 3:],
             self.velocity[..., :3],

@@ -24,6 +24,7 @@ from urdfkin.rotation.euler_rates import (
     singularity_distance,
 )
 from urdfkin.rotation.integrate import integrate_orientation
+from urdfkin.rotation.nearest import nearest_rotation
 from urdfkin.rotation.quaternion import conjugate, multiply, quaternion_of, rotation_of
 from urdfkin.rotation.quaternion_rates import (
     angular_velocity_from_quaternion_rates,
@@ -58,6 +59,7 @@ __all__ = [
     "integrate_orientation",
     "log_rotation",
     "multiply",
+    "nearest_rotation",
     "quaternion_of",
     "quaternion_rate_matrix",
     "quaternion_rates",

@@ -16,6 +16,9 @@ FloatArray = NDArray[np.float64]
 #: A direction counts as a unit vector when its norm is one to this. Normalised doubles are within 4e-16;
 #: six typed digits are not, and would give a matrix that is no rotation.
 UNIT_TOLERANCE = 1e-12
+#: A matrix is a rotation when R R^T is the identity to this: nine decimals, each off by 5e-10, leave it off
+#: by 1e-9 times the sum of the absolute values of a row, which is sqrt(3) at most.
+ROTATION_TOLERANCE = 2e-9
 #: NumPy's kinds that would turn into floats without a word: complex, bytes, text, spans and dates.
 _NOT_NUMBERS = "cSUmMV"
 
@@ -86,7 +89,7 @@ def rotations(value: ArrayLike, name: str) -> FloatArray:
     """`value` as (..., 3, 3) rotation matrices; raises InputError naming the argument otherwise."""
     array = matrices(value, name)
     residual = np.abs(array @ array.swapaxes(-1, -2) - np.eye(3)).max(initial=0.0)
-    if residual > 1e-9:
+    if residual > ROTATION_TOLERANCE:
         raise InputError(f"{name} must be a rotation", found=f"R R^T off the identity by {residual:.3g}")
     if (determinant(array) < 0.0).any():
         raise InputError(f"{name} must be a rotation", found="a reflection, determinant -1")

@@ -54,7 +54,7 @@ def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
         moving = tuple(i for i in tree.path(leaf) if tree.joints[i].kind.nv)
         if moving and moving not in seen and len(seen) < MOST:
             seen.add(moving)
-            yield None, robot.base_frame, f"link:{tree.links[leaf]}"
+            yield None, robot.base_frame, tree.link_frames[leaf]
 
 
 def _checked(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable]) -> dict[str, Any]:

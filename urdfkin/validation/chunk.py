@@ -128,7 +128,7 @@ def _loaded(subject: Subject) -> tuple[Robot, Oracle, Plan]:
     # The chunks of a robot come one after another; a worker need not read it again for each.
     robot = subject.load()
     links = tuple(robot.tree.frame_link(frame) for frame in robot.all_frames)
-    return robot, Oracle(robot.urdf, robot.tree, root_joint=robot.root_joint), robot.plan(links)
+    return robot, robot.oracle(None), robot.plan(links)
 
 
 def run_chunk(chunk: Chunk) -> ChunkResult:

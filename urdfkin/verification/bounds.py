@@ -39,6 +39,22 @@ Adding the joint's term to the sum and its cross product cost 2 eps at most on e
 more than there is covers the frame's own offset and the first of these sums, and the rest is in rounding
 8.1 + 13.1 = 21.2 up to ROUNDINGS = 24. The two may err in opposite directions, hence the sum.
 
+A base that is turned counts as one joint more (`magnitudes`); one that is not rounds nothing. Both sides
+bring the user's matrix M, right to nine digits, to the rotation nearest to it, each in its own way, so that
+how far M is from a rotation does not enter:
+
+| | urdfkin | Pinocchio |
+|---|---|---|
+| M^T M - I: nine sums of three products, 9 u in the Frobenius norm, of which the step takes half | 2.3 | |
+| the difference M - M (M^T M - I)/2, u sqrt(3), and what the step leaves, u/8 | 0.9 | |
+| K: sums of two or three numbers, 12 u; eigenvalues 4 apart; a quaternion's turn counts twice | | 3.0 |
+| the eigenvector once more through K + I: four products, 16 u, likewise; the quotient by its norm | | 5.0 |
+| the quaternion's matrix | | 3.0 |
+| a base's velocity and acceleration, brought into its axes: two crosses and two sums | | 6.0 |
+| | 3.2 | 17.0 |
+
+20.2 is within ROUNDINGS. Found were 0.6 and 5.1 for the rotation (1,500 matrices, against 50 digits).
+
 A quantity is multilinear in rotated vectors, each a *factor* that may be off by as much: a position has one
 in each term (R d), a velocity two (w and d), an acceleration three (w, w, d, or v z, w, d), a Jacobian's
 linear rows two (z and d), its rate's three (w, z and d); seeing it in the frame's own axes is one factor
@@ -116,9 +132,12 @@ class Bound:
 
 
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """`k` for each result, the same for all its numbers; `leading` axes count results."""
+    """`k` for each result, the same for all its numbers; `leading` axes count results.
+
+    A k that allows nothing, less, or anything is no number: no share of it is within the bound.
+    """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
-    return np.broadcast_to(k, leading)
+    return np.broadcast_to(np.where((k > 0.0) & (k < np.inf), k, np.nan), leading)
 
 
 def roundings(quantity: Quantity, reference: Reference, size: Magnitudes) -> FloatArray:

@@ -152,8 +152,10 @@ class Certificate:
 
     @property
     def verified(self) -> bool:
-        """Whether results were handed out and every one of them was checked."""
-        return any(line.checked for line in self.lines) and not any(line.unchecked for line in self.lines)
+        """Whether results were handed out and every one of them was checked and found within its bound."""
+        return any(line.checked for line in self.lines) and not any(
+            line.unchecked or not line.share <= 1.0 for line in self.lines
+        )
 
     def __str__(self) -> str:
         head = f"{self.robot}, checked by Pinocchio {self.pinocchio}"

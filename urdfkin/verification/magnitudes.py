@@ -23,6 +23,7 @@ from urdfkin.recursion.plan import Geometry, Motion, Plan, Step
 from urdfkin.tree import FloatArray
 
 SMALLEST = float(np.finfo(np.float64).tiny)
+_UNTURNED = np.eye(3).ravel()
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +36,8 @@ class Magnitudes:
         vel: (n, frames) m/s.
         alpha: (n, frames) rad/s^2.
         acc: (n, frames) m/s^2.
-        joints: (n, frames) how many joints' worth of rounding lies on the path: one for each URDF joint, and
-            one more.
+        joints: (n, frames) how many joints' worth of rounding lies on the path: one for each URDF joint, one
+            for a base that is turned, and one more.
         tilt: (n, frames) rad: by how much Pinocchio's axes on the path are off the file's, added up.
     """
 
@@ -75,7 +76,8 @@ def magnitudes(
         carried = carry(states[step + 1], lengths[len(plan.steps) + f])
         for row, values in zip(out, carried, strict=False):
             row[:, place] = values  # what is the same for all configurations is one number
-    out[5], out[6] = plan.depth + 1, plan.tilts
+    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # such a base rounds like a joint: see `bounds`
+    out[5], out[6] = plan.depth + 1 + turned[:, np.newaxis], plan.tilts
     return Magnitudes(*out)
 
 

@@ -1,0 +1,309 @@
+"""Run as a program: slips between what a user gives and what is handed out, and what each leads to.
+
+    python -m tests.attacks.slips_between [--sample N --seed S] [MODULE...]
+
+Each slip is one of `scripts.mutating.operators`, made in a process of its own in a function that has been
+imported already. That process then loads a robot that has everything (a follower of a follower, a planar and
+a floating joint, names that look like ours), and asks for every quantity in many ways. Printed is JSON: for
+each slip what became of it:
+
+    caught    a call raised VerificationError or OracleError, or Pinocchio was found to read another robot
+    refused   a call raised something else
+    same      every result is the right one
+    WRONG     a result is wrong, and the certificate says that it was verified
+    BLIND     of a robot that urdfkin misreads by a billionth, a result is handed out as verified
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import importlib
+import inspect
+import json
+import os
+import random
+import re
+import signal
+import traceback
+import types
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import urdfkin
+from scripts.mutating.operators import mutated, slips
+from urdfkin import BaseMotion
+from urdfkin.dh import table_from_rows
+from urdfkin.errors import OracleError
+from urdfkin.origin import Origin
+from urdfkin.robot import Robot
+from urdfkin.rotation import exp_rotation
+from urdfkin.tree import FloatArray
+from urdfkin.urdf.reader import read_tree
+
+#: Where a user's numbers pass on their way to the result, and on their way to Pinocchio.
+MODULES = (
+    "asked", "call", "chain", "checks", "configuration", "coupling", "dh.to_tree", "followers",
+    "frame_names", "from_table", "manipulator", "oracle", "oracle_base", "oracle_frames",
+    "oracle_layout", "recursion.base", "recursion.batch", "recursion.columns", "recursion.evaluate",
+    "recursion.plan", "recursion.rows", "reference", "robot", "rotation.aligning",
+    "rotation.arrays", "rotation.nearest", "rotation.quaternion", "tables", "tree", "urdf.reader",
+    "urdf.skeleton", "urdf.writer", "verification.bounds", "verification.certificate",
+    "verification.choosing", "verification.magnitudes", "verification.tables",
+)  # fmt: skip
+
+#: A result is the right one when it is off by less than this share of the largest number.
+TOLERANCE = 1e-9
+#: Results that are checked without an entry in the robot's ledger.
+UNCOUNTED = ("table", "robot of a table")
+#: Longest that a process may take, seconds.
+_PATIENCE = 60
+
+
+def _joint(name: str, kind: str, parent: str, child: str, more: str = "", axis: str = "1 -2 0.5") -> str:
+    number = len(name) + len(parent)
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="0.{number} -0.2 0.1" rpy="0.{number} 1 -0.4"/><axis xyz="{axis}"/>'
+        f'<limit lower="-2" upper="1.5" effort="1" velocity="1"/>{more}</joint>'
+    )
+
+
+URDF = (
+    '<robot name="everything">'
+    + "".join(f'<link name="{n}"/>' for n in ["base", "b", "joint:b", "c", "d", "e", "f", "g", "h", "link:b"])
+    + _joint("b", "revolute", "base", "c")
+    + _joint("slide", "prismatic", "c", "b", axis="0 0 1")
+    + _joint("turn", "continuous", "b", "joint:b", axis="0 -1 0")
+    + _joint("first", "revolute", "joint:b", "d", '<mimic joint="slide" multiplier="-1.5" offset="0.3"/>')
+    + _joint("bolt", "fixed", "d", "e")
+    + _joint("second", "continuous", "e", "f", '<mimic joint="first" multiplier="0.7" offset="-0.2"/>')
+    + _joint("free", "floating", "base", "g")
+    + _joint("table", "planar", "g", "h", axis="0 0 1")
+    + _joint("link:c", "prismatic", "h", "link:b", '<mimic joint="b" offset="0.1"/>')
+    + "</robot>"
+)
+
+
+def results() -> Iterator[tuple[str, Callable[[Robot], FloatArray]]]:
+    """Every way to be handed a result, by name; the same inputs each time."""
+    generator = np.random.default_rng(3)
+    q = generator.uniform(-1.0, 1.4, (2, 1, 13))
+    q[..., 6:10] *= (1.0 + 4e-7) / np.linalg.norm(q[..., 6:10], axis=-1, keepdims=True)
+    v, a = generator.normal(size=(3, 12)), generator.normal(size=(2, 3, 12))
+    T = np.tile(np.eye(4), (3, 1, 1))
+    T[:, :3, :3] = np.round(exp_rotation(generator.normal(size=(3, 3))), 9)
+    T[:, :3, 3] = generator.normal(size=(3, 3))
+    moves = BaseMotion(T, generator.normal(size=6), generator.normal(size=(2, 1, 6)))
+    stands = BaseMotion(T[0])
+    one = q[1, 0], v[1], a[0, 2]
+    yield "placement", lambda r: r.placement(q, "f")
+    yield "placement of a link like a joint", lambda r: r.placement(list(one[0]), "link:b", base=stands)
+    yield "placement of a joint", lambda r: r.placement(q, "joint:slide", base=moves)
+    yield "placements", lambda r: r.placements(q[:, 0])
+    yield "velocity", lambda r: r.velocity(q, v, "link:b", "WORLD", base=moves)
+    yield "velocity, alone", lambda r: r.velocity(one[0], one[1], "joint:b", "local")
+    yield "velocities", lambda r: r.velocities(q, v, ["f", "h"], "local", base=stands, verify="sample")
+    yield "jacobian", lambda r: r.jacobian(q, "second", "local", base=moves)
+    yield "jacobian into out", lambda r: r.jacobian(q, "link:b", out=np.empty((2, 1, 6, 12)))
+    yield "jacobians", lambda r: r.jacobians(one[0], ["f", "link:b"], "world")
+    yield "jacobian rate", lambda r: r.jacobian_rate(q, v, "f", "local", base=moves)
+    yield "acceleration", lambda r: r.acceleration(q, v, a, "f", "local", base=moves)
+    yield "acceleration, alone", lambda r: r.acceleration(*one, "link:b")
+    yield "accelerations", lambda r: r.accelerations(q, v, a, ["f", "g", "link:b"], "world", base=moves)
+    yield "breakdown", lambda r: r.acceleration_breakdown(q, v, a, "f", base=moves).total
+    yield "table", lambda r: _by_table(r, q)
+    yield "robot of a table", lambda r: _of_table(q[..., :3])
+
+
+def _by_table(robot: Robot, q: FloatArray) -> FloatArray:
+    table = robot.dh("f", base="base")
+    return table.placement(robot.select(table, q))
+
+
+def _of_table(q: FloatArray) -> FloatArray:
+    rows = [[0.1, 0.7, 0.2, 0.3], [0.0, -0.4, 0.1, 0.2], [0.2, 0.5, -0.3, 0.1, "P"]]
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = exp_rotation([0.3, -0.2, 0.5]), (0.1, 0.2, 0.3)
+    table = replace(table_from_rows(rows, "standard"), base=T, tool=T @ T)
+    robot = table.to_robot()
+    return robot.placement(q, robot.tip_frame)
+
+
+def misread() -> Robot:
+    """The robot, each of its numbers off by a billionth in urdfkin's own reading, but not in Pinocchio's."""
+    tree = read_tree(
+        re.sub(r'(?<=[" ])-?[0-9.]+(?=[" ])', lambda x: repr(float(x[0]) * (1 + 1e-9)), URDF).encode()
+    )
+    return Robot(tree, URDF, origin=Origin("<text>"))
+
+
+def blind() -> list[str]:
+    """The ways by which the misread robot's results are handed out as verified now."""
+    warnings.simplefilter("ignore")
+    found = []
+    for name, compute in results():
+        if name in UNCOUNTED:  # nothing but the check itself could tell
+            continue
+        robot = misread()
+        try:
+            compute(robot)
+        except Exception:
+            continue
+        if not robot.cannot_verify() and robot.certificate().verified:
+            found.append(name)
+    return found
+
+
+def outcome(right: dict[str, FloatArray] | None) -> tuple[str, dict[str, FloatArray]]:
+    """What becomes of a robot that is read and asked now."""
+    warnings.simplefilter("ignore")
+    found: dict[str, FloatArray] = {}
+    words, wrong = set[str](), list[str]()
+    try:
+        robot = urdfkin.load(URDF)
+    except Exception as error:
+        return f"refused: {type(error).__name__}: {error}"[:200], found
+    for name, compute in results():
+        robot.ledger = type(robot.ledger)()
+        try:
+            found[name] = compute(robot)
+        except (urdfkin.VerificationError, OracleError, urdfkin.TableError):
+            words.add("caught")
+            continue
+        except Exception as error:
+            words.add(f"refused: {name}: {type(error).__name__}: {error}"[:200])
+            continue
+        if right is not None and not _alike(found[name], right[name]):
+            if robot.cannot_verify() or not (robot.certificate().verified or name in UNCOUNTED):
+                words.add("caught")  # found at the door: the result is handed out as not verified
+            else:
+                wrong.append(name)
+    if wrong:
+        return "WRONG: " + ", ".join(wrong), found
+    return ("caught" if "caught" in words else min(words, default="same")), found
+
+
+def _alike(x: FloatArray, y: FloatArray) -> bool:
+    return x.shape == y.shape and bool((np.abs(x - y) <= TOLERANCE * max(1.0, float(np.abs(y).max()))).all())
+
+
+# -- making a slip -----------------------------------------------------------------------------------
+
+
+def _codes(code: types.CodeType) -> Iterator[tuple[str, types.CodeType]]:
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield constant.co_qualname, constant
+            if "<" not in constant.co_name:
+                yield from _codes(constant)
+
+
+def _functions(module: types.ModuleType) -> Iterator[types.FunctionType]:
+    """The functions and methods that a module defines, wrapped ones too."""
+    for value in list(vars(module).values()):
+        members = list(vars(value).values()) if inspect.isclass(value) else [value]
+        for member in members:
+            for function in _unwrapped(member):
+                if function.__module__ == module.__name__:
+                    yield function
+
+
+def _unwrapped(member: Any) -> Iterator[types.FunctionType]:
+    if isinstance(member, property):
+        member = member.fget
+    elif isinstance(member, cached_property):
+        member = member.func
+    elif isinstance(member, classmethod | staticmethod):
+        member = member.__func__
+    while member is not None:
+        if isinstance(member, types.FunctionType):
+            yield member
+        member = getattr(member, "__wrapped__", None)
+
+
+def make(module: types.ModuleType, tree: ast.Module) -> bool:
+    """Give the module's functions the code of a changed source; whether any has changed."""
+    codes = dict(_codes(compile(tree, str(module.__file__), "exec")))
+    changed = False
+    for function in _functions(module):
+        code = codes.get(function.__qualname__)
+        if code is None or code.co_freevars != function.__code__.co_freevars:
+            continue
+        if (code.co_code, code.co_consts) != (function.__code__.co_code, function.__code__.co_consts):
+            function.__code__ = code
+            changed = True
+    return changed
+
+
+def attempt(name: str, change: Callable[[str], ast.Module], right: dict[str, FloatArray]) -> str:
+    """What a process in which a module's source was changed says; `unreached` where it cannot be made."""
+    module = importlib.import_module(f"urdfkin.{name}")
+    tree = change(_source(name))
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(_PATIENCE)
+        os.close(reading)
+        answer = "unreached"
+        try:
+            if make(module, tree):
+                answer = outcome(right)[0]
+                if answer == "same" and (unseen := blind()):
+                    answer = "BLIND: " + ", ".join(unseen)
+        except BaseException:
+            answer = "refused: " + traceback.format_exc()[-150:]
+        os.write(writing, answer.encode())
+        os._exit(0)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as pipe:
+        answer = pipe.read().decode()
+    os.waitpid(child, 0)
+    return answer or "refused: died"
+
+
+def _source(name: str) -> str:
+    return Path(str(importlib.import_module(f"urdfkin.{name}").__file__)).read_text(encoding="utf-8")
+
+
+def truth() -> dict[str, FloatArray]:
+    """What every way hands out without any slip.
+
+    Raises:
+        RuntimeError: then already something is refused, or a misread robot is not noticed.
+    """
+    (word, found), unseen = outcome(None), blind()
+    if word != "same" or unseen:
+        raise RuntimeError(f"without any slip: {word}; not noticed: {unseen}")
+    return found
+
+
+def slips_of(names: Sequence[str], sample: int | None, seed: int) -> list[tuple[str, int]]:
+    """Slips as (module, number): all of some modules, or a sample."""
+    places = [(name, i) for name in names for i in range(len(slips(ast.parse(_source(name)))))]
+    return places if sample is None else random.Random(seed).sample(places, min(sample, len(places)))
+
+
+def main() -> None:
+    """Print what became of each slip, or of a sample."""
+    arguments = argparse.ArgumentParser()
+    arguments.add_argument("modules", nargs="*")
+    arguments.add_argument("--sample", type=int)
+    arguments.add_argument("--seed", type=int, default=0)
+    asked = arguments.parse_args()
+    right = truth()
+    for name, number in slips_of(asked.modules or MODULES, asked.sample, asked.seed):
+        slip = slips(ast.parse(_source(name)))[number]
+        answer = attempt(name, lambda source, number=number: mutated(source, number), right)  # type: ignore[misc]
+        row = {"slip": f"{name}:{number}", "line": slip.line, "what": slip.what, "outcome": answer}
+        print(json.dumps(row), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+"""No slip between a user's numbers and the result is verified, and none blinds the check."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+
+import pytest
+
+from scripts.mutating.operators import mutated
+from tests.attacks.slips_between import MODULES, attempt, slips_of, truth
+from urdfkin.tree import FloatArray
+
+#: Slips that change no number by itself but which way a thing is turned, ordered or shared: module, text that
+#: stands there once, what to write instead.
+FRAGMENTS = [
+    # the base's motion
+    ("recursion.base", "self._rotation.reshape(", "np.swapaxes(self._rotation, -1, -2).reshape("),
+    ("recursion.base", "self.placement[..., :3, 3],", "-self.placement[..., :3, 3],"),
+    ("recursion.base", "  self.velocity[..., 3:],\n", "  self.velocity[..., :3],\n"),
+    ("recursion.base", "  self.velocity[..., :3],\n", "  self.acceleration[..., :3],\n"),
+    ("recursion.base", "  self.acceleration[..., 3:],\n", "  -self.acceleration[..., 3:],\n"),
+    ("recursion.base", "np.broadcast_to(part, (*shape, part.shape[-1]))",
+     "np.broadcast_to(part, (*shape, part.shape[-1]))[::-1]"),
+    ("rotation.nearest", "return nearest", "return np.swapaxes(nearest, -1, -2)"),
+    ("rotation.nearest", "M - M @ (0.5 * defect)", "M + M @ (0.5 * defect)"),
+    # a call's inputs and its results
+    ("call", "np.ascontiguousarray(array.reshape(self.n, width))",
+     "np.ascontiguousarray(array.reshape(self.n, width)[::-1])"),
+    ("call", "np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width)",
+     "np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width)[::-1]"),
+    ("call", "self.q, *self.rates = flat", "self.q, *self.rates = flat[:1] + flat[:0:-1]"),
+    ("call", "return result.reshape(*self.shape, *result.shape[2:]) if out is None else out",
+     "return result[::-1].reshape(*self.shape, *result.shape[2:]) if out is None else out"),
+    ("call", "return result.reshape(*self.shape, *result.shape[1:]) if out is None else out",
+     "return result[::-1].reshape(*self.shape, *result.shape[1:]) if out is None else out"),
+    ("call", "return out.reshape(self.n", "return out.copy().reshape(self.n"),
+    ("call", "tuple(robot.tree.frame_link(frame) for frame in self.frames)",
+     "tuple(robot.tree.frame_link(frame) for frame in reversed(self.frames))"),
+    ("call", "base.state(self.shape)", "base.state(self.shape)[::-1]"),
+    ("call", "self.reference = Reference.of(reference)", "self.reference = Reference.LOCAL_WORLD_ALIGNED"),
+    # configurations, coordinates, followers
+    ("configuration", "quaternion[...] = unit_quaternions(", "_ = unit_quaternions("),
+    ("rotation.quaternion", "normalised: FloatArray = quat / norms", "normalised: FloatArray = quat * norms"),
+    ("tree", "tuple(int(own[i]) for i in leaders)", "tuple(int(own[i]) for i in range(len(self.joints)))"),
+    ("tree", "return sorted(joints, key=lambda pair: pair[0].name, reverse=True)",
+     "return sorted(joints, key=lambda pair: pair[0].name)"),
+    ("urdf.reader", "= rule.multiplier * end.offset + rule.offset", "= end.offset + rule.offset"),
+    ("urdf.reader", "rule.multiplier * end.multiplier, offset)", "rule.multiplier, offset)"),
+    ("urdf.reader", "resolved[follower] = Mimic(end.leader,", "resolved[follower] = Mimic('b',"),
+    ("followers", "offset = rule.multiplier * end.offset + rule.offset", "offset = end.offset + rule.offset"),
+    ("followers", "rule.multiplier * end.multiplier, offset)", "rule.multiplier, offset)"),
+    # the tree and the plan
+    ("tree", "return link if link is not None else self._joint_index[name] + 1",
+     "return joint + 1 if joint is not None else self._link_index[name] - 1"),
+    ("urdf.reader", "T_parent_joint=np.eye(4) if joint.origin is None else joint.origin",
+     "T_parent_joint=np.eye(4) if joint.origin is None else np.round(joint.origin, 9)"),
+    ("urdf.reader", "axis if length == 1.0 else axis / length", "axis if length == 1.0 else -axis / length"),
+    ("recursion.plan", "T[:3, :3].T @ T[:3, 3]", "T[:3, :3] @ T[:3, 3]"),
+    ("recursion.plan", "turned(joint).T, 0.0)", "turned(joint), 0.0)"),
+    ("recursion.plan", "anchors[joint.parent].T @ joint.T_parent_joint @ turned(joint)",
+     "joint.T_parent_joint @ anchors[joint.parent].T @ turned(joint)"),
+    ("recursion.plan", "else (rule.multiplier, rule.offset)", "else (rule.multiplier, -rule.offset)"),
+    ("recursion.plan", "steps[row, Step.V] = tree.v_index[i]", "steps[row, Step.V] = tree.v_index[i] - 1"),
+    ("recursion.plan", "order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)",
+     "order = sorted(range(len(links)), key=lambda place: -anchors[links[place]].step)"),
+    ("rotation.aligning", "return", "return -"),
+    # a table's URDF
+    ("dh.to_tree", "ways = [s @ x for s, x", "ways = [x @ s for s, x"),
+    ("dh.to_tree", "poses[-1] @ table.tool\n", "table.tool @ poses[-1]\n"),
+    ("urdf.writer", "numbers(rpy_of(T[:3, :3]))", "numbers(rpy_of(T[:3, :3])[::-1])"),
+    ("urdf.writer", "numbers(T[:3, 3])", "numbers(T[:3, :3] @ T[:3, 3])"),
+    # Pinocchio's side
+    ("oracle_base", "linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])", "linear = acc[..., :3]"),
+    ("oracle_layout", "*at[rule.leader], rule.multiplier", "*at[rule.leader][::-1], rule.multiplier"),
+    ("oracle_frames", "body, joint = self._bodies.get(name)", "body, joint = self._bodies.get(name[5:])"),
+    ("asked", "return spread[places]", "return spread[places][::-1]"),
+    ("asked", "return result.reshape(self.n, len(self.frames), *own)",
+     "return result.reshape(self.n, len(self.frames), *own)[::-1]"),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def right() -> dict[str, FloatArray]:
+    return truth()
+
+
+def replacing(before: str, after: str) -> Callable[[str], ast.Module]:
+    def change(source: str) -> ast.Module:
+        assert source.count(before) == 1, f"{source.count(before)} times: {before}"
+        return ast.parse(source.replace(before, after))
+
+    return change
+
+
+@pytest.mark.parametrize(("module", "before", "after"), FRAGMENTS)
+def test_a_slip_on_the_way_is_caught(
+    right: dict[str, FloatArray], module: str, before: str, after: str
+) -> None:
+    assert attempt(module, replacing(before, after), right) == "caught"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_of_any_slips_none_is_verified_and_none_blinds_the_check(
+    right: dict[str, FloatArray], seed: int
+) -> None:
+    # All of them: python -m tests.attacks.slips_between
+    found = {
+        (module, number): attempt(module, lambda source, number=number: mutated(source, number), right)  # type: ignore[misc]
+        for module, number in slips_of(MODULES, 40, seed)
+    }
+    assert [slip for slip, word in found.items() if word.startswith(("WRONG", "BLIND"))] == []
+    assert "caught" in found.values()
