@@ -71,14 +71,13 @@ def choice(value: str | None, default: str, name: str) -> str:
 
 
 def words(value: Any, name: str) -> tuple[str, ...]:
-    """`value` as a tuple of texts."""
+    """`value` as a tuple of what should be names: whoever looks them up says which is none."""
     if isinstance(value, str):
         raise InputError(f"{name} are a list of names", found=shown(value), remedy=f"write [{shown(value)}]")
     try:
-        found = tuple(value)
+        return tuple(value)
     except TypeError:
         raise InputError(f"{name} are a list of names", found=shown(value)) from None
-    return tuple(word(one, f"each of {name}") for one in found)
 
 
 def switch(value: object, name: str) -> bool:

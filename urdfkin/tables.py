@@ -106,7 +106,7 @@ class Tables:
             snap=snap,
             last=word(last, "last"),
             parallel_offset=word(parallel_offset, "parallel_offset"),
-            flip=words(flip, "flip"),
+            flip=[word(joint, "each of flip") for joint in words(flip, "flip")],
         )
         if checked_choice(robot.verify if verify is None else verify):
             verified(robot, table)
