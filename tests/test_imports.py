@@ -14,8 +14,10 @@ PACKAGE = Path(__file__).parent.parent / "urdfkin"
 #: Every part of the package, in the order in which they may build on one another: a module imports what
 #: stands in its own row or above it. Imports inside functions count; those for types alone do not.
 LAYERS = (
-    ("errors", "nearest", "frame_names", "interpreter", "printable"),
-    ("rotation", "motion", "equations", "resources", "keeping", "figure", "plain_xml"),
+    ("errors", "nearest", "numerals", "frame_names", "interpreter", "printable"),
+    ("demands", "forking"),
+    ("files", "rotation", "motion", "equations", "resources", "keeping", "sealed", "figure", "plain_xml"),
+    ("columns",),
     ("tree", "reference"),
     ("coupling", "followers", "configuration", "chain"),
     ("recursion",),
@@ -24,7 +26,7 @@ LAYERS = (
     ("catalogue", "sources", "origin", "deep_stack"),
     ("oracle_frames", "oracle_layout", "oracle_base", "oracle", "verification"),
     ("asked", "checks", "call", "prepared", "manipulator", "tables", "robot"),
-    ("loading", "from_table", "checking", "description", "trajectory", "frame_motion"),
+    ("loading", "from_table", "checking", "description", "unwrapping", "trajectory", "frame_motion"),
     ("judge", "validation"),
     ("plot", "report", "view"),
     ("cli",),

@@ -4,7 +4,9 @@ import os
 import time
 from pathlib import Path
 
-from urdfkin.keeping import kept_folder
+import pytest
+
+from urdfkin.keeping import CacheWarning, kept_folder
 
 
 def test_a_folder_is_the_same_until_its_sources_or_anything_beside_them_change(tmp_path: Path) -> None:
@@ -44,4 +46,5 @@ def test_what_nobody_used_for_a_month_is_deleted_and_nothing_else(tmp_path: Path
 
 def test_a_root_that_cannot_be_written_gives_no_folder(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    assert kept_folder("kernels", [], root=tmp_path / "file") is None
+    with pytest.warns(CacheWarning, match="nothing can be kept in .*file: .*set XDG_CACHE_HOME"):
+        assert kept_folder("kernels", [], root=tmp_path / "file") is None

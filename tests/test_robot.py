@@ -350,7 +350,7 @@ def test_a_sample_lies_within_limits_and_repeats_itself(panda: Robot) -> None:
     assert (q == panda.sample(500, 4)).all()
     assert (q != panda.sample(500, 5)).all()
     assert panda.limit_violations(panda.neutral()) == ["joint panda_joint4: 0 is outside [-3.0718, -0.0698]"]
-    with pytest.raises(InputError, match="sample needs n >= 0"):
+    with pytest.raises(InputError, match="must be at least 0"):
         panda.sample(-1)
 
 

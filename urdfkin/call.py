@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.asked import Question
 from urdfkin.checks import Part, axes_of, held_against
+from urdfkin.demands import words
 from urdfkin.errors import InputError, NotFiniteError, RangeError
 from urdfkin.recursion.base import STILL_STATE, BaseMotion
 from urdfkin.recursion.plan import IntArray
@@ -43,12 +44,6 @@ class NotVerifiedWarning(UserWarning):
     """Results are handed out that Pinocchio could not check; the message says why."""
 
 
-def _named(frames: Sequence[str]) -> tuple[str, ...]:
-    if isinstance(frames, str):
-        raise InputError("frames are a list of names", found=repr(frames), remedy=f"write [{frames!r}]")
-    return tuple(frames)
-
-
 def _every_link(robot: Robot) -> tuple[str, ...]:
     return tuple(robot.tree.frame_name(link) for link in range(len(robot.tree.links)))
 
@@ -77,10 +72,10 @@ class Call:
         if base is not None and not isinstance(base, BaseMotion):
             raise InputError("base is a BaseMotion or None", found=type(base).__name__)
         self.robot, self.base = robot, base
+        self.frames = _every_link(robot) if frames is None else words(frames, "frames")
         self.question = Question(
             robot.tree.link_frames if frames is None else frames, reference, base, inputs
         )
-        self.frames = _every_link(robot) if frames is None else _named(frames)
         self.reference = Reference.of(reference)
         self.links = tuple(robot.tree.frame_link(frame) for frame in self.frames)
         self.plan = robot.plan(self.links)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from urdfkin.demands import switch, word
 from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Limits
 from urdfkin.diagnostics.check import check_robot, read_document
 from urdfkin.diagnostics.reporter import Reporter
@@ -49,6 +50,11 @@ def check(
     ...     print(finding)  # doctest: +ELLIPSIS
     <text>:1:42: URDF411 error: link 'stray': the link has no parent, and neither has "base"; ...
     """
+    if mimic is not None:
+        switch(mimic, "mimic")
+    if root_joint is not None:
+        word(root_joint, "root_joint")
+    switch(fold, "fold")
     text = read_source(source, limits.bytes, xacro_args)
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic

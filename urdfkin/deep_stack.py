@@ -11,10 +11,12 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import TypeVar
 
+from urdfkin.forking import lock_over_forks
+
 _T = TypeVar("_T")
 
 _USUAL_STACK = 8 * 2**20
-_one_at_a_time = threading.Lock()
+_one_at_a_time = lock_over_forks()
 
 
 def with_stack(size: int, function: Callable[[], _T]) -> _T:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.call import Call
+from urdfkin.demands import real_number, word
 from urdfkin.errors import RangeError
 from urdfkin.motion.representation import analytical_jacobian
 from urdfkin.recursion import evaluate
@@ -238,6 +239,7 @@ class Manipulator:
             VerificationError: Pinocchio computes something else.
         """
         robot = _robot(self)
+        representation, nearest = word(representation, "representation"), real_number(nearest, "nearest")
         call = Call(robot, (frame,), _ALIGNED, base, q, representation=representation, nearest=nearest)
         poses = call.compute(evaluate.placements, call.plan, call.q, base=call.state)
         J_v = call.compute(evaluate.jacobians, call.plan, call.q, base=call.state)

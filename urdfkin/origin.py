@@ -5,6 +5,8 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 
+from urdfkin.demands import switch, word
+
 
 @dataclass(frozen=True, slots=True)
 class Origin:
@@ -15,12 +17,21 @@ class Origin:
         mimic: As it was given.
         root_joint: As it was given.
         xacro_args: Names and values.
+
+    Raises:
+        InputError: `mimic` is neither True, False nor None, or `root_joint` is no name.
     """
 
     source: str
     mimic: bool | None = None
     root_joint: str | None = None
     xacro_args: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.mimic is not None:
+            switch(self.mimic, "mimic")
+        if self.root_joint is not None:
+            word(self.root_joint, "root_joint")
 
     @property
     def again(self) -> str:

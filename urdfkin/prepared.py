@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.recursion.compiling import NoKernelError
 from urdfkin.recursion.plan import Packed, Plan
 from urdfkin.recursion.scratch import scratch
 from urdfkin.reference import Reference
@@ -23,10 +24,12 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 _empty = np.empty
+#: Numba takes a masked array for a plain one, once it has seen a plain one.
+_ARRAY = np.ndarray
 #: What the kernels count, in the order of `Packed.COUNTS`.
 _COUNTED = Quantity.PLACEMENT, Quantity.VELOCITY, Quantity.ACCELERATION, Quantity.JACOBIAN
 #: What Numba raises for arguments that are no arrays of the kernel's kind; an empty list has no type at all.
-_NOT_TAKEN = (TypeError, ValueError, OverflowError)
+_NOT_TAKEN = (TypeError, ValueError, OverflowError, NoKernelError)
 
 
 class PreparedFrame:
@@ -81,7 +84,7 @@ class PreparedFrame:
         """(4, 4) T_world_frame: eq. 7.77."""
         pose = _empty((4, 4)) if out is None else out
         try:
-            if self._placement(self._packed, q, pose) == 1:
+            if type(q) is _ARRAY and self._placement(self._packed, q, pose) == 1:
                 return pose
         except _NOT_TAKEN:
             pass
@@ -91,7 +94,7 @@ class PreparedFrame:
         """(6,) [linear; angular] m/s, rad/s: eq. 7.127, 7.128."""
         six = _empty(6) if out is None else out
         try:
-            if self._motion(1, self._packed, q, v, v, six) == 1:
+            if type(q) is type(v) is _ARRAY and self._motion(1, self._packed, q, v, v, six) == 1:
                 return six
         except _NOT_TAKEN:
             pass
@@ -101,7 +104,7 @@ class PreparedFrame:
         """(6, nv): eq. 7.85."""
         J = _empty(self._shape) if out is None else out
         try:
-            if self._jacobian(self._packed, q, J) == 1:
+            if type(q) is _ARRAY and self._jacobian(self._packed, q, J) == 1:
                 return J
         except _NOT_TAKEN:
             pass
@@ -113,7 +116,8 @@ class PreparedFrame:
         """(6,) [linear; angular] m/s^2, rad/s^2, classical: eq. 7.129, 7.130."""
         six = _empty(6) if out is None else out
         try:
-            if self._motion(2, self._packed, q, v, a, six) == 1:
+            plain = type(q) is type(v) is type(a) is _ARRAY
+            if plain and self._motion(2, self._packed, q, v, a, six) == 1:
                 return six
         except _NOT_TAKEN:
             pass

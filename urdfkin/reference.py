@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+from urdfkin.demands import shown
 from urdfkin.errors import UnknownNameError
 
 
@@ -29,7 +30,7 @@ class Reference(IntEnum):
         """The member that a user means; raises UnknownNameError for another name."""
         if isinstance(value, Reference):
             return value
-        name = str(value)
+        name = value if isinstance(value, str) else shown(value)
         if name.upper() not in cls.__members__:
             raise UnknownNameError("reference", name, [member.lower() for member in cls.__members__])
         return cls[name.upper()]

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin import configuration
 from urdfkin.call import Call
+from urdfkin.demands import switch, whole_number
 from urdfkin.diagnostics import Finding
 from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.manipulator import Manipulator
@@ -33,6 +34,8 @@ from urdfkin.verification.sampling import sample
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _ARRAY, _FLOAT64 = np.ndarray, np.dtype(np.float64)
+#: More than these no array can hold, on any machine.
+_MOST_NUMBERS = (2**63 - 1) // 8
 
 
 class Robot(Manipulator, Tables):
@@ -163,13 +166,16 @@ class Robot(Manipulator, Tables):
         return configuration.neutral(self.tree)
 
     def sample(self, n: int, seed: int = 0) -> FloatArray:
-        """(n, nq) configurations within limits; the same seed gives the same ones.
+        """(n, nq) configurations within limits, followers' too; the same seed gives the same ones.
+
+        Where a follower's limits leave its leader no room, the leader keeps to its own, and
+        `limit_violations` names the follower.
 
         Raises:
-            InputError: a negative number of samples or a negative seed.
+            InputError: `n` or `seed` is no whole number from 0 on.
         """
-        if n < 0 or seed < 0:
-            raise InputError("sample needs n >= 0 and seed >= 0", found=f"{n} and {seed}")
+        n = whole_number(n, "n", 0, _MOST_NUMBERS // max(1, self.nq))
+        seed = whole_number(seed, "seed", 0)
         return sample(self.tree, n, np.random.default_rng(seed))
 
     def limit_violations(self, q: ArrayLike) -> list[str]:
@@ -178,11 +184,11 @@ class Robot(Manipulator, Tables):
 
     def to_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """(..., nq) to the configuration of `pinocchio.buildModelFromUrdf(path, mimic=mimic)`."""
-        return configuration.to_pinocchio(self.tree, self.checked(q, "q"), mimic=mimic)
+        return configuration.to_pinocchio(self.tree, self.checked(q, "q"), mimic=switch(mimic, "mimic"))
 
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """The inverse of `to_pinocchio`; angles of continuous joints come back in (-pi, pi]."""
-        return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=mimic)
+        return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=switch(mimic, "mimic"))
 
     # -- what it computes ----------------------------------------------------------------------------
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TypeGuard
 
 from urdfkin.catalogue import Entry, catalogue
+from urdfkin.demands import shown
 from urdfkin.errors import InputError, SourceError, UnknownNameError
+from urdfkin.files import at_home, exists, read_bytes, read_standard_input
 from urdfkin.nearest import nearest
 
 #: What `load` and `check` take.
@@ -56,10 +57,14 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
             not take; the nearest names are offered.
         InputError: something else than a source.
     """
+    if xacro_args is not None and not isinstance(xacro_args, Mapping):
+        raise InputError("xacro_args are a mapping from names to values", found=shown(xacro_args))
     if is_xacro(source):
-        return _expanded(Path(source).expanduser(), xacro_args or {})
+        return _expanded(at_home(source), xacro_args or {})
     if xacro_args:
-        raise InputError("xacro_args go with the path of a .xacro file", found=", ".join(xacro_args))
+        raise InputError(
+            "xacro_args go with the path of a .xacro file", found=", ".join(map(str, xacro_args))
+        )
     if isinstance(source, bytes):
         return Text(source, "<bytes>", "<bytes>")
     if isinstance(source, os.PathLike):
@@ -102,14 +107,14 @@ def _read_word(word: str, most: int) -> Text:
             "no robot is named", found=repr(word), remedy="a path, a name that 'urdfkin robots' lists, or '-'"
         )
     if word == "-":
-        return Text(sys.stdin.buffer.read(most + 1), "<stdin>", "-")
+        return Text(read_standard_input(most), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):
         return _encoded(word, "<text>", "<text>")
     if (entry := catalogue().get(word)) is not None:
         read = _read_file(entry.path, most)
         return Text(read.data, read.label, word, entry)
-    path = Path(word).expanduser()
-    if path.exists() or os.sep in word or path.suffix:
+    path = at_home(word)
+    if os.sep in word or path.suffix or exists(path):
         return _read_file(path, most)
     raise UnknownNameError("robot", word, catalogue(), where="neither a file nor in the catalogue")
 
@@ -122,15 +127,15 @@ def _encoded(content: str | bytes, label: str, source: str) -> Text:
 
 def _read_file(path: Path, most: int) -> Text:
     try:
-        with path.open("rb") as file:
-            return Text(file.read(most + 1), str(path), as_word(path))
-    except FileNotFoundError:
-        raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
-    except IsADirectoryError:
-        raise SourceError("a folder, not a file", where=str(path), remedy="name the .urdf inside") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise SourceError("cannot be read", where=str(path), found=reason) from error
+        return Text(read_bytes(path, most), str(path), as_word(path))
+    except SourceError as error:
+        if isinstance(error.__cause__, FileNotFoundError):
+            raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
+        if isinstance(error.__cause__, IsADirectoryError):
+            raise SourceError(
+                "a folder, not a file", where=str(path), remedy="name the .urdf inside"
+            ) from None
+        raise
 
 
 def as_word(path: Path) -> str:

@@ -14,12 +14,14 @@ from numpy.typing import ArrayLike
 
 from urdfkin.call import NotVerifiedWarning
 from urdfkin.chain import FrameChain, chain
+from urdfkin.demands import choice, word, words
 from urdfkin.dh.elements import EPS
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
 from urdfkin.oracle import version
 from urdfkin.tree import FloatArray
+from urdfkin.verification.choosing import checked_choice
 from urdfkin.verification.sampling import draw
 from urdfkin.verification.tables import TableCheck, TableError, check_table
 
@@ -45,7 +47,7 @@ class Tables:
             InputError: a planar or floating joint lies on the way.
         """
         robot = cast("Robot", self)
-        return chain(robot.tree, tip or robot.tip_frame, base or robot.base_frame)
+        return chain(robot.tree, choice(tip, robot.tip_frame, "tip"), choice(base, robot.base_frame, "base"))
 
     def select(self, path: FrameChain | DHTable, q: ArrayLike) -> FloatArray:
         """(..., coordinates) of a path or table out of the robot's `q` (..., nq).
@@ -97,16 +99,16 @@ class Tables:
         robot = cast("Robot", self)
         table = dh_table(
             robot.tree,
-            tip or robot.tip_frame,
-            base or robot.base_frame,
-            convention,
-            near_parallel=near_parallel,
+            choice(tip, robot.tip_frame, "tip"),
+            choice(base, robot.base_frame, "base"),
+            word(convention, "convention"),
+            near_parallel=word(near_parallel, "near_parallel"),
             snap=snap,
-            last=last,
-            parallel_offset=parallel_offset,
-            flip=flip,
+            last=word(last, "last"),
+            parallel_offset=word(parallel_offset, "parallel_offset"),
+            flip=[word(joint, "each of flip") for joint in words(flip, "flip")],
         )
-        if robot.verify if verify is None else verify:
+        if checked_choice(robot.verify if verify is None else verify):
             verified(robot, table)
         return table
 
@@ -122,7 +124,7 @@ class Tables:
         """
         robot = cast("Robot", self)
         parameters = tree_parameters(robot.tree)
-        if robot.verify if verify is None else verify:
+        if checked_choice(robot.verify if verify is None else verify):
             verified_tree(robot, parameters)
         return parameters
 

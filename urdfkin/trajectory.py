@@ -1,24 +1,29 @@
 """Motions in time: a line between two configurations, or a table of samples.
 
 A line runs with s = 10 u^3 - 15 u^4 + 6 u^5, u = t / duration, which starts and ends at rest without a step
-in the acceleration. Where a table has no rates, they are central differences of its configurations.
+in the acceleration. Where a table has no rates, they are central differences of its configurations, whose
+angles are unwrapped first.
 """
 
 from __future__ import annotations
 
-import csv
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urdfkin.errors import InputError, SourceError
-from urdfkin.tree import FloatArray, JointKind, frozen
+from urdfkin.columns import read_columns
+from urdfkin.demands import real_number, whole_number
+from urdfkin.errors import InputError
+from urdfkin.files import read_text
+from urdfkin.rotation.quaternion import rotation_of
+from urdfkin.rotation.quaternion_rates import angular_velocity_from_quaternion_rates
+from urdfkin.tree import FloatArray, JointKind, KinematicTree, frozen
+from urdfkin.unwrapping import unwrapped
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from urdfkin.robot import Robot
 
@@ -36,6 +41,8 @@ class Trajectory:
         v: (n, nv).
         a: (n, nv).
         rates: Where v and a come from, in words.
+        exact: Whether v and a are the derivatives of q to rounding; else nobody knows how close they are.
+        notes: What a person must know about how the samples were read, a line each.
     """
 
     t: FloatArray
@@ -43,6 +50,8 @@ class Trajectory:
     v: FloatArray
     a: FloatArray
     rates: str
+    exact: bool = False
+    notes: tuple[str, ...] = ()
 
 
 def line(robot: Robot, start: FloatArray, end: FloatArray, duration: float, samples: int) -> Trajectory:
@@ -64,7 +73,9 @@ def line(robot: Robot, start: FloatArray, end: FloatArray, duration: float, samp
     >>> motion.q[2].round(3).tolist(), motion.v[[0, -1]].any()
     ([0.5, 0.5, 0.5, 0.5, 0.5, 0.5], np.False_)
     """
-    if not duration > 0.0 or samples < _FEWEST:
+    duration = real_number(duration, "the duration")
+    samples = whole_number(samples, "samples", 0)
+    if duration <= 0.0 or samples < _FEWEST:
         raise InputError(
             f"a line needs a duration above 0 and {_FEWEST} samples", found=f"{duration} s, {samples}"
         )
@@ -77,7 +88,7 @@ def line(robot: Robot, start: FloatArray, end: FloatArray, duration: float, samp
     s_2 = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / duration**2
     step = q_1 - q_0
     return Trajectory(
-        frozen(t), frozen(q_0 + s * step), frozen(s_1 * step), frozen(s_2 * step), "of the line, exactly"
+        frozen(t), frozen(q_0 + s * step), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True
     )
 
 
@@ -85,37 +96,60 @@ def read_trajectory(robot: Robot, path: Path) -> Trajectory:
     """Samples from a CSV file whose first line names the columns.
 
     `t` holds seconds (without it, samples are a second apart); a coordinate's name holds q; `v:NAME` and
-    `a:NAME` hold rates and their rates, all of them or none.
+    `a:NAME` hold rates and their rates, all of them or none. Where there are none, the wraps are taken out
+    of the angles of continuous, planar and floating joints, and the rates are central differences.
 
     Raises:
         SourceError: the file cannot be read.
         InputError: a column that is unknown, missing or twice there, a number that is none, time that does
-            not increase, too few samples, or a planar or floating joint without rates.
+            not increase, or too few samples.
     """
-    heads, rows = _cells(path)
-    known = ["t", *robot.coordinate_names, *(f"{x}:{name}" for x in "va" for name in robot.rate_names)]
-    for head in heads:
-        if head not in known or heads.count(head) > 1:
-            raise InputError(
-                "a column that is unknown or twice there",
-                where=f"{path}:1",
-                found=repr(head),
-                remedy=f"name them t, {', '.join(robot.coordinate_names)}, v:..., a:...",
-            )
-    data = _numbers(path, heads, rows)
-    t = data.get("t", np.arange(len(rows), dtype=np.float64))
+    rates = [f"{letter}:{name}" for letter in "va" for name in robot.rate_names]
+    data = read_columns(
+        read_text(path), str(path), "a trajectory", robot.coordinate_names, ["t", *rates], named=True
+    )
+    q = _columns(path, data, robot.coordinate_names)
+    if len(q) < _FEWEST:
+        raise InputError(
+            f"{_FEWEST} samples are the least, below a line of names", where=str(path), found=str(len(q))
+        )
+    t = data.get("t", np.arange(len(q), dtype=np.float64))
     if (np.diff(t) <= 0.0).any():
         raise InputError(
             "time must increase", where=str(path), found=f"sample {int(np.argmax(np.diff(t) <= 0.0)) + 1}"
         )
-    q = _columns(path, data, robot.coordinate_names)
-    if not any(head.startswith(("v:", "a:")) for head in heads):
-        _only_plain_joints(robot)
-        v, a, rates = _gradient(q, t), _gradient(_gradient(q, t), t), "by central differences"
-    else:
+    q = robot.checked(q, "q")
+    if any(name in data for name in rates):
         v, a = (_columns(path, data, [f"{x}:{name}" for name in robot.rate_names]) for x in "va")
-        rates = "as given"
-    return Trajectory(frozen(t), frozen(robot.checked(q, "q")), frozen(v), frozen(a), rates)
+        return Trajectory(frozen(t), frozen(q), frozen(v), frozen(a), "as given")
+    found = unwrapped(robot.tree, q)
+    v = _rates(robot.tree, found.q, t)
+    words = "by central differences"
+    if found.joints:
+        words += f", after wraps were taken out of {', '.join(found.joints)}"
+    return Trajectory(
+        frozen(t), frozen(found.q), frozen(v), frozen(_gradient(v, t)), words, notes=found.notes
+    )
+
+
+def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
+    """(n, nv) central differences; those of planar and floating joints in the moving frame."""
+    slopes = _gradient(q, t)
+    v = np.empty((len(q), tree.nv))
+    for joint, at, to in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
+        if joint.nv == 1:
+            v[:, to] = slopes[:, at]
+        elif joint.kind is JointKind.PLANAR:
+            cosine, sine = np.cos(q[:, at + 2]), np.sin(q[:, at + 2])
+            v[:, to] = cosine * slopes[:, at] + sine * slopes[:, at + 1]
+            v[:, to + 1] = cosine * slopes[:, at + 1] - sine * slopes[:, at]
+            v[:, to + 2] = slopes[:, at + 2]
+        elif joint.kind is JointKind.FLOATING:
+            quaternion, rates = (x[:, at + 3 : at + 7] for x in (q, slopes))
+            R = rotation_of(quaternion)
+            v[:, to : to + 3] = (R.swapaxes(-1, -2) @ slopes[:, at : at + 3, np.newaxis])[..., 0]
+            v[:, to + 3 : to + 6] = angular_velocity_from_quaternion_rates(quaternion, rates, "body")
+    return v
 
 
 def _only_plain_joints(robot: Robot) -> None:
@@ -124,45 +158,15 @@ def _only_plain_joints(robot: Robot) -> None:
             raise InputError(
                 f"a {joint.kind.value} joint's rates are not the rates of its coordinates",
                 where=f"joint {joint.name}",
-                remedy="give v: and a: columns in a CSV file",
+                remedy="give a CSV file of samples",
             )
 
 
-def _cells(path: Path) -> tuple[list[str], list[list[str]]]:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = [row for row in csv.reader(stream) if row and not row[0].startswith("#")]
-    except (OSError, UnicodeDecodeError) as error:
-        raise SourceError("cannot be read", where=str(path), found=str(error)) from error
-    if len(rows) <= _FEWEST:
-        raise InputError(f"{_FEWEST} samples are the least, below a line of names", where=str(path))
-    return [cell.strip() for cell in rows[0]], rows[1:]
-
-
-def _numbers(path: Path, heads: list[str], rows: list[list[str]]) -> dict[str, FloatArray]:
-    table = np.empty((len(rows), len(heads)))
-    for i, row in enumerate(rows):
-        if len(row) != len(heads):
-            raise InputError(
-                f"{len(heads)} cells are expected", where=f"{path}, sample {i}", found=str(len(row))
-            )
-        for k, cell in enumerate(row):
-            try:
-                table[i, k] = float(cell)
-            except ValueError:
-                table[i, k] = math.nan
-            if not math.isfinite(table[i, k]):
-                raise InputError(
-                    "not a finite number", where=f"{path}, sample {i}, {heads[k]}", found=repr(cell)
-                )
-    return {head: np.ascontiguousarray(table[:, k]) for k, head in enumerate(heads)}
-
-
-def _columns(path: Path, data: dict[str, FloatArray], names: Sequence[str]) -> FloatArray:
+def _columns(path: Path, data: Mapping[str, FloatArray], names: Sequence[str]) -> FloatArray:
     missing = [name for name in names if name not in data]
     if missing:
         raise InputError("columns are missing", where=f"{path}:1", found=", ".join(missing))
-    n = len(next(iter(data.values())))
+    n = len(next(iter(data.values()), ()))
     return np.stack([data[name] for name in names], axis=-1) if names else np.empty((n, 0))
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.demands import shown
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.frame_names import FrameName, JointFrame, LinkFrame
 from urdfkin.rotation.arrays import FloatArray, floats
@@ -287,7 +288,7 @@ class KinematicTree:
             InputError: a link and a joint elsewhere share the name.
         """
         if not isinstance(name, str):
-            raise InputError("a frame is the name of a link or joint", where=self.name, found=repr(name)[:60])
+            raise InputError("a frame is the name of a link or joint", where=self.name, found=shown(name))
         if isinstance(name, FrameName):
             return self._meant(name)
         link, joint = self._link_index.get(name), self._joint_index.get(name)

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from urdfkin.keeping import CacheWarning
 from urdfkin.sources import read_source
 from urdfkin.tree import KinematicTree
 from urdfkin.urdf import remembering
@@ -70,7 +71,8 @@ def test_a_damaged_file_is_read_anew_and_mended(folder: Path, damage: bytes) -> 
     expected = remembered_tree(data)
     (kept,) = folder.iterdir()
     kept.write_bytes(damage)
-    assert same(remembered_tree(data), expected)
+    with pytest.warns(CacheWarning, match="is damaged and is made anew"):
+        assert same(remembered_tree(data), expected)
     assert kept.read_bytes() != damage
 
 
@@ -78,7 +80,8 @@ def test_where_nothing_can_be_written_the_tree_is_read_each_time(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder.rmdir()
-    assert same(remembered_tree(text("ur5")), read_tree(text("ur5")))
+    with pytest.warns(CacheWarning, match="nothing can be kept"):
+        assert same(remembered_tree(text("ur5")), read_tree(text("ur5")))
     monkeypatch.setattr(remembering, "_folder", lambda: None)
     assert same(remembered_tree(text("ur5")), read_tree(text("ur5")))
 

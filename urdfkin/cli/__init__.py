@@ -12,6 +12,7 @@ from typing import cast
 
 import click
 
+from urdfkin.cli import streams
 from urdfkin.cli.crash import run
 from urdfkin.cli.door import guard
 from urdfkin.errors import UnknownNameError
@@ -95,6 +96,7 @@ def main() -> None:
     Exit 0: verified. 1: a disagreement. 2: bad input or usage. 3: computed, but Pinocchio did not check it.
     70: a defect of urdfkin. 128 and its number: ended by a signal.
     """
+    streams.prepare()
     guard()
     # The line under a result says that it was not verified, and why; once is enough.
     warnings.filterwarnings("ignore", message="not verified")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import math
 import shlex
 import sys
 import warnings
@@ -16,7 +14,10 @@ import click
 
 from urdfkin.cli.door import say
 from urdfkin.cli.idle import refuse_idle
+from urdfkin.cli.numbers import Whole
 from urdfkin.errors import InputError, SourceError
+from urdfkin.files import read_standard_input, read_text
+from urdfkin.numerals import whole
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
@@ -96,7 +97,7 @@ verify_option = click.option(
     "--verify/--no-verify", default=True, help="Whether Pinocchio checks each result (the default)."
 )
 seed_option = click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="What `random` is drawn from."
+    "--seed", type=Whole(0), default=0, show_default=True, help="What `random` is drawn from."
 )
 _VALUES = "Numbers '0,0.5,...', '@FILE.csv' for a batch, 'neutral', 'random' or 'random:N'."
 q_option = click.option("--q", metavar="VALUES", default="neutral", show_default=True, help=_VALUES)
@@ -170,71 +171,39 @@ def _values(robot: Robot, letter: str, text: str, rng: Any) -> FloatArray:
         return sample(robot.tree, n, rng) if letter == "q" else rng.standard_normal((n, len(names)))
     if text.startswith("@"):
         return _read_csv(Path(text[1:]), letter, names)
-    return np.array([_numbers(text.split(","), f"--{letter}", names)])
+    from urdfkin.columns import numbers  # noqa: PLC0415
+
+    return np.array([numbers(text.split(","), f"--{letter}", names)])
 
 
 def _count(letter: str, text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
+    count = whole(text)
+    if count is None or count < 1:
         raise InputError("random:N wants a whole number from 1 on", where=f"--{letter}", found=repr(text))
-    return int(text)
-
-
-def _numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[float]:
-    values = []
-    for cell in cells:
-        try:
-            value = float(cell)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise InputError("not a finite number", where=where, found=repr(cell.strip()))
-        values.append(value)
-    if len(values) != len(names):
-        expected = ", ".join(names) if names else "none: nothing moves"
-        raise InputError(
-            f"{len(names)} numbers are expected ({expected})", where=where, found=str(len(values))
-        )
-    return values
+    return count
 
 
 def _read_csv(path: Path, letter: str, names: Sequence[str]) -> FloatArray:
     """A batch, one sample a line; a first line of names may put the columns in any order."""
-    import numpy as np  # noqa: PLC0415
+    import numpy as np  # noqa: PLC0415  keeps --help fast
 
-    try:
-        with sys.stdin if str(path) == "-" else path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = [
-                (i, row) for i, row in enumerate(csv.reader(stream), 1) if row and not row[0].startswith("#")
-            ]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = "no UTF-8 text" if isinstance(error, UnicodeDecodeError) else str(error)
-        reason = getattr(error, "strerror", None) or reason
-        raise SourceError("cannot be read", where=str(path), found=reason) from error
-    order = list(range(len(names)))
-    if rows and not _is_number(rows[0][1][0]):
-        header = [cell.strip() for cell in rows.pop(0)[1]]
-        if sorted(header) != sorted(names):
-            raise InputError(
-                f"the first line must name the columns of --{letter}: {', '.join(names)}",
-                where=f"{path}:1",
-                found=", ".join(header),
-            )
-        order = [header.index(name) for name in names]
-    if not rows:
+    from urdfkin.columns import read_columns  # noqa: PLC0415
+
+    text = _standard_input() if str(path) == "-" else read_text(path)
+    columns = read_columns(text, str(path), f"--{letter}", names)
+    found = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
+    if not len(found):
         raise InputError(
             "no samples", where=str(path), remedy="one line a sample, numbers separated by commas"
         )
-    return np.array([_numbers(row, f"{path}:{line}", names) for line, row in rows]).reshape(-1, len(names))[
-        :, order
-    ]
+    return np.ascontiguousarray(found)
 
 
-def _is_number(cell: str) -> bool:
+def _standard_input() -> str:
     try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+        return read_standard_input().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise SourceError("cannot be read", where="-", found=f"no UTF-8 text ({error})") from None
 
 
 def command_line() -> str:

@@ -13,6 +13,7 @@ import click
 from urdfkin.checking import check
 from urdfkin.cli.arguments import xacro_args, xacro_option
 from urdfkin.cli.door import command_lines, say, say_styled
+from urdfkin.cli.numbers import Whole
 from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Limits, Severity
 from urdfkin.diagnostics.codes import REGISTRY
 from urdfkin.diagnostics.explain import find_code
@@ -43,15 +44,13 @@ _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "b
     "--root-joint", type=click.Choice(["floating", "planar"]), help="Check the names this joint needs, too."
 )
 @xacro_option
-@click.option("--max-bytes", type=click.IntRange(1), default=DEFAULT_LIMITS.bytes, show_default=True)
-@click.option("--max-depth", type=click.IntRange(1), default=DEFAULT_LIMITS.depth, show_default=True)
-@click.option("--max-elements", type=click.IntRange(1), default=DEFAULT_LIMITS.elements, show_default=True)
-@click.option(
-    "--max-attributes", type=click.IntRange(1), default=DEFAULT_LIMITS.attributes, show_default=True
-)
-@click.option("--max-name", type=click.IntRange(1), default=DEFAULT_LIMITS.name, show_default=True)
-@click.option("--max-number", type=click.IntRange(1), default=DEFAULT_LIMITS.number, show_default=True)
-@click.option("--max-markup", type=click.IntRange(1), default=DEFAULT_LIMITS.markup, show_default=True)
+@click.option("--max-bytes", type=Whole(1), default=DEFAULT_LIMITS.bytes, show_default=True)
+@click.option("--max-depth", type=Whole(1), default=DEFAULT_LIMITS.depth, show_default=True)
+@click.option("--max-elements", type=Whole(1), default=DEFAULT_LIMITS.elements, show_default=True)
+@click.option("--max-attributes", type=Whole(1), default=DEFAULT_LIMITS.attributes, show_default=True)
+@click.option("--max-name", type=Whole(1), default=DEFAULT_LIMITS.name, show_default=True)
+@click.option("--max-number", type=Whole(1), default=DEFAULT_LIMITS.number, show_default=True)
+@click.option("--max-markup", type=Whole(1), default=DEFAULT_LIMITS.markup, show_default=True)
 def command(
     files: Sequence[str],
     style: str,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from urdfkin.cli.numbers import NumberFrom
 from urdfkin.cli.output import console, write_file
 from urdfkin.cli.reports import check_writable
 
@@ -18,7 +19,7 @@ EXAMPLE = "urdfkin compare main.json branch.json --markdown comment.md"
 @click.argument("new", metavar="NEW.json", type=click.Path(path_type=Path))
 @click.option(
     "--factor",
-    type=click.FloatRange(1.0),
+    type=NumberFrom(1.0),
     default=2.0,
     show_default=True,
     help="By how much a worst disagreement may grow before it is a regression.",

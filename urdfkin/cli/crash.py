@@ -5,20 +5,17 @@ Exit 1 is a disagreement and nothing else; Python's own exit code of an uncaught
 
 from __future__ import annotations
 
-import os
-import sys
 import traceback
 
 import click
 
+from urdfkin.cli import streams
 from urdfkin.errors import UrdfkinError
 
 #: EX_SOFTWARE of sysexits.h.
 CRASH = 70
 #: 128 and SIGINT's number, as shells have it.
 _INTERRUPTED = 130
-#: 128 and SIGPIPE's number.
-_NOBODY_READS = 141
 
 
 def run(command: click.Command, name: str) -> int:
@@ -29,7 +26,10 @@ def run(command: click.Command, name: str) -> int:
     """
     try:
         # click's own way out gives 1 to an interrupt.
-        code = command.main(prog_name=name, standalone_mode=False)
+        try:
+            code = command.main(prog_name=name, standalone_mode=False)
+        finally:
+            streams.finish()
     except click.ClickException as error:
         error.show()
         return error.exit_code
@@ -38,9 +38,6 @@ def run(command: click.Command, name: str) -> int:
         return _INTERRUPTED
     except UrdfkinError as error:
         return refuse(error)
-    except BrokenPipeError:  # whoever read the output has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return _NOBODY_READS
     except Exception as error:
         return crash(error)
     return code if isinstance(code, int) else 0

@@ -9,6 +9,7 @@ import click
 
 from urdfkin.cli.arguments import load_robot, robot_argument, together, verify_option
 from urdfkin.cli.idle import refuse_idle
+from urdfkin.cli.numbers import Number, Whole
 from urdfkin.cli.output import compiling, output_option
 
 #: Forms of a table. They repeat `urdfkin.dh.export.FORMATS`, whose import --help does not need.
@@ -35,7 +36,7 @@ choice_options = together(
     _choice("--near-parallel", ("hayati", "strict"), "Nearly parallel axes: a fifth parameter, or four."),
     click.option(
         "--snap",
-        type=float,
+        type=Number(),
         default=0.0,
         metavar="RAD",
         help="Make angles within this of a multiple of 15 degrees round.",
@@ -52,7 +53,7 @@ compare_options = together(
     ),
     click.option(
         "--tolerance",
-        type=float,
+        type=Number(),
         default=0.2,
         show_default=True,
         metavar="MM",
@@ -68,7 +69,7 @@ form_options = together(
     ),
     click.option("--degrees/--radians", default=False, help="Angles in what people read."),
     click.option("--millimetres/--metres", default=False, help="Lengths in what people read."),
-    click.option("--digits", type=click.IntRange(3, 17), default=10, show_default=True, help="Significant."),
+    click.option("--digits", type=Whole(3, 17), default=10, show_default=True, help="Significant."),
 )
 
 

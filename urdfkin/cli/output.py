@@ -19,6 +19,7 @@ from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.door import say
 from urdfkin.cli.tables import make_table, print_named
 from urdfkin.errors import SourceError
+from urdfkin.numerals import whole
 from urdfkin.printable import csv_cell, json_text
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ FORMATS = ("table", "json", "csv", "npy")
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
 #: Quantities with a column for each rate.
 MATRICES = ("jacobian", "jacobian rate")
+#: Columns beyond which a table gets no wider: padding takes memory.
+_WIDEST = 10_000
 #: How many samples of a batch a table shows.
 _SHOWN = 5
 
@@ -66,8 +69,14 @@ def console(*, err: bool = False) -> Console:
     from urdfkin.cli.terminal import Terminal  # noqa: PLC0415  keeps --help fast
 
     stream = sys.stderr if err else sys.stdout
-    width = None if stream.isatty() else int(os.environ.get("COLUMNS", "100"))
+    width = None if stream.isatty() else _columns()
     return Terminal(stream, width=width, soft_wrap=False)
+
+
+def _columns() -> int:
+    """How wide a pipe is, as COLUMNS says; a shell may leave it empty, and 0 stands for what nobody knows."""
+    wanted = whole(os.environ.get("COLUMNS", "")) or 0
+    return min(wanted, _WIDEST) if wanted > 0 else 100
 
 
 def write_file(path: Path, data: bytes) -> None:

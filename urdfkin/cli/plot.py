@@ -9,6 +9,7 @@ import click
 
 from urdfkin.cli.arguments import frame_option, load_robot, reference_option, robot_argument, seed_option
 from urdfkin.cli.door import say
+from urdfkin.cli.numbers import Number, Whole
 from urdfkin.cli.output import compiling, write_file
 from urdfkin.cli.reports import check_writable
 from urdfkin.errors import InputError
@@ -33,8 +34,8 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
 @click.option("--trajectory", type=click.Path(path_type=Path), help="CSV: t, coordinates, v:NAME, a:NAME.")
 @click.option("--from", "start", default="neutral", show_default=True, help="Where a line begins, as --q.")
 @click.option("--to", "end", help="Where a line ends: numbers, 'neutral' or 'random'.")
-@click.option("--duration", type=float, default=1.0, show_default=True, help="Of a line, seconds.")
-@click.option("--samples", type=click.IntRange(3), default=201, show_default=True, help="Of a line.")
+@click.option("--duration", type=Number(), default=1.0, show_default=True, help="Of a line, seconds.")
+@click.option("--samples", type=Whole(3), default=201, show_default=True, help="Of a line.")
 @seed_option
 @click.option(
     "--panel",
@@ -83,6 +84,8 @@ def command(
     loaded = load_robot(robot, mimic, root_joint)
     if trajectory is not None:
         motion = read_trajectory(loaded, trajectory)
+        for note in (*motion.notes, *loaded.limit_violations(motion.q)):
+            click.echo(f"warning: {note}", err=True)
     else:
         motion = _line(loaded, start, end or "", duration, samples, seed)
     with compiling():

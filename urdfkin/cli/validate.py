@@ -12,6 +12,7 @@ import click
 from urdfkin.catalogue import examples
 from urdfkin.cli.arguments import xacro_args, xacro_option
 from urdfkin.cli.judgement import judge_all
+from urdfkin.cli.numbers import Whole
 from urdfkin.cli.output import compiling, console
 from urdfkin.cli.reports import check_writable, report_options, write_reports
 from urdfkin.cli.stopping import stoppable
@@ -27,21 +28,21 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @click.command(epilog=f"Example: {EXAMPLE}")
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...")
 @click.option("--all", "all_", is_flag=True, help="Every robot of example-robot-data in the catalogue.")
-@click.option("--samples", type=click.IntRange(0), default=1000, show_default=True, help="For each robot.")
+@click.option("--samples", type=Whole(0), default=1000, show_default=True, help="For each robot.")
 @click.option(
     "--seed",
-    type=click.IntRange(0),
+    type=Whole(0),
     default=0,
     show_default=True,
     help="The same seed gives the same numbers.",
 )
-@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Local processes.")
+@click.option("--jobs", type=Whole(1), default=1, show_default=True, help="Local processes.")
 @click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow (the default).")
 @click.option("--root-joint", type=click.Choice(["floating", "planar"]), help="Hang the root from a joint.")
 @click.option("--isolate", is_flag=True, help="Each robot in a process of its own, whose death is a result.")
 @xacro_option
 @click.option("--judge", "judged", is_flag=True, help="Say whose last digits are right, at 50 digits.")
-@click.option("--judge-samples", type=click.IntRange(1), default=5, show_default=True, help="For --judge.")
+@click.option("--judge-samples", type=Whole(1), default=5, show_default=True, help="For --judge.")
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as data.")
 @report_options
 @click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case.")

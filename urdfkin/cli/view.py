@@ -8,6 +8,7 @@ import click
 
 from urdfkin.cli.arguments import load_robot, robot_argument
 from urdfkin.cli.door import say
+from urdfkin.cli.numbers import Whole
 from urdfkin.cli.output import compiling
 
 EXAMPLE = "urdfkin view panda"
@@ -21,7 +22,7 @@ EXAMPLE = "urdfkin view panda"
     show_default=True,
     help="Whom to listen to: this machine alone, or 0.0.0.0 for the whole network.",
 )
-@click.option("--port", type=click.IntRange(1, 65535), default=8080, show_default=True)
+@click.option("--port", type=Whole(1, 65535), default=8080, show_default=True)
 def command(robot: str, mimic: bool | None, root_joint: str | None, host: str, port: int) -> None:
     """Show a robot in a browser tab: meshes, sliders, frames, DH frames, velocity and acceleration arrows.
 

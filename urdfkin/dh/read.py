@@ -14,7 +14,8 @@ from urdfkin.dh.digits import Literal
 from urdfkin.dh.rows import table_from_mapping
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.written_row import ORDER
-from urdfkin.errors import InputError, SourceError, UrdfkinError
+from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.files import read_text
 from urdfkin.printable import from_csv_cell
 
 
@@ -30,7 +31,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
 def read_mapping(path: str | os.PathLike[str]) -> Mapping[str, Any]:
     """The plain data of a table's file, its numbers as they are written; errors as for `read_table`."""
-    return mapping_from_text(_text(Path(path)), Path(path).suffix.lower(), where=str(path))
+    return mapping_from_text(read_text(Path(path)), Path(path).suffix.lower(), where=str(path))
 
 
 def table_from_text(text: str, suffix: str, where: str = "table") -> DHTable:
@@ -68,13 +69,6 @@ def mapping_from_text(text: str, suffix: str, where: str) -> Mapping[str, Any]:
             "a table is a mapping with convention and rows", where=where, found=type(data).__name__
         )
     return data
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise SourceError("cannot read the table", where=str(path), found=str(error)) from None
 
 
 def _from_csv(text: str) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from urdfkin.errors import UnknownNameError
+from urdfkin.files import exists
 from urdfkin.resources import robots_dir
 
 
@@ -20,7 +21,7 @@ def reference_path(name: str) -> Path:
         UnknownNameError: neither; the nearest names are offered.
     """
     path = Path(name)
-    if path.suffix or path.exists():
+    if path.suffix or exists(path):
         return path
     shipped = references()
     if name not in shipped:

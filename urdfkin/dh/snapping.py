@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from urdfkin.chain import ChainJoint, FrameChain, chain, steps_between
+from urdfkin.demands import real_number
 from urdfkin.dh.elements import EPS, nearest_twelfth, wrapped
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.statement import SnapChange, SnapStatement
@@ -29,9 +30,10 @@ LARGEST_TOLERANCE = math.pi / 36.0
 
 def checked_tolerance(snap: float) -> float:
     """The tolerance as a float; raises InputError unless it lies between 0 and 5 degrees."""
-    if not 0.0 <= snap <= LARGEST_TOLERANCE:
+    tolerance = real_number(snap, "snap")
+    if not 0.0 <= tolerance <= LARGEST_TOLERANCE:
         raise InputError("snap is an angle in radians between 0 and 0.087 (5 degrees)", found=repr(snap))
-    return float(snap)
+    return tolerance
 
 
 def snap_chain(

@@ -16,9 +16,9 @@ from urdfkin.diagnostics.codes.base import Code
 from urdfkin.diagnostics.document import Element
 from urdfkin.diagnostics.escape import quoted
 from urdfkin.diagnostics.reporter import Reporter
+from urdfkin.numerals import DECIMAL
 
 #: No text can be split in two ways by this: one that is no number takes linear time too.
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _BLANKS = re.compile(r"[ \t\r\n]+")
 
 
@@ -82,7 +82,7 @@ class NumberReader:
         return tuple(values)
 
     def _number(self, element: Element, attribute: str, piece: str) -> float | None:
-        value = float(piece) if _NUMBER.fullmatch(piece) else None
+        value = float(piece) if DECIMAL.fullmatch(piece) else None
         if value is not None and math.isfinite(value):
             if value == 0.0 and any(digit in _NOT_ZERO for digit in re.split("[eE]", piece)[0]):
                 self.report.add(
@@ -131,7 +131,7 @@ class NumberReader:
             return
         seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw))
         pieces = [seen] if count == 1 else [piece for piece in seen.split(" ") if piece]
-        if not all(_NUMBER.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
+        if not all(DECIMAL.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
             self._refused(element, attribute, "a tab or line end between or after the numbers")
 
     def _refused(self, element: Element, attribute: str, what: str) -> None:

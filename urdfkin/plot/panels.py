@@ -96,7 +96,7 @@ def manipulability(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 
 def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """With Pinocchio, in eps * scale; a cross where it lies outside the bound."""
+    """With Pinocchio at the same q, v and a, in eps * scale; a cross where it lies outside the bound."""
     axes.set_ylabel("disagreement [eps·scale]")
     if x.not_verified is not None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")

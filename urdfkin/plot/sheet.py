@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _PANEL = (5.2, 2.3)
+#: Letters of the foot that an inch has room for.
+_LETTERS = 15
+#: What a check says nothing about.
+_RATES_UNCHECKED = "Pinocchio checks the formulas at these q, v and a, not whether v and a are the rates of q"
 
 
 def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
@@ -54,13 +59,14 @@ def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence
         for axes in grid[-1]:
             axes.set_xlabel("time [s]")
         figure.suptitle(label(f"{robot.name}: {x.frame}, {x.reference.name}"), fontsize=11)
-        figure.supxlabel(foot(x, trajectory), fontsize=8, color="#444444")
+        words = textwrap.wrap(label(foot(x, trajectory)), width=int(_LETTERS * _PANEL[0] * columns))
+        figure.supxlabel("\n".join(words), fontsize=8, color="#444444")
     return figure
 
 
 def foot(x: FrameMotion, trajectory: Trajectory) -> str:
-    """What was checked, in a line."""
-    rates = f"rates {trajectory.rates}"
+    """What was checked, and what was not, in a line."""
+    rates = f"rates {trajectory.rates}" + (", exactly" if trajectory.exact else f"; {_RATES_UNCHECKED}")
     if x.not_verified is not None:
         return f"NOT VERIFIED by Pinocchio {version()}: {x.not_verified}; {rates}"
     worst = max(float(np.max(check.units, initial=0.0)) for check in x.checks.values())

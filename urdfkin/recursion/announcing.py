@@ -65,7 +65,7 @@ def _compile(kernels: Mapping[str, str]) -> None:
 
 def _on_disk(name: str) -> bool:
     folder = cache_folder()
-    return folder is None or any(folder.rglob(f"{name}.*.nbi"))
+    return folder is None or any(folder.glob(f"{name}.*.kernel"))
 
 
 def _compile_elsewhere(kernels: Mapping[str, str]) -> subprocess.Popen[bytes]:

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from urdfkin.errors import InputError
+from urdfkin.demands import whole_number
 from urdfkin.recursion.lanes import LANES
 from urdfkin.tree import FloatArray
 
@@ -28,7 +28,12 @@ Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 def default_threads(n: int) -> int:
     """One thread for each processor this process may use, for batches that are worth it."""
-    return len(os.sched_getaffinity(0)) if n >= _WORTH_THREADS else 1
+    return _processors() if n >= _WORTH_THREADS else 1
+
+
+def _processors() -> int:
+    """How many this process may use: more threads would wait for each other."""
+    return len(os.sched_getaffinity(0))
 
 
 def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> bool:
@@ -38,17 +43,16 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
         compute: A kernel for whole blocks; releases the interpreter's lock.
         inputs: C-contiguous.
         out: C-contiguous.
-        threads: How many; None for `default_threads`.
+        threads: How many at most; None for `default_threads`.
 
     Raises:
-        InputError: fewer than one thread.
+        InputError: `threads` is no whole number from 1 on.
     """
-    if threads is not None and threads < 1:
-        raise InputError("threads must be at least 1", found=str(threads))
     n = len(out)
+    threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
     if n < LANES:
         return n == 0 or _in_one_block(compute, inputs, out)
-    parts = _parts(n, default_threads(n) if threads is None else threads)
+    parts = _parts(n, min(threads, n // LANES, _processors()))
     if len(parts) == 1:
         return bool(compute(inputs, out))
     work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
@@ -80,4 +84,8 @@ def _filled(x: FloatArray, rows: int) -> FloatArray:
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(len(os.sched_getaffinity(0)), thread_name_prefix="urdfkin")
+    """The threads, which a forked child does not have: it starts its own."""
+    return ThreadPoolExecutor(_processors(), thread_name_prefix="urdfkin")
+
+
+os.register_at_fork(after_in_child=_pool.cache_clear)

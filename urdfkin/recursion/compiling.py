@@ -1,23 +1,27 @@
 """Compile once a machine: kernels are kept on disk, under a digest of the sources they are made from.
 
-Numba by itself looks only at the file a kernel stands in; a change in a file it is inlined from would go
-unnoticed, and an old kernel would be run. Here every source file of `recursion` enters the folder's name.
+Every source file of `recursion` enters the folder's name: a kernel is made of all that it is inlined from.
 """
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import cache, cached_property
+import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import llvmlite
 import numba
 from numba import types
 
+from urdfkin.forking import lock_over_forks
 from urdfkin.keeping import kept_folder
-from urdfkin.recursion.lanes import COMPILED
+from urdfkin.recursion.kept_kernels import KeptKernel
+from urdfkin.recursion.lanes import compiling_allowed, jitted
+
+#: What Numba raises of its own where a kernel does not take an argument.
+NoKernelError: type[Exception] = numba.core.errors.NumbaError
 
 _config: Any = numba.config  # settings that numba sets at run time
 
@@ -36,29 +40,42 @@ def output(axes: int) -> Any:
     return types.Array(types.float64, axes, "C")
 
 
+#: One kernel after the other, as Numba compiles them anyway. A fork waits for the one that is being compiled:
+#: in the child nobody would finish it.
+_compiling = lock_over_forks()
+
+
 class Kernel:
-    """A function that is compiled, or read from disk, when it is first called."""
+    """A function that is compiled, or read from disk, when it is first called.
+
+    Attributes:
+        compiled: The compiled function itself: a call through it takes a tenth of a microsecond.
+    """
+
+    compiled: Any
 
     def __init__(self, function: Callable[..., int], arguments: tuple[Any, ...], nogil: bool) -> None:
         self._function, self._arguments, self._nogil = function, arguments, nogil
-        self._lock = threading.Lock()
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
-    @cached_property
-    def compiled(self) -> Any:
-        """The compiled function itself: a call through it takes a tenth of a microsecond."""
-        with self._lock:
-            if (ready := self.__dict__.get("compiled")) is not None:
-                return ready
-            folder = cache_folder()
-            with _numba_cache(folder):
-                self.__dict__["compiled"] = numba.njit(
-                    [types.int64(*self._arguments)],
-                    nogil=self._nogil,
-                    cache=folder is not None,
-                    **COMPILED,
-                )(self._function)
+    def __getattr__(self, name: str) -> Any:
+        # Asked for what is not there yet. A cached property has a lock of its own until Python 3.12, which a
+        # forked child might find closed.
+        if name != "compiled":
+            raise AttributeError(name)
+        with _compiling:
+            if "compiled" not in self.__dict__:
+                self.compiled = self._compile()
             return self.__dict__["compiled"]
+
+    def _compile(self) -> Any:
+        dispatcher = jitted(nogil=self._nogil)(self._function)
+        if (folder := cache_folder()) is not None:
+            dispatcher._cache = KeptKernel(self._function, folder)
+        with compiling_allowed():
+            dispatcher.compile(types.int64(*self._arguments))
+        dispatcher.disable_compile()
+        return dispatcher
 
     def __call__(self, *arguments: Any) -> int:
         """Compute."""
@@ -67,8 +84,7 @@ class Kernel:
 
 def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Decorator for what kernels call; options are Numba's, beside those of every kernel."""
-    decorate: Callable[[Callable[..., Any]], Any] = numba.njit(forceinline=True, **options, **COMPILED)
-    return decorate
+    return jitted(forceinline=True, **options)
 
 
 def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
@@ -85,15 +101,5 @@ def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]]
 def cache_folder() -> Path | None:
     """Where compiled kernels are kept; None if no folder can be written."""
     root = Path(_config.CACHE_DIR) if _config.CACHE_DIR else None
-    return kept_folder("kernels", sorted(Path(__file__).parent.glob("*.py")), root=root)
-
-
-@contextmanager
-def _numba_cache(folder: Path | None) -> Iterator[None]:
-    before = _config.CACHE_DIR
-    if folder is not None:
-        _config.CACHE_DIR = str(folder)
-    try:
-        yield
-    finally:
-        _config.CACHE_DIR = before
+    versions = numba.__version__, llvmlite.__version__, sys.implementation.cache_tag
+    return kept_folder("kernels", sorted(Path(__file__).parent.glob("*.py")), *versions, root=root)

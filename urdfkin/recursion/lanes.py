@@ -9,6 +9,8 @@ which is how the compiler sees that rows do not overlap and turns the loops into
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numba
@@ -30,7 +32,30 @@ Vec = tuple[float, float, float]
 #: that no loop carries a branch that raises. Nothing is allocated, so that arrays need no reference counts:
 #: counting them took half of the time.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-lane_function: Any = numba.njit(forceinline=True, **COMPILED)
+
+
+def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Decorator: Numba's, with the options of every function here, and those given."""
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        with compiling_allowed():
+            return numba.njit(**options, **COMPILED)(function)
+
+    return decorate
+
+
+@contextmanager
+def compiling_allowed() -> Iterator[None]:
+    """NUMBA_DISABLE_JIT is not obeyed: it is meant for functions that Python could run instead."""
+    config: Any = numba.config
+    before, config.DISABLE_JIT = config.DISABLE_JIT, 0
+    try:
+        yield
+    finally:
+        config.DISABLE_JIT = before
+
+
+lane_function = jitted(forceinline=True)
 
 
 @intrinsic

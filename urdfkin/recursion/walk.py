@@ -10,13 +10,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numba
-
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.recursion.lanes import (
-    COMPILED,
     LANES,
     copy_rows,
+    jitted,
     lane_function,
     numbers_at,
     pointer_to,
@@ -192,7 +190,7 @@ def frame_state(m, s, plan, f, order, turned):
         turn_by_constant(m, s, FRAME, plan.offsets, at)
 
 
-@numba.njit(forceinline=True, fastmath={"reassoc"}, **COMPILED)
+@jitted(forceinline=True, fastmath={"reassoc"})
 def ordinary(x, at, count):
     """Whether `count` numbers are: none that is no number or infinite, and their sizes no more than `LARGE`.
 

@@ -8,7 +8,8 @@ from itertools import islice
 from pathlib import Path
 from typing import cast
 
-from urdfkin.errors import InputError, SourceError
+from urdfkin.errors import InputError
+from urdfkin.files import read_bytes
 from urdfkin.report.consistency import contradictions
 from urdfkin.report.document import Document, schema
 from urdfkin.validation.report import SCHEMA
@@ -26,9 +27,7 @@ def read_document(path: Path) -> Document:
             contradicts itself.
     """
     try:
-        data = json.loads(path.read_bytes(), parse_constant=_number, parse_float=_number)
-    except OSError as error:
-        raise SourceError("cannot be read", where=str(path), found=error.strerror or str(error)) from error
+        data = json.loads(read_bytes(path), parse_constant=_number, parse_float=_number)
     except (ValueError, RecursionError) as error:
         raise InputError("not a JSON file", where=str(path), found=str(error)) from error
     return checked(data, str(path))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from urdfkin.demands import is_real, shown
 from urdfkin.errors import InputError
 
 FloatArray = NDArray[np.float64]
@@ -19,18 +20,30 @@ UNIT_TOLERANCE = 1e-12
 #: by 1e-9 times the sum of the absolute values of a row, which is sqrt(3) at most.
 ROTATION_TOLERANCE = 2e-9
 #: NumPy's kinds that would turn into floats without a word: complex, bytes, text, spans and dates.
-_NOT_NUMBERS = "cSUmM"
+_NOT_NUMBERS = "cSUmMV"
 
 
 def floats(value: ArrayLike, name: str) -> FloatArray:
     """`value` as float64 of any shape, nan and inf too; raises InputError where it is no real numbers."""
+    if _is_masked(value):
+        raise InputError(f"{name} must be real numbers", found="a masked value, which is none")
     try:
         array = np.asarray(value)
         if array.dtype.kind in _NOT_NUMBERS:
             raise TypeError(array.dtype)
+        # In an array of objects, text and None would become numbers, or nan, without a word.
+        if array.dtype.kind == "O" and not all(map(is_real, array.flat)):
+            raise TypeError(array.dtype)
         return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} must be real numbers", found=repr(value)[:60]) from error
+        raise InputError(f"{name} must be real numbers", found=shown(value)) from error
+
+
+def _is_masked(value: object) -> bool:
+    """Whether a number is masked, which NumPy would unmask without a word."""
+    if isinstance(value, np.ma.MaskedArray):
+        return bool(np.ma.is_masked(value))
+    return isinstance(value, list | tuple) and any(map(_is_masked, value))
 
 
 def scalars(value: ArrayLike, name: str) -> FloatArray:

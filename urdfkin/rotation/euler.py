@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.demands import word
 from urdfkin.errors import UnknownNameError
 from urdfkin.rotation.arrays import FloatArray, rotations, vectors
 
@@ -54,7 +55,6 @@ class Sequence:
         return values[..., ::-1] if self.fixed else values
 
 
-@cache
 def sequence(name: str) -> Sequence:
     """The sequence of this name.
 
@@ -64,8 +64,13 @@ def sequence(name: str) -> Sequence:
     Raises:
         UnknownNameError: not one of the 24 names.
     """
-    if name not in SEQUENCES:
+    if word(name, "an Euler sequence") not in SEQUENCES:
         raise UnknownNameError("Euler sequence", name, SEQUENCES)
+    return _sequence(name)
+
+
+@cache
+def _sequence(name: str) -> Sequence:
     fixed = name.islower()
     letters = name.lower()[::-1] if fixed else name.lower()
     first, second, third = (_AXES.index(letter) for letter in letters)

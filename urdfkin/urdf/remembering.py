@@ -1,21 +1,20 @@
 """Trees that were read before, on disk: reading one takes a millisecond, importing the parser half a second.
 
 A tree is kept under a digest of everything it depends on: the URDF, how it is read, the sources that read it
-and the parser's version. What cannot be read back is read anew, what cannot be written is not kept.
+and the parser's version. What is damaged is read anew, what cannot be written is not kept; both are said.
 """
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import importlib.metadata
 import pickle
-import tempfile
 from functools import cache
 from pathlib import Path
 
 from urdfkin import tree
 from urdfkin.keeping import kept_folder
+from urdfkin.sealed import damaged, keep, kept
 from urdfkin.tree import KinematicTree
 from urdfkin.urdf.reader import read_tree
 
@@ -31,14 +30,14 @@ def remembered_tree(data: bytes, *, mimic: bool = True, root_joint: str | None =
     if folder is None:
         return read_tree(data, mimic=mimic, root_joint=root_joint)
     place = folder / hashlib.sha256(repr((data, mimic, root_joint)).encode()).hexdigest()[:32]
-    try:
-        kept = pickle.loads(place.read_bytes())
-    except Exception:  # a damaged file may fail in any way
-        kept = None
-    if isinstance(kept, KinematicTree):
-        return kept
+    if (content := kept(place)) is not None:
+        try:
+            if isinstance(found := pickle.loads(content), KinematicTree):
+                return found
+        except Exception as error:  # whole, but of another time: it may fail in any way
+            damaged(place, str(error))
     read = read_tree(data, mimic=mimic, root_joint=root_joint)
-    _keep(read, place)
+    keep(place, pickle.dumps(read))
     return read
 
 
@@ -46,10 +45,3 @@ def remembered_tree(data: bytes, *, mimic: bool = True, root_joint: str | None =
 def _folder() -> Path | None:
     sources = (Path(tree.__file__), *sorted(Path(__file__).parent.glob("*.py")))
     return kept_folder("trees", sources, importlib.metadata.version("yourdfpy"))
-
-
-def _keep(read: KinematicTree, place: Path) -> None:
-    with contextlib.suppress(OSError):
-        with tempfile.NamedTemporaryFile(dir=place.parent, delete=False) as file:
-            file.write(pickle.dumps(read))
-        Path(file.name).replace(place)

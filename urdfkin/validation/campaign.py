@@ -10,7 +10,8 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 
-from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.demands import switch, whole_number
+from urdfkin.errors import UrdfkinError
 from urdfkin.origin import Origin
 from urdfkin.recursion.announcing import load_kernels
 from urdfkin.robot import Robot
@@ -65,9 +66,8 @@ def validate(
     >>> report.passed, report.robots[0].failed
     (True, 0)
     """
-    if samples < 0 or jobs < 1 or seed < 0:
-        found = f"{samples}, {jobs} and {seed}"
-        raise InputError("validate needs samples >= 0, jobs >= 1 and seed >= 0", found=found)
+    samples, seed = whole_number(samples, "samples", 0), whole_number(seed, "seed", 0)
+    jobs, isolate = whole_number(jobs, "jobs", 1), switch(isolate, "isolate")
     many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started, begin = datetime.datetime.now(datetime.UTC), time.perf_counter()
     subjects, unread = _subjects(many, mimic, root_joint, xacro_args)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from urdfkin.errors import UrdfkinError
+from urdfkin.forking import lock_over_forks
 from urdfkin.recursion.plan import IntArray
 from urdfkin.tree import FloatArray
 from urdfkin.verification.bounds import Bound, Quantity, result_k
@@ -15,6 +15,8 @@ from urdfkin.verification.worst import worst_of_each
 
 #: The reason that certificates give for what nobody wanted checked.
 NOT_ASKED_FOR = "verify=False was asked for"
+#: One entry after the other, in all ledgers.
+_entering = lock_over_forks()
 
 
 class VerificationError(UrdfkinError):
@@ -197,25 +199,24 @@ class Account:
 class Ledger:
     """Counts what a robot hands out; safe to use from several threads."""
 
-    _lock: threading.Lock = field(default_factory=threading.Lock)
     _accounts: dict[Quantity, Account] = field(default_factory=dict)
     _reasons: dict[str, None] = field(default_factory=dict)
 
     def account(self, quantity: Quantity) -> Account:
         """A quantity's account, for those who count often."""
-        with self._lock:
+        with _entering:
             return self._accounts.setdefault(quantity, Account())
 
     def checked(self, quantity: Quantity, comparison: Comparison) -> None:
         """Enter results that Pinocchio confirmed."""
         account = self.account(quantity)
-        with self._lock:
+        with _entering:
             account.checked += comparison
 
     def unchecked(self, quantity: Quantity, results: int, reason: str | None = None) -> None:
         """Enter results that were handed out without a check, and why; None if nobody wanted one."""
         account = self.account(quantity)
-        with self._lock:
+        with _entering:
             if reason is None:
                 account.not_asked_for += results
             else:
@@ -224,7 +225,7 @@ class Ledger:
 
     def certificate(self, robot: str, pinocchio: str) -> Certificate:
         """What stands in the ledger now."""
-        with self._lock:
+        with _entering:
             found = [
                 (quantity, self._accounts[quantity]) for quantity in Quantity if quantity in self._accounts
             ]

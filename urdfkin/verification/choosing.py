@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from urdfkin.demands import shown
 from urdfkin.errors import InputError
 from urdfkin.recursion.plan import IntArray
 
@@ -32,7 +33,7 @@ def checked_choice(verify: object) -> Verify:
         return verify
     if isinstance(verify, str) and verify == "sample":
         return "sample"
-    raise InputError('verify is True, False or "sample"', found=repr(verify))
+    raise InputError('verify is True, False or "sample"', found=shown(verify))
 
 
 def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:

@@ -1,0 +1,229 @@
+"""Whatever a shell, a disc or a terminal does to a command: a result, or a clear line and the right code."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+import urdfkin
+from tests.cli import running
+from urdfkin import files
+from urdfkin.errors import SourceError
+from urdfkin.files import read_bytes
+
+ARM = (
+    '<robot name="Ärmchen"><link name="a"/><link name="Hand Größe 3 手"/>'
+    '<joint name="Gelenk_θ" type="continuous"><parent link="a"/><child link="Hand Größe 3 手"/>'
+    '<axis xyz="0 0 1"/></joint></robot>'
+)
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM, encoding="utf-8")
+    return path
+
+
+def shell(line: str, cwd: Path | None = None, **env: str) -> tuple[int, str, str]:
+    """`$URDFKIN` in a line of bash is the command."""
+    done = subprocess.run(
+        ["bash", "-c", line.replace("$URDFKIN", f"{sys.executable} -m urdfkin")],
+        env={**os.environ, **env},
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        errors="surrogateescape",
+        check=False,
+        timeout=120,
+    )
+    assert "Traceback" not in done.stderr, done.stderr
+    assert "Exception ignored" not in done.stderr, done.stderr
+    return done.returncode, done.stdout, done.stderr
+
+
+def one_line(text: str) -> str:
+    (line,) = text.splitlines()
+    return line
+
+
+# -- standard streams --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("words", ["robots", "--help", "--version", "explain URDF101", "info ur5"])
+def test_a_full_standard_output_is_told_in_a_line(words: str) -> None:
+    code, _, err = shell(f"$URDFKIN {words} > /dev/full")
+    assert code == 2
+    assert "standard output: cannot be written: found No space left on device" in one_line(err)
+
+
+@pytest.mark.parametrize("words", ["robots", "--help", "info ur5"])
+def test_a_closed_standard_output_is_told_in_a_line(words: str) -> None:
+    code, _, err = shell(f"$URDFKIN {words} >&-")
+    assert code == 2
+    assert "standard output: cannot be written: found Bad file descriptor" in one_line(err)
+
+
+@pytest.mark.slow
+def test_a_closed_standard_output_is_no_matter_where_a_file_is_written(tmp_path: Path) -> None:
+    code, _, err = shell("$URDFKIN placement ur5 -o T.csv >&-", tmp_path)
+    assert code == 0, err
+    assert (tmp_path / "T.csv").read_text().startswith("sample,T00")
+
+
+@pytest.mark.parametrize("closed", ["2>&-", "2>/dev/full", "2>&- >&-"])
+def test_a_standard_error_that_takes_nothing_changes_no_exit_code(closed: str) -> None:
+    assert shell(f"$URDFKIN info nothing_of_this_name {closed}")[0] == 2
+
+
+def test_a_closed_standard_input_is_told_in_a_line() -> None:
+    code, out, err = shell("$URDFKIN info - <&-")
+    assert (code, out) == (2, "")
+    assert "standard input: cannot be read: found Bad file descriptor" in one_line(err)
+
+
+@pytest.mark.parametrize("words", ["robots", "--help", "explain 7.130"])
+def test_a_reader_that_leaves_ends_a_command_quietly_and_as_no_disagreement(words: str) -> None:
+    code, _, err = shell(f"set -o pipefail; (sleep 0.01; $URDFKIN {words}) | true")
+    assert (code, err) == (141, "")
+
+
+# -- what the terminal is like -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("columns", ["", "abc", "0", "-5", "1_0", "1e3", "9" * 20, "7", "1"])
+def test_any_columns_give_a_table(columns: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    done = running.urdfkin("info", "ur5")
+    assert done.code == 0, done.err
+    assert "shoulder_pan_joint" in "".join(done.text.split())
+
+
+ASCII = (
+    {"PYTHONIOENCODING": "ascii"},
+    {"PYTHONIOENCODING": "ascii:strict", "LC_ALL": "C"},
+    {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    {"LC_ALL": "POSIX"},
+    {"PYTHONIOENCODING": "latin-1"},
+)
+
+
+@pytest.mark.parametrize("env", ASCII, ids=str)
+@pytest.mark.parametrize("words", ["info", "check", "check --format json", "check --format github"])
+def test_names_of_any_script_are_printed_on_any_terminal(words: str, env: dict[str, str], arm: Path) -> None:
+    code, out, err = shell(f"$URDFKIN {words} arm.urdf", arm.parent, **env)
+    assert code == 0, err
+    assert out or "github" in words  # which has nothing to say of a good file
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["terminal", "latex", "toml", "csv", "urdf", "c"])
+def test_a_table_of_names_of_any_script_is_the_same_file_on_an_ascii_terminal(form: str, arm: Path) -> None:
+    line = f"$URDFKIN dh arm.urdf --format {form} > table"
+    assert shell(line, arm.parent, **ASCII[0])[0] == 0
+    if form != "terminal":
+        ascii_only = (arm.parent / "table").read_bytes()
+        assert shell(line, arm.parent, PYTHONIOENCODING="utf-8")[0] == 0
+        assert (arm.parent / "table").read_bytes() == ascii_only
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cached", [True, False])
+def test_numba_told_not_to_compile_is_no_matter(cached: bool, tmp_path: Path) -> None:
+    cache = os.environ.get("XDG_CACHE_HOME", "") if cached else str(tmp_path)
+    code, out, err = shell("$URDFKIN placement ur5", NUMBA_DISABLE_JIT="1", XDG_CACHE_HOME=cache)
+    assert code == 0, err
+    assert "verified by Pinocchio" in out
+
+
+# -- names of files ----------------------------------------------------------------------------------------
+
+LONG = {"a name": "x" * 300 + ".urdf", "a path": "x/" * 3000 + "arm.urdf", "a word": "x" * 70_000}
+WITH_FILES = (
+    "info {}", "check {}", "validate {}", "dh {}", "dh ur5 --compare {}", "placement ur5 --q @{}",
+    "placement ur5 -o {}", "report {}", "compare {} {}", "plot ur5 --trajectory {} -o x.svg",
+    "validate ur5 --json {}",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("long", LONG)
+@pytest.mark.parametrize("words", WITH_FILES)
+def test_a_name_too_long_for_a_file_is_told_in_a_line(
+    words: str, long: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = running.urdfkin(*words.replace("{}", LONG[long]).split())
+    if words.startswith("validate {}"):
+        assert done.code == 2, done.err
+        return
+    assert done.code == 2, done.err
+    assert "Traceback" not in done.err
+    lines = [line for line in done.err.splitlines() if not line.startswith(("warning: ", "Usage", "Try"))]
+    assert any("File name too long" in line or "unknown" in line for line in lines), done.err[:500]
+
+
+@pytest.mark.parametrize("name", ["~nobody_of_this_name/arm.urdf", "a\x00b.urdf", "\udcff.urdf"])
+def test_an_odd_name_is_told_in_a_line(name: str) -> None:
+    with pytest.raises(urdfkin.UrdfkinError):
+        urdfkin.load(name)
+
+
+# -- pipes -------------------------------------------------------------------------------------------------
+
+
+def test_a_named_pipe_that_nobody_writes_to_is_given_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(files, "PATIENCE", 0.1)
+    os.mkfifo(tmp_path / "pipe.urdf")
+    os.mkfifo(tmp_path / "pipe.toml")
+    with pytest.raises(SourceError, match="a pipe that nobody writes to"):
+        urdfkin.read_table(tmp_path / "pipe.toml")
+    for take in (urdfkin.load, urdfkin.check):
+        with pytest.raises(SourceError, match=r"a pipe that nobody writes to: found nothing in 0.1 s"):
+            take(tmp_path / "pipe.urdf")
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.3])
+def test_a_named_pipe_is_read_as_soon_as_somebody_writes_however_slowly(pause: float, tmp_path: Path) -> None:
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    content = bytes(range(256)) * 1000  # more than a pipe holds
+
+    def write() -> None:
+        with path.open("wb") as pipe:  # waits for the reader
+            threading.Event().wait(pause)
+            pipe.write(content[:100])
+            pipe.flush()
+            threading.Event().wait(pause)
+            pipe.write(content[100:])
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        assert read_bytes(path) == content
+    finally:
+        writer.join()
+
+
+def test_reading_ends_one_byte_after_what_is_allowed(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(bytes(5000))
+    assert len(read_bytes(tmp_path / "file", 1000)) == 1001
+    assert len(read_bytes(Path("/dev/zero"), 3_000_000)) == 3_000_001
+    assert len(read_bytes(tmp_path / "file", 5000)) == 5000
+
+
+def test_a_process_substitution_is_a_file(arm: Path) -> None:
+    code, out, err = shell("$URDFKIN check <(sleep 0.3; cat arm.urdf) && echo good", arm.parent)
+    assert code == 0, err
+    assert "good" in out
+    code, out, _ = shell("$URDFKIN check <(true)", arm.parent)
+    assert code == 1
+    assert "URDF101" in out
+    assert shell("cat arm.urdf | $URDFKIN check /dev/stdin", arm.parent)[0] == 0

@@ -1,0 +1,97 @@
+"""Samples are within limits, those of followers too, and where nothing cuts them they are what they were."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import urdfkin
+from urdfkin.robot import Robot
+from urdfkin.verification.sampling import draw
+
+
+def gripper(kind: str, bounds: tuple[float, float], *rules: tuple[float, float, float, float]) -> Robot:
+    """A leader with bounds and followers, each (multiplier, offset, lower, upper)."""
+    links = "".join(f'<link name="l{i}"/>' for i in range(len(rules) + 2))
+    limit = '<limit lower="{!r}" upper="{!r}" effort="1" velocity="1"/>'
+    joint = '<joint name="{}" type="{}"><parent link="l{}"/><child link="l{}"/><axis xyz="0 0 1"/>{}</joint>'
+    joints = joint.format("leader", kind, 0, 1, limit.format(*bounds))
+    for i, (multiplier, offset, lower, upper) in enumerate(rules, 1):
+        rule = f'<mimic joint="leader" multiplier="{multiplier!r}" offset="{offset!r}"/>'
+        joints += joint.format(f"f{i}", "revolute", i, i + 1, limit.format(lower, upper) + rule)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(f'<robot name="r">{links}{joints}</robot>')
+
+
+@pytest.mark.parametrize("multiplier", [5.0, -5.0, 1e-3, 1.0 / 3.0, 7e3])
+@pytest.mark.parametrize("offset", [0.0, 0.7, -1.0, 900.0])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "continuous"])
+def test_a_leader_stays_where_its_follower_keeps_its_limits(
+    kind: str, offset: float, multiplier: float
+) -> None:
+    middle = 0.3 * multiplier + offset  # where the follower stands with its leader at 0.3
+    robot = gripper(kind, (-1.0, 1.0), (multiplier, offset, middle - 0.2, middle + 0.9))
+    drawn = draw(robot.tree, 2000, np.random.default_rng(0), with_special=True).q
+    assert robot.limit_violations(drawn[1:]) == []  # the first is neutral, wherever that is
+    assert robot.limit_violations(robot.sample(2000)) == []
+    reached = np.ptp(drawn[1:])
+    wanted = min(1.1 / abs(multiplier), 2.0)
+    assert reached >= 0.4 * wanted, "the range that is left is used"
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    st.floats(-3.0, 3.0), st.floats(1e-3, 3.0),
+    st.lists(st.tuples(st.floats(-9.0, 9.0), st.floats(-2.0, 2.0), st.floats(0.01, 1.0)), max_size=3),
+)  # fmt: skip
+def test_any_followers_keep_their_limits_where_there_is_room(
+    lower: float, width: float, rules: list[tuple[float, float, float]]
+) -> None:
+    middle = lower + 0.5 * width
+    followers = [(m, o, m * middle + o - half, m * middle + o + half) for m, o, half in rules]
+    robot = gripper("prismatic", (lower, lower + width), *followers)
+    assert robot.limit_violations(robot.sample(50)) == []
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [(1.0, 0.0, 3.0, 4.0), (-1.0, 0.0, 1.0, 4.0), (0.0, 5.0, -1.0, 1.0)],
+    ids=["no common place", "one common point", "a constant outside"],
+)
+def test_where_there_is_no_room_the_leader_keeps_its_own_limits_and_the_follower_is_named(
+    rule: tuple[float, float, float, float],
+) -> None:
+    robot = gripper("revolute", (-1.0, 1.0), rule)
+    q = robot.sample(500)
+    assert q.min() < -0.9
+    assert q.max() > 0.9
+    assert q.min() >= -1.0
+    assert q.max() <= 1.0
+    (line,) = robot.limit_violations(q)
+    assert line.startswith("joint f1")
+
+
+@pytest.mark.parametrize(
+    ("name", "digest"),
+    [
+        ("panda", "42521fd4b67c65a0"),
+        ("ur5", "cb6bde16c9b2a8f9"),
+        ("talos", "a2bb0559f21907f0"),
+        ("anymal", "a4048fddd35247c6"),
+    ],
+)
+def test_a_seed_gives_the_numbers_it_gave_before_where_followers_cut_nothing(name: str, digest: str) -> None:
+    drawn = urdfkin.load(name).sample(20, seed=3)
+    assert hashlib.sha256(drawn.tobytes()).hexdigest()[:16] == digest
+
+
+def test_a_continuous_leader_without_a_followers_limit_takes_any_angle() -> None:
+    robot = gripper("continuous", (0.0, 0.0))
+    assert np.ptp(robot.sample(1000)) > 1.99 * math.pi

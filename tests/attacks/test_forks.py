@@ -1,0 +1,137 @@
+"""A forked child computes, whatever threads and locks its parent had: a fork copies neither as it should.
+
+Each case is a process of its own: Python warns of forks beside threads, and a child that hangs must be ended.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+#: Fork, let the child do `child()`, and say how it ended; one that hangs is ended after a while.
+HARNESS = """
+import os, signal, sys, threading, time, warnings
+warnings.simplefilter("ignore")
+import numpy as np, urdfkin
+robot = urdfkin.load("ur5", verify=False)
+q = robot.sample(8192)
+
+def fork(child, patience=60.0):
+    pid = os.fork()
+    if pid == 0:
+        try:
+            child()
+        except BaseException as error:
+            print("child:", type(error).__name__, error, file=sys.stderr, flush=True)
+            os._exit(1)
+        os._exit(0)
+    end = time.monotonic() + patience
+    while time.monotonic() < end:
+        done, status = os.waitpid(pid, os.WNOHANG)
+        if done:
+            return print("ended with", os.waitstatus_to_exitcode(status))
+        time.sleep(0.02)
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    print("hung")
+
+def held(lock, seconds=1.0):
+    '''Another thread has the lock for a while.'''
+    has = threading.Event()
+    def hold():
+        with lock:
+            has.set()
+            time.sleep(seconds)
+    threading.Thread(target=hold).start()
+    has.wait()
+"""
+
+CASES = {
+    "a batch on all threads, after the parent had one": """
+        expected = robot.jacobian(q, "tool0", threads=2)
+        def child():
+            assert (robot.jacobian(q, "tool0", threads=2) == expected).all()
+            assert (robot.jacobian(q, "tool0") == expected).all()
+        fork(child)
+        fork(child)
+        assert (robot.jacobian(q, "tool0", threads=2) == expected).all()
+        """,
+    "a batch, while the parent computes one": """
+        stop = threading.Event()
+        def work():
+            while not stop.is_set():
+                robot.jacobian(q, "tool0", threads=2)
+        thread = threading.Thread(target=work)
+        thread.start()
+        for _ in range(5):
+            time.sleep(0.05)
+            fork(lambda: robot.jacobian(q, "tool0", threads=2))
+        stop.set()
+        thread.join()
+        """,
+    "an entry in the ledger, while another thread makes one": """
+        from urdfkin.verification import certificate
+        held(certificate._entering)
+        fork(lambda: (robot.placement(q[:3], "tool0"), robot.certificate()))
+        """,
+    "a kernel, while another thread compiles one": """
+        from urdfkin.recursion import compiling
+        held(compiling._compiling)
+        fork(lambda: robot.placement(q[:3], "tool0"))
+        """,
+    "a deep robot, while another thread builds one": """
+        from urdfkin import deep_stack
+        held(deep_stack._one_at_a_time)
+        fork(lambda: deep_stack.with_stack(2**24, lambda: None))
+        """,
+    "verified results, after the parent had some": """
+        checked = urdfkin.load("ur5")
+        checked.acceleration(q[:50], q[:50], q[:50], "tool0")
+        def child():
+            checked.acceleration(q[:50], q[:50], q[:50], "tool0")
+            assert checked.certificate().verified
+        fork(child)
+        """,
+    "a pool of processes": """
+        import multiprocessing
+        robot.jacobian(q, "tool0", threads=2)
+        with multiprocessing.get_context("fork").Pool(2) as pool:
+            pool.map_async(len, [q, q]).get(timeout=60)
+            found = pool.apply_async(robot.jacobian, (q, "tool0")).get(timeout=60)
+        assert (found == robot.jacobian(q, "tool0")).all()
+        print("ended with 0")
+        """,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_a_forked_child_computes(case: str) -> None:
+    code = HARNESS + textwrap.dedent(CASES[case])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert set(done.stdout.splitlines()) == {"ended with 0"}, done.stderr
+
+
+def test_every_lock_and_pool_of_the_package_is_made_for_forks() -> None:
+    """A new lock or pool has to say what a fork does to it; those of a validation end with its run."""
+    from pathlib import Path  # noqa: PLC0415
+
+    import urdfkin  # noqa: PLC0415
+
+    made = ("threading.Lock(", "threading.RLock(", "default_factory=threading", "ThreadPoolExecutor(")
+    package = Path(str(urdfkin.__file__)).parent
+    found = {
+        f"{path.relative_to(package)}: {name.rstrip('(')}"
+        for path in package.rglob("*.py")
+        for name in made
+        if name in path.read_text(encoding="utf-8") and path.parent.name != "validation"
+    }
+    assert found == {
+        "forking.py: threading.RLock",
+        "recursion/batch.py: ThreadPoolExecutor",  # forgotten in the child
+        "view/viewer.py: threading.RLock",  # a server that does not fork
+    }

@@ -1,0 +1,226 @@
+"""Whatever is handed to a public argument, the answer is a result or one of urdfkin's own errors."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import os
+import warnings
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from urdfkin.recursion import batch
+from urdfkin.recursion.lanes import LANES
+from urdfkin.robot import Robot
+from urdfkin.trajectory import line
+
+ODD: dict[str, Any] = {
+    "None": None,
+    "a half": 1.5,
+    "zero": 0,
+    "minus one": -1,
+    "text": "2",
+    "a list": [],
+    "a mapping": {},
+    "a set": {1, 2},
+    "a tuple": (1, "x"),
+    "an object": object(),
+    "nan": math.nan,
+    "inf": math.inf,
+    "too large": 10**400,
+    "bytes": b"x",
+    "True": True,
+    "a class": int,
+    "a function": len,
+    "complex": 1j,
+    "lists of two lengths": [[1.0], [1.0, 2.0]],
+    "masked": np.ma.masked_array([1.0, 2.0], mask=[True, False]),
+    "text in an object array": np.array(["1", "2"], dtype=object),
+    "dates": np.array(["2020-01-01"], dtype="M8[D]"),
+    "records": np.zeros(2, dtype=[("x", float)]),
+    "a surrogate": "\ud800",
+    "a null": "\x00",
+    "a long text": "x" * 10_000,
+}
+
+ARM = (
+    '<robot name="r"><link name="a"/><link name="b"/><link name="c"/>'
+    '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    '<joint name="k" type="continuous"><parent link="b"/><child link="c"/><origin xyz="1 0 0"/>'
+    '<axis xyz="0 1 0"/></joint></robot>'
+)
+#: Good arguments for every parameter without a default.
+GOOD: dict[str, Any] = {"q": [0.1, 0.2], "v": [0.1, 0.2], "a": [0.1, 0.2], "frame": "c", "n": 2}
+
+
+def methods() -> list[str]:
+    names = [name for name in dir(Robot) if not name.startswith("_")]
+    # What is for the package's own parts takes what they made.
+    inside = {"plan", "oracle", "cannot_verify", "shaped", "checked", "select"}
+    return [name for name in names if inspect.isfunction(getattr(Robot, name)) and name not in inside]
+
+
+def cases() -> list[tuple[str, str]]:
+    return [
+        (method, parameter)
+        for method in methods()
+        for parameter in inspect.signature(getattr(Robot, method)).parameters
+        if parameter != "self"
+    ]
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return urdfkin.load(ARM)
+
+
+def failure(function: Callable[..., Any], arguments: dict[str, Any]) -> str | None:
+    """What is wrong with the answer: nothing, for a result or for an error of urdfkin's own with words."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            function(**arguments)
+        except urdfkin.UrdfkinError as error:
+            return None if str(error) else "an error without words"
+        except Exception as error:
+            return f"{type(error).__name__}: {error}"
+    return None
+
+
+def good_for(function: Callable[..., Any]) -> dict[str, Any]:
+    return {
+        name: GOOD[name]
+        for name, parameter in inspect.signature(function).parameters.items()
+        if parameter.default is inspect.Parameter.empty
+    }
+
+
+@pytest.mark.parametrize(("method", "parameter"), cases())
+def test_an_odd_argument_gives_a_result_or_an_error_of_urdfkins_own(
+    method: str, parameter: str, robot: Robot
+) -> None:
+    function = getattr(robot, method)
+    failures = {}
+    for verify in (True, False):
+        good = good_for(function)
+        if "verify" in inspect.signature(function).parameters and parameter != "verify":
+            good["verify"] = verify
+        assert failure(function, good) is None
+        for label, odd in ODD.items():
+            failures[label, verify] = failure(function, good | {parameter: odd})
+    assert {label: words for label, words in failures.items() if words} == {}
+
+
+@pytest.mark.parametrize("method", ["placement", "velocity", "jacobian", "acceleration"])
+def test_a_prepared_frame_takes_what_its_robot_takes(method: str, robot: Robot) -> None:
+    function = getattr(robot.prepare("c"), method)
+    good = good_for(function)
+    failures = {
+        (name, label): failure(function, good | {name: odd})
+        for name in [*good, "out"]
+        for label, odd in ODD.items()
+    }
+    assert {label: words for label, words in failures.items() if words} == {}
+
+
+FUNCTIONS: dict[str, dict[str, Any]] = {
+    "load": {"source": ARM},
+    "check": {"source": ARM},
+    "validate": {"robots": ARM, "samples": 1},
+}
+#: Arguments that are objects with methods of their own, which are called and answer for themselves.
+OBJECTS = {("validate", "executor"), ("validate", "progress"), ("check", "limits")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "parameter"),
+    [
+        (name, parameter)
+        for name in FUNCTIONS
+        for parameter in inspect.signature(getattr(urdfkin, name)).parameters
+        if (name, parameter) not in OBJECTS
+    ],
+)
+def test_an_odd_argument_of_a_function_gives_a_result_or_an_error_of_urdfkins_own(
+    name: str, parameter: str
+) -> None:
+    function, good = getattr(urdfkin, name), FUNCTIONS[name]
+    # So many processes or samples are no mistake, but take a while.
+    odd = {key: x for key, x in ODD.items() if key != "too large" or parameter not in ("jobs", "samples")}
+    failures = {label: failure(function, good | {parameter: x}) for label, x in odd.items()}
+    assert {label: words for label, words in failures.items() if words} == {}
+
+
+@pytest.mark.parametrize("odd", [key for key in ODD if key not in ("a half",)])
+def test_a_duration_that_is_no_time_is_refused(odd: str, robot: Robot) -> None:
+    with pytest.raises(urdfkin.InputError):
+        line(robot, robot.neutral(), robot.neutral(), ODD[odd], 5)
+
+
+@pytest.mark.parametrize("odd", [1.5, "2", True, 0, -1, None.__class__, math.nan])
+@pytest.mark.parametrize("n", [1, 3, 40])
+def test_threads_are_a_whole_number_whatever_the_batch(odd: object, n: int, robot: Robot) -> None:
+    with pytest.raises(urdfkin.InputError, match="threads"):
+        robot.jacobian(robot.sample(n), "c", threads=odd)  # type: ignore[arg-type]
+
+
+def test_many_threads_are_no_more_work_than_the_batch_and_the_processors(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ten million threads made ten million parts, for 3.5 s."""
+    counted = []
+    parts = batch._parts
+
+    def counting(n: int, threads: int) -> list[tuple[int, int]]:
+        counted.append(threads)
+        return parts(n, threads)
+
+    monkeypatch.setattr(batch, "_parts", counting)
+    q = robot.sample(1000)
+    many = robot.jacobian(q, "c", verify=False, threads=10**7)
+    np.testing.assert_array_equal(many, robot.jacobian(q, "c", verify=False, threads=1))
+    assert counted[0] <= min(1000 // LANES, len(os.sched_getaffinity(0)))
+
+
+ARRAYS_REFUSED: dict[str, Any] = {
+    "masked": np.ma.masked_array([1.0, 2.0], mask=True),
+    "one masked": np.ma.masked_array([1.0, 2.0], mask=[True, False]),
+    "a list of masked arrays": [np.ma.masked_array([1.0, 2.0], mask=True)],
+    "a masked number in a list": [np.ma.masked, 1.0],
+    "text": np.array(["1", "2"], dtype=object),
+    "underscores": np.array(["1_0", "2"], dtype=object),
+    "text beside a number": np.array([1.0, "2"], dtype=object),
+    "None beside a number": [1.0, None],
+    "bytes": np.array([b"1", b"2"], dtype=object),
+    "complex numbers": np.array([1j, 2j], dtype=object),
+}
+
+
+@pytest.mark.parametrize("verify", [True, False])
+@pytest.mark.parametrize("given", ARRAYS_REFUSED)
+def test_what_is_no_number_is_not_made_one_in_silence(given: str, verify: bool, robot: Robot) -> None:
+    with pytest.raises(urdfkin.InputError, match="q must be real numbers"):
+        robot.placement(ARRAYS_REFUSED[given], "c", verify=verify)
+    with pytest.raises(urdfkin.InputError, match="q must be real numbers"):
+        robot.prepare("c").placement(ARRAYS_REFUSED[given])
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        np.ma.masked_array([1.0, 2.0], mask=False),
+        np.array([Fraction(1), Decimal(2)], dtype=object),
+        np.array([1, 2.0], dtype=object),
+        (1, np.float32(2.0)),
+    ],
+)
+def test_numbers_in_any_clothes_are_taken(given: Any, robot: Robot) -> None:
+    np.testing.assert_array_equal(robot.placement(given, "c"), robot.placement([1.0, 2.0], "c"))

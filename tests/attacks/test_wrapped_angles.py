@@ -1,0 +1,162 @@
+"""A log that wraps its angles is read as the motion that was logged, and what was done to it is said."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import urdfkin
+from tests.cli import running
+from urdfkin.frame_motion import frame_motion
+from urdfkin.plot.sheet import foot
+from urdfkin.robot import Robot
+from urdfkin.rotation.quaternion import rotation_of
+from urdfkin.trajectory import Trajectory, read_trajectory
+
+JOINT = (
+    '<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+    '<origin xyz="1 0 0"/><axis xyz="0 0 1"/>{more}</joint>'
+)
+LIMIT = '<limit lower="-6" upper="6" effort="1" velocity="1"/>'
+T = np.linspace(0.0, 4.0, 81)
+
+
+def robot_of(*joints: str) -> Robot:
+    links = "".join(f'<link name="{link}"/>' for link in "abc"[: len(joints) + 1])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(f'<robot name="r">{links}{"".join(joints)}</robot>')
+
+
+def joint(name: str, kind: str, parent: str, child: str, more: str = "") -> str:
+    return JOINT.format(name=name, kind=kind, parent=parent, child=child, more=more)
+
+
+def wheel(follower: str = "") -> Robot:
+    return robot_of(joint("wheel", "continuous", "a", "b"), *([follower] if follower else []))
+
+
+def wrapped(angle: NDArray[Any]) -> NDArray[Any]:
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def read(robot: Robot, path: Path, q: NDArray[Any], t: NDArray[Any] = T) -> Trajectory:
+    rows = np.column_stack([t, q])
+    names = ",".join(["t", *robot.coordinate_names])
+    lines = [",".join(repr(float(x)) for x in row) for row in rows]
+    path.write_text("\n".join([names, *lines]))
+    return read_trajectory(robot, path)
+
+
+@pytest.mark.parametrize("start", [0.0, np.pi])
+def test_a_wheel_that_turns_steadily_has_a_steady_rate_wherever_its_log_wraps(
+    start: float, tmp_path: Path
+) -> None:
+    angle = 2.0 * T + 0.3
+    motion = read(wheel(), tmp_path / "w.csv", wrapped(angle - start) + start)
+    np.testing.assert_allclose(motion.v, 2.0, atol=1e-9)
+    np.testing.assert_allclose(motion.a, 0.0, atol=1e-7)
+    turns = (motion.q[:, 0] - angle) / (2.0 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns[0]), atol=1e-9)
+    assert "angle jumps by a whole turn after sample" in motion.notes[0]
+    assert "wraps were taken out of wheel" in motion.rates
+
+
+def test_a_wheel_may_turn_backwards_and_forwards(tmp_path: Path) -> None:
+    angle = 7.0 * np.sin(T)
+    motion = read(wheel(), tmp_path / "w.csv", wrapped(angle))
+    np.testing.assert_allclose(motion.q[:, 0], angle, atol=1e-12)
+    np.testing.assert_allclose(motion.v[2:-2, 0], 7.0 * np.cos(T)[2:-2], atol=0.01)
+
+
+def test_what_was_not_wrapped_keeps_its_bits_and_nothing_is_said(tmp_path: Path) -> None:
+    angle = np.sin(T)
+    motion = read(wheel(), tmp_path / "w.csv", angle)
+    np.testing.assert_array_equal(motion.q[:, 0], angle)
+    assert motion.notes == ()
+    assert motion.rates == "by central differences"
+
+
+def test_a_revolute_joint_is_taken_as_written(tmp_path: Path) -> None:
+    angle = np.where(T < 2.0, 3.0, -3.0)
+    motion = read(robot_of(joint("arm", "revolute", "a", "b", LIMIT)), tmp_path / "r.csv", angle)
+    np.testing.assert_array_equal(motion.q[:, 0], angle)
+
+
+def test_a_fast_wheel_that_was_never_wrapped_is_taken_as_written_and_said(tmp_path: Path) -> None:
+    angle = 3.5 * np.arange(len(T))
+    motion = read(wheel(), tmp_path / "w.csv", angle)
+    np.testing.assert_array_equal(motion.q[:, 0], angle)
+    (note,) = motion.notes
+    assert "span more than one turn and are taken as written" in note
+
+
+def test_a_step_of_nearly_half_a_turn_is_called_unsure(tmp_path: Path) -> None:
+    motion = read(wheel(), tmp_path / "w.csv", wrapped(2.9 * np.arange(len(T))))
+    np.testing.assert_allclose(np.diff(motion.q[:, 0]), 2.9)
+    assert any("the shorter way round is taken, and may be the wrong one" in note for note in motion.notes)
+    assert any(f"and so {len(T) - 2} times more" in note for note in motion.notes)
+
+
+@pytest.mark.parametrize(
+    ("kind", "ratio", "told"),
+    [("revolute", 0.5, True), ("revolute", 3.0, False), ("prismatic", 1.0, True), ("continuous", 0.5, True)],
+)
+def test_a_follower_goes_on_with_its_leader_and_is_told_where_that_changes_it(
+    kind: str, ratio: float, told: bool, tmp_path: Path
+) -> None:
+    follower = joint("f", kind, "b", "c", f'<mimic joint="wheel" multiplier="{ratio}"/>{LIMIT}')
+    motion = read(wheel(follower), tmp_path / "w.csv", wrapped(2.0 * T))
+    assert any("joint f follows wheel" in note for note in motion.notes) is told
+    np.testing.assert_allclose(motion.q[:, 0], 2.0 * T, atol=1e-12)
+
+
+def test_a_planar_joint_on_a_circle_drives_straight_ahead_in_its_own_frame(tmp_path: Path) -> None:
+    """At 2 rad/s on a radius of 3 m: 6 m/s along its own x, and nothing sideways, through every wrap."""
+    t = np.linspace(0.0, 4.0, 4001)
+    angle = 2.0 * t
+    q = np.column_stack([3.0 * np.sin(angle), -3.0 * np.cos(angle), wrapped(angle)])
+    motion = read(robot_of(joint("base", "planar", "a", "b")), tmp_path / "p.csv", q, t)
+    np.testing.assert_allclose(motion.v[1:-1], np.tile([6.0, 0.0, 2.0], (len(t) - 2, 1)), atol=1e-4)
+    np.testing.assert_allclose(motion.a[3:-3], 0.0, atol=1e-4)
+
+
+def test_a_quaternion_that_changes_its_sign_is_the_same_orientation(tmp_path: Path) -> None:
+    t = np.linspace(0.0, 4.0, 401)
+    axis = np.array([0.6, 0.0, 0.8])
+    quaternion = np.column_stack([np.sin(t)[:, None] * axis, np.cos(t)])
+    signs = np.where((np.arange(len(t)) // 7) % 2, -1.0, 1.0)[:, None]
+    q = np.column_stack([np.cos(t), np.sin(t), 0.0 * t, signs * quaternion])
+    motion = read(robot_of(joint("base", "floating", "a", "b")), tmp_path / "f.csv", q, t)
+    np.testing.assert_allclose(motion.v[2:-2, 3:], np.tile(2.0 * axis, (len(t) - 4, 1)), atol=1e-3)
+    np.testing.assert_allclose(motion.a[3:-3, 3:], 0.0, atol=1e-2)
+    world = np.column_stack([-np.sin(t), np.cos(t), 0.0 * t])
+    own = np.einsum("nji,nj->ni", rotation_of(quaternion), world)
+    np.testing.assert_allclose(motion.v[2:-2, :3], own[2:-2], atol=1e-3)
+    assert any("quaternion changes its sign" in note for note in motion.notes)
+
+
+def test_what_a_plot_verifies_is_the_formula_and_not_the_rates(tmp_path: Path) -> None:
+    robot = wheel()
+    motion = read(robot, tmp_path / "w.csv", wrapped(2.0 * T))
+    words = foot(frame_motion(robot, motion.q, motion.v, motion.a, "b"), motion)
+    assert "verified by Pinocchio" in words
+    assert "not whether v and a are the rates of q" in words
+
+
+def test_plot_tells_on_stderr_that_it_took_wraps_out(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    robot = wheel()
+    read(robot, tmp_path / "w.csv", wrapped(2.0 * T))
+    (tmp_path / "w.urdf").write_text(robot.urdf)
+    words = ["plot", tmp_path / "w.urdf", "--trajectory", tmp_path / "w.csv", "-o", tmp_path / "w.svg"]
+    done = running.urdfkin(*map(str, words))
+    assert done.code == 0
+    assert "warning: joint wheel: its angle jumps by a whole turn after sample" in done.err
+    assert "wraps were taken out of wheel" in done.text
+    assert "not whether v and a" in " ".join((tmp_path / "w.svg").read_text().split())

@@ -1,0 +1,127 @@
+"""The one door for files that users name: read whole, or refused in one clear line.
+
+A pipe is a file here too, since `urdfkin check <(xacro arm.xacro)` names one; but a named pipe that nobody
+writes to is given up after a while, where Python's own `open` would wait for ever.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import stat
+import sys
+import time
+from pathlib import Path
+
+from urdfkin.errors import SourceError
+
+#: How long to wait for somebody to open the other end of a named pipe, seconds.
+PATIENCE = 10.0
+_AT_A_TIME = 2**20
+
+
+def read_bytes(path: Path, most: int | None = None) -> bytes:
+    """What a file holds.
+
+    Args:
+        path: A file, a device, or a pipe.
+        most: Bytes after which reading ends, with one more, so that a caller sees that there are too many.
+
+    Raises:
+        SourceError: it cannot be read; the message says why.
+    """
+    try:
+        # Without O_NONBLOCK, opening a pipe waits for its writer.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        with open(descriptor, "rb", buffering=0) as file:  # noqa: PTH123  a descriptor has no path
+            kind = os.fstat(descriptor).st_mode
+            if stat.S_ISDIR(kind):
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            first = _first_of_pipe(descriptor, path) if stat.S_ISFIFO(kind) else b""
+            os.set_blocking(descriptor, True)
+            return _all_of(file.fileno(), most, first)
+    except SourceError:
+        raise
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SourceError("cannot be read", where=shortened(path), found=reason) from error
+
+
+def read_text(path: Path, most: int | None = None) -> str:
+    """What a file holds, as UTF-8 with or without a byte order mark; errors as `read_bytes`."""
+    try:
+        return read_bytes(path, most).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise SourceError("cannot be read", where=str(path), found=f"no UTF-8 text ({error})") from None
+
+
+def read_standard_input(most: int | None = None) -> bytes:
+    """What standard input holds.
+
+    Raises:
+        SourceError: it is closed, or cannot be read.
+    """
+    try:
+        if sys.stdin is None:  # closed by whoever started the process
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        data: bytes = sys.stdin.buffer.read(-1 if most is None else most + 1)
+    except OSError as error:
+        raise SourceError("cannot be read", where="standard input", found=error.strerror) from error
+    return data
+
+
+def exists(path: Path) -> bool:
+    """Whether there is something; True for a name too long for a file, so that reading it says so."""
+    try:
+        return path.exists()
+    except OSError:
+        return True
+
+
+def at_home(name: str | os.PathLike[str]) -> Path:
+    """A path whose `~` is the home it stands for; what stands for no home is a name like others."""
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        return Path(name)
+
+
+def shortened(path: Path) -> str:
+    """A path for a message: one that no file system takes is not printed at length.
+
+    >>> len(shortened(Path("x" * 5000))) < 200
+    True
+    """
+    text = str(path)
+    return text if len(text) <= 300 else f"{text[:60]}...{text[-60:]} ({len(text)} characters)"
+
+
+def _all_of(descriptor: int, most: int | None, first: bytes) -> bytes:
+    pieces, left = [first], (_AT_A_TIME if most is None else most + 1 - len(first))
+    while left > 0 and (piece := os.read(descriptor, min(left, _AT_A_TIME))):
+        pieces.append(piece)
+        left -= len(piece) if most is not None else 0
+    return b"".join(pieces)
+
+
+def _first_of_pipe(descriptor: int, path: Path) -> bytes:
+    """What is there already, once somebody has, or had, the other end; if nobody comes, it is refused."""
+    events = select.poll()
+    events.register(descriptor, select.POLLIN)
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        try:
+            if piece := os.read(descriptor, _AT_A_TIME):
+                return piece
+        except BlockingIOError:  # a writer that has written nothing yet
+            return b""
+        if any(event & select.POLLHUP for _, event in events.poll(0)):  # one that came and went
+            return b""
+        time.sleep(0.01)
+    raise SourceError(
+        "a pipe that nobody writes to",
+        where=str(path),
+        found=f"nothing in {PATIENCE:g} s",
+        remedy="write the text into a file, or give it on standard input as -",
+    )
