@@ -284,7 +284,7 @@ def in_place(name: str, wrong: ast.Module) -> Iterator[None]:
 
 
 def _forget() -> None:
-    importlib.import_module("urdfkin.rotation.euler").sequence.cache_clear()
+    importlib.import_module("urdfkin.rotation.euler")._sequence.cache_clear()
 
 
 def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | None:
