@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -251,10 +250,7 @@ def _difference(one: CellDifference) -> dict[str, Any]:
 
 
 def _put(work: Work, text: str) -> None:
-    if work.output is not None:
-        write_file(work.output, text.encode())
-    elif work.format_ in _READ:
+    if work.output is None:
         click.echo(text, nl=False)
-    else:  # the same file whatever letters the terminal knows
-        sys.stdout.buffer.write(text.encode())
-        sys.stdout.buffer.flush()
+    else:
+        write_file(work.output, text.encode())

@@ -268,7 +268,8 @@ def _rigid(T: ArrayLike, where: str) -> FloatArray:
         raise InputError(
             "a pose is a (4, 4) array of finite numbers", where=where, found=f"shape {pose.shape}"
         )
-    off = np.abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max()
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is no rotation
+        off = np.abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max()
     if off > 1e-6 or np.linalg.det(pose[:3, :3]) < 0.0 or pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
         raise InputError("a pose must be a rotation and a translation", where=where, found=str(pose.tolist()))
     return pose
