@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
+from urdfkin.chain import chain
 from urdfkin.dh import dh_table
+from urdfkin.dh.snapping import _change, _snap_pose, rotation_angle, row_of_constant
 from urdfkin.dh.statement import SnapChange, SnapStatement
 from urdfkin.tree import Joint, JointKind, KinematicTree, Limit, build_tree
 
@@ -82,3 +85,39 @@ def test_a_statement_adds_up_what_is_said_of_each_change() -> None:
     said = SnapStatement(1e-2, changes, 0.0, 0.0, {"s": 1e-3})
     assert said.rows == (-1, 1)
     assert said.bound({"s": np.array([0.0, -10.0])}) == pytest.approx([0.012, 0.022])
+
+
+def test_what_several_changes_move_for_each_metre_of_a_slider_adds_up() -> None:
+    tree = arm(
+        rotation("x", math.pi / 2 + OFF), shift(1.0, 0, 0) @ rotation("x", math.pi / 2 + 2 * OFF), kinds="RP"
+    )
+    snap = dh_table(tree, "tip", snap=10 * OFF).snap
+    assert snap is not None
+    assert snap.per_metre == {"j2": pytest.approx(3 * OFF, rel=1e-9)}
+
+
+@pytest.mark.parametrize("psi", [-2.5, -0.4, 0.3, 1.1, 3.0])
+@pytest.mark.parametrize("tilt", [0.0, OFF, math.pi - OFF, math.pi, 1.0])
+def test_a_pose_that_is_snapped_turns_by_no_more_than_is_said(tilt: float, psi: float) -> None:
+    A = shift(1, 2, 3) @ rotation("z", 0.7) @ rotation("x", tilt) @ rotation("z", psi)
+    pose, angle = _snap_pose(A, 10 * OFF)
+    assert angle <= 2 * OFF
+    assert rotation_angle(pose[:3, :3], A[:3, :3]) <= max(angle, 1e-12)
+    assert (pose[:3, 3] == [1, 2, 3]).all()
+
+
+@pytest.mark.parametrize(("convention", "row"), [("standard", 0), ("modified", 1)])
+def test_a_constant_shows_in_the_row_of_its_convention(convention: str, row: int) -> None:
+    tree = arm(np.eye(4), shift(0.3, 0, 0) @ rotation("x", 1.0), tip=shift(0.1, 0.2, 0) @ rotation("y", 0.3))
+    table = dh_table(tree, "tip", convention=convention)
+    assert [row_of_constant(table, k) for k in range(3)] == [-1, row, 2]
+    plain = replace(table, tool=np.eye(4))
+    assert [row_of_constant(plain, k) for k in range(3)] == [-1, row, 1]
+
+
+@pytest.mark.parametrize(("pivot", "sliders"), [(0, "j1 j3"), (1, "j1 j3"), (2, "j3"), (3, "j3"), (4, "")])
+def test_the_joints_that_slide_from_the_pivot_on_lengthen_a_lever(pivot: int, sliders: str) -> None:
+    path = chain(arm(np.eye(4), shift(1, 0, 0), shift(0, 2, 0), kinds="PRP", tip=shift(0, 0, 4)), "tip")
+    found = _change(path, pivot, "something", OFF)
+    assert found.sliders == tuple(sliders.split())
+    assert found.lever == pytest.approx({0: 7.0, 1: 7.0, 2: 6.0, 3: 4.0, 4: 0.0}[pivot])
