@@ -1,4 +1,4 @@
-"""What a validation draws: as many as asked for, the special configurations first, some of the rates large."""
+"""What a validation draws: as many as asked for, special configurations first, some rates large."""
 
 from __future__ import annotations
 
