@@ -3,9 +3,11 @@
     python scripts/mutate.py --sample 40 --seed 1          forty slips, drawn from the whole package
     python scripts/mutate.py verification validation       every slip of two parts
     python scripts/mutate.py --only urdfkin.validation.tally:17
+    python scripts/mutate.py --named                       those of tests/attacks/named_slips.toml
 
-The tests that are near the file are asked first, then, with --whole, the whole suite. Every slip that nobody
-noticed is printed, and kept in --json with the others. Exit 0: all were noticed; 1: some were not.
+The tests that are near the file are asked first, those that are quick; then, with --slow, the slow ones near
+it, and with --whole the whole suite. Every slip that nobody noticed is printed, and kept in --json with the
+others. What docs/mutation.md argues is not asked again. Exit 0: all were noticed or are argued; 1: some not.
 """
 
 from __future__ import annotations
@@ -19,31 +21,39 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
-from scripts.mutating.operators import slips
+from scripts.mutating.arguments import argued
+from scripts.mutating.named import Named, named_slips
+from scripts.mutating.operators import function_at, slips
 from scripts.mutating.selection import ROOT, files, module_of, near_tests
 
 _NO_TESTS = 5  # pytest's exit code where nothing was collected
+_QUICK, _SLOW = "not slow and not browser", "slow and not browser"
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A slip in a file; `name` replays it with --only."""
+    """A slip in a file; `name` replays it with --only, `place` finds it again when the file has changed."""
 
     name: str
     file: str
     line: int
     what: str
+    place: str
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the tests said: `noticed` with the test that did, `survived`, or `too slow`."""
+    """What the tests said: `noticed` with the test that did, `survived`, `too slow`, or `argued`."""
 
     mutant: Mutant
     word: str
@@ -53,35 +63,59 @@ class Outcome:
 
 def mutants(parts: list[str]) -> list[Mutant]:
     """Every mutant of some parts of the package, or of all."""
+    return [mutant for path in files(parts) for mutant in mutants_of(path)]
+
+
+def mutants_of(path: Path) -> list[Mutant]:
+    """Every mutant of a file."""
+    tree, module = ast.parse(path.read_text(encoding="utf-8")), module_of(path)
     return [
-        Mutant(f"{module_of(path)}:{number}", str(path.relative_to(ROOT)), slip.line, slip.what)
-        for path in files(parts)
-        for number, slip in enumerate(slips(ast.parse(path.read_text(encoding="utf-8"))))
+        Mutant(
+            f"{module}:{number}",
+            str(path.relative_to(ROOT)),
+            slip.line,
+            slip.what,
+            ".".join(filter(None, (module, function_at(tree, slip.line)))),
+        )
+        for number, slip in enumerate(slips(tree))
     ]
 
 
-def judge(mutant: Mutant, *, whole: bool, timeout: float) -> Outcome:
+def judge(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = False) -> Outcome:
     """Run the tests on a mutant until one fails."""
     begin = time.perf_counter()
     near = near_tests(ROOT / mutant.file)
-    for tests in [near, *([["tests"]] if whole else [])]:
-        word, by = _run(mutant, tests, timeout)
+    rounds = [(near, _QUICK), *([(near, _SLOW)] if slow else []), *([(["tests"], _QUICK)] if whole else [])]
+    for tests, marks in rounds:
+        word, by = _run({"URDFKIN_MUTANT": mutant.name}, [*tests, "-m", marks], timeout)
         if word != "survived":
             break
     return Outcome(mutant, word, by, round(time.perf_counter() - begin, 1))
 
 
-def _run(mutant: Mutant, tests: list[str], timeout: float) -> tuple[str, str]:
+def judge_named(slip: Named, *, timeout: float) -> Outcome:
+    """Run the one test that a named slip must fail."""
+    begin = time.perf_counter()
+    texts = json.dumps([slip.before, slip.after])
+    word, by = _run({"URDFKIN_MUTANT": slip.module, "URDFKIN_MUTANT_TEXTS": texts}, [slip.test], timeout)
+    if word == "noticed" and not by.startswith(f"FAILED {slip.test}"):
+        word = "not run"  # something else than the test's claim failed
+    file = f"{slip.module.replace('.', '/')}.py"
+    mutant = Mutant(slip.claim, file, 0, f"{slip.before}  ->  {slip.after}", slip.module)
+    return Outcome(mutant, word, by, round(time.perf_counter() - begin, 1))
+
+
+def _run(slip: dict[str, str], tests: list[str], timeout: float) -> tuple[str, str]:
     paths = [str(ROOT / "scripts" / "mutating" / "hook"), str(ROOT), os.environ.get("PYTHONPATH", "")]
     command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider"]
     with tempfile.TemporaryFile("w+") as said:
         try:
             done = subprocess.run(
-                [*command, "--tb=no", "-m", "not slow and not browser", *tests],
+                [*command, "--tb=no", *tests],
                 cwd=ROOT,
                 env={
                     **os.environ,
-                    "URDFKIN_MUTANT": mutant.name,
+                    **slip,
                     "PYTHONPATH": os.pathsep.join(filter(None, paths)),
                     "PYTHONDONTWRITEBYTECODE": "1",
                 },
@@ -98,7 +132,7 @@ def _run(mutant: Mutant, tests: list[str], timeout: float) -> tuple[str, str]:
     if done.returncode in (0, _NO_TESTS):
         return "survived", ""
     failed = (line for line in lines if line.startswith(("FAILED", "ERROR")))
-    return "noticed", next(failed, lines[-1] if lines else "")[:200]
+    return "noticed", next(failed, lines[-1] if lines else "")[:300]
 
 
 def main() -> int:
@@ -112,35 +146,53 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--timeout", type=float, default=300.0, help="seconds for one mutant's tests")
     parser.add_argument(
-        "--whole", action="store_true", help="ask the whole suite where the near tests are silent"
+        "--slow", action="store_true", help="ask the slow tests near it where those are silent"
     )
+    parser.add_argument("--whole", action="store_true", help="ask the whole suite where those are silent")
     parser.add_argument("--only", help="this mutant alone")
+    parser.add_argument("--named", action="store_true", help="the named slips, each by its own test")
     parser.add_argument("--count", action="store_true", help="say how many there are, and end")
     parser.add_argument("--json", type=Path, help="keep what happened to each")
     options = parser.parse_args()
-    chosen = mutants(options.parts)
-    if options.only is not None:
-        chosen = [mutant for mutant in chosen if mutant.name == options.only]
-    elif options.sample is not None and options.sample < len(chosen):
-        chosen = random.Random(options.seed).sample(chosen, options.sample)
+    asks: list[Callable[[], Outcome]]
+    if options.named:
+        asks = [partial(judge_named, slip, timeout=options.timeout) for slip in named_slips()]
+    else:
+        how = {"timeout": options.timeout, "slow": options.slow, "whole": options.whole}
+        asks = [partial(_unless_argued, mutant, **how) for mutant in _chosen(options)]
     if options.count:
-        print(len(chosen))
+        print(len(asks))
         return 0
     outcomes = []
     with ThreadPoolExecutor(options.jobs) as pool:
-        judged = pool.map(lambda mutant: judge(mutant, whole=options.whole, timeout=options.timeout), chosen)
-        for outcome in judged:
+        for outcome in pool.map(lambda ask: ask(), asks):
             outcomes.append(outcome)
             if outcome.word != "noticed":
                 mutant = outcome.mutant
                 print(
-                    f"{outcome.word}: {mutant.file}:{mutant.line}: {mutant.what}  [{mutant.name}]", flush=True
+                    f"{outcome.word}: {mutant.place}:{mutant.line}: {mutant.what}  [{mutant.name}]",
+                    flush=True,
                 )
             if options.json is not None:
                 options.json.write_text(json.dumps([asdict(o) for o in outcomes], indent=1), "utf-8")
-    missed = sum(outcome.word != "noticed" for outcome in outcomes)
-    print(f"{len(outcomes)} mutants, {len(outcomes) - missed} noticed, {missed} not")
-    return 1 if missed else 0
+    counts = Counter(outcome.word for outcome in outcomes)
+    print(f"{len(outcomes)} mutants: " + ", ".join(f"{n} {word}" for word, n in counts.most_common()))
+    return 0 if counts.keys() <= {"noticed", "argued"} else 1
+
+
+def _chosen(options: argparse.Namespace) -> list[Mutant]:
+    chosen = mutants(options.parts)
+    if options.only is not None:
+        return [mutant for mutant in chosen if mutant.name == options.only]
+    if options.sample is not None and options.sample < len(chosen):
+        return random.Random(options.seed).sample(chosen, options.sample)
+    return chosen
+
+
+def _unless_argued(mutant: Mutant, **how: Any) -> Outcome:
+    if (mutant.place, mutant.what) in argued():
+        return Outcome(mutant, "argued", "docs/mutation.md", 0.0)
+    return judge(mutant, **how)
 
 
 if __name__ == "__main__":

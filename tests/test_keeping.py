@@ -34,7 +34,7 @@ def test_what_nobody_used_for_a_month_is_deleted_and_nothing_else(tmp_path: Path
     foreign = tmp_path / "kernels-of-somebody-else"
     foreign.mkdir()
     (old / "kernel.nbc").write_bytes(b"compiled")
-    for folder, days in ((old, 31), (recent, 29), (other, 31)):
+    for folder, days in ((old, 30.1), (recent, 29.9), (other, 30.1)):
         then = time.time() - days * 24 * 3600
         os.utime(folder / ".used", (then, then))
     used = made("kernels", "new")

@@ -49,6 +49,25 @@ def mutated(source: str, number: int) -> ast.Module:
     return ast.fix_missing_locations(tree)
 
 
+def function_at(tree: ast.Module, line: int) -> str:
+    """The function or class in which a line stands, `Tally.percentile`; empty outside of all."""
+    kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+    around = (node for node in ast.walk(tree) if isinstance(node, kinds))
+    found = [node for node in around if node.lineno <= line <= (node.end_lineno or 0)]
+    return ".".join(node.name for node in sorted(found, key=lambda node: node.lineno))
+
+
+def rewritten(source: str, before: str, after: str) -> ast.Module:
+    """A file's tree with one piece of its text replaced.
+
+    Raises:
+        ValueError: the text does not stand there exactly once.
+    """
+    if source.count(before) != 1:
+        raise ValueError(f"found {source.count(before)} times: {before}")
+    return ast.parse(source.replace(before, after))
+
+
 def _code(node: ast.AST) -> Iterator[ast.AST]:
     """The nodes that do something when the program runs: no types, no texts, no decorators."""
     yield node

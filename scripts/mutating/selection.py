@@ -17,6 +17,9 @@ _COMPILED = {
 }  # fmt: skip
 
 
+_OF_ROBOTS = ("test_robot.py", "verification", "laws")
+
+
 def files(parts: list[str]) -> list[Path]:
     """The package's files, or those whose path below the package begins with one of the words."""
     found = sorted(path for path in PACKAGE.rglob("*.py") if path.stem not in _COMPILED)
@@ -33,11 +36,15 @@ def _below(path: Path) -> str:
 
 
 def near_tests(path: Path) -> list[str]:
-    """Test files that name the module, and those of its part: who is near it asks first."""
+    """Test files that name the module, and those of its part: who is near it asks first.
+
+    What lies in no part serves all of them, by way of a robot.
+    """
     named = re.compile(rf"\b{re.escape(module_of(path))}\b(?!\.)|\b{re.escape(path.stem)}\b")
     part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
     near = {test for test, text in _texts().items() if named.search(text)}
-    own = {test for test in _texts() if test.relative_to(TESTS).parts[0] in (part, f"test_{part}.py")}
+    parts = (part, f"test_{part}.py", *(_OF_ROBOTS if path.parent == PACKAGE else ()))
+    own = {test for test in _texts() if test.relative_to(TESTS).parts[0] in parts}
     order = sorted(near | own, key=lambda test: (path.stem not in test.stem, test not in near, str(test)))
     return [str(test.relative_to(ROOT)) for test in order]
 

@@ -115,6 +115,23 @@ def test_worse_means_by_more_than_a_factor_of_two() -> None:
     assert not line(1.9, 1.0).ours_is_worse
 
 
+@pytest.mark.parametrize(
+    ("ours", "theirs", "worse"),
+    [
+        ((6.1, 1.0), (3.0, 1.0), True),
+        ((6.0, 1.0), (3.0, 1.0), False),
+        ((3.0, 0.61), (3.0, 0.3), True),
+        ((3.0, 0.6), (3.0, 0.3), False),
+        ((0.9, 0.9), (0.5, 0.5), False),
+    ],
+)
+def test_the_worst_and_the_typical_error_are_each_held_against_their_own(
+    ours: tuple[float, float], theirs: tuple[float, float], worse: bool
+) -> None:
+    line = Line(Quantity.VELOCITY, "local", 1, Errors(*ours), Errors(*theirs))
+    assert line.ours_is_worse == worse
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_urdfkin_is_never_the_worse_of_the_two_by_more_than_a_factor_of_two(name: str) -> None:

@@ -94,11 +94,14 @@ def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pyte
         return started[-1]
 
     monkeypatch.setattr(workers, "_interpreter", kept)
-    report = validate(["ur5", "panda"], samples=0, isolate=True, jobs=2)
-    assert report.interrupted
-    assert started[0].poll() == -9
-    started[1].kill()
-    started[1].wait()
+    try:
+        report = validate(["ur5", "panda"], samples=0, isolate=True, jobs=2)
+        assert report.interrupted
+        assert started[0].poll() == -9
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
 
 
 def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -103,18 +103,14 @@ class Quantity(StrEnum):
     SCREWS = "screws"
 
 
-#: How many rotated vectors are multiplied in each term of [linear; angular], in LOCAL_WORLD_ALIGNED.
+#: How many rotated vectors are multiplied in each term of [linear; angular], in LOCAL_WORLD_ALIGNED; what is
+#: not here has the bound of one of these.
 _FACTORS = {
     Quantity.PLACEMENT: 1,
     Quantity.VELOCITY: 2,
     Quantity.JACOBIAN: 2,
     Quantity.JACOBIAN_RATE: 3,
     Quantity.ACCELERATION: 3,
-    Quantity.ANALYTICAL_JACOBIAN: 2,
-    Quantity.ACCELERATION_BREAKDOWN: 3,
-    Quantity.JOINT_JACOBIAN: 2,
-    Quantity.JOINT_JACOBIAN_RATE: 3,
-    Quantity.SCREWS: 2,
 }
 
 

@@ -1,10 +1,12 @@
 """Found on PYTHONPATH by every process of a mutant's test: one module of the package is read with its slip.
 
-`URDFKIN_MUTANT` is the module's name and the slip's number, `urdfkin.validation.tally:17`.
+`URDFKIN_MUTANT` is the module's name and the slip's number, `urdfkin.validation.tally:17`; or the name alone,
+where `URDFKIN_MUTANT_TEXTS` is the slip: the text as it stands and the text instead, as JSON.
 """
 
 import importlib.abc
 import importlib.machinery
+import json
 import os
 import sys
 from collections.abc import Sequence
@@ -12,13 +14,15 @@ from pathlib import Path
 from types import CodeType, ModuleType
 
 MODULE, _, NUMBER = os.environ.get("URDFKIN_MUTANT", "").partition(":")
+TEXTS = os.environ.get("URDFKIN_MUTANT_TEXTS", "")
 
 
 class _Loader(importlib.machinery.SourceFileLoader):
     def get_code(self, fullname: str) -> CodeType:
-        from scripts.mutating.operators import mutated  # noqa: PLC0415  only the process that needs it
+        from scripts.mutating.operators import mutated, rewritten  # noqa: PLC0415  where it is needed
 
-        tree = mutated(Path(self.path).read_text(encoding="utf-8"), int(NUMBER))
+        source = Path(self.path).read_text(encoding="utf-8")
+        tree = mutated(source, int(NUMBER)) if NUMBER else rewritten(source, *json.loads(TEXTS))
         return compile(tree, str(self.path), "exec")
 
 

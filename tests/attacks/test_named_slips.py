@@ -1,0 +1,39 @@
+"""Slips that nobody noticed once: each is made again, in a process of its own, and its test must fail."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scripts.mutate import judge_named
+from scripts.mutating.named import Named, named_slips
+from scripts.mutating.operators import rewritten
+from scripts.mutating.selection import ROOT
+
+SLIPS = named_slips()
+
+
+def _source(slip: Named) -> str:
+    return (ROOT / f"{slip.module.replace('.', '/')}.py").read_text(encoding="utf-8")
+
+
+def test_every_slip_can_still_be_made_and_its_test_is_there() -> None:
+    assert len({slip.claim for slip in SLIPS}) == len(SLIPS)
+    for slip in SLIPS:
+        rewritten(_source(slip), slip.before, slip.after)
+        file, _, name = slip.test.partition("::")
+        assert f"def {name}(" in Path(ROOT / file).read_text(encoding="utf-8"), slip.test
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slip", SLIPS, ids=[slip.claim.replace(" ", "-") for slip in SLIPS])
+def test_its_test_fails(slip: Named) -> None:
+    outcome = judge_named(slip, timeout=300.0)
+    assert outcome.word == "noticed", outcome.by
+
+
+def test_a_text_that_does_not_stand_there_once_is_no_slip() -> None:
+    for text in ("x = 1\nx = 1\n", "y = 2\n"):
+        with pytest.raises(ValueError, match=r"found \d times"):
+            rewritten(text, "x = 1", "x = 2")
