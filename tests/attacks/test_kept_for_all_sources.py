@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from urdfkin import recursion, tree, urdf
+from urdfkin import keeping, recursion, tree, urdf
 from urdfkin.keeping import kept_folder
 from urdfkin.recursion import compiling
 from urdfkin.urdf import remembering
@@ -51,3 +51,13 @@ def test_every_file_of_the_part_is_among_the_sources(
 
 def _files(path: Path) -> list[Path]:
     return sorted(path.parent.glob("*.py")) if path.stem == "__init__" else [path]
+
+
+def test_even_whom_one_trusts_above_a_folder_may_not_own_the_folder_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    owner = tmp_path.stat().st_uid
+    assert keeping._not_ours(tmp_path) is None
+    monkeypatch.setattr(keeping, "_TRUSTED", (0, owner))
+    monkeypatch.setattr("os.geteuid", lambda: owner + 1)
+    assert str(keeping._not_ours(tmp_path)).startswith(f"{tmp_path} belongs to another user")

@@ -62,3 +62,16 @@ def test_the_heading_is_the_verdict_with_a_capital() -> None:
     assert markdown_of(old, new, compare(old, new)).startswith("## ✅ No regression, 0 changes\n")
     new["robots"][0]["checks"][0]["failed"] = 2
     assert markdown_of(old, new, compare(old, new)).startswith("## ❌ ")
+
+
+def test_what_fits_is_shown_and_what_does_not_is_counted() -> None:
+    old: Any = arms()
+    new = copy.deepcopy(old)
+    for check in new["robots"][0]["checks"]:
+        check["failed"] = 2
+    found = compare(old, new)
+    whole = markdown_of(old, new, found)
+    room = len(whole) + 100  # what is kept free for the last line
+    assert markdown_of(old, new, found, room) == whole
+    assert markdown_of(old, new, found, room - 1).endswith("\n1 change more did not fit.\n")
+    assert len(markdown_of(old, new, found, room - 1)) <= room - 1
