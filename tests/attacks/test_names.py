@@ -14,7 +14,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import urdfkin
-from scripts.fuzzing.robots import LIKE_OURS
+from scripts.fuzzing.robots import LIKE_OURS as POOL
 from urdfkin import BaseMotion
 from urdfkin.errors import InputError, OracleError, UnknownNameError
 from urdfkin.frame_names import JointFrame, LinkFrame
@@ -23,7 +23,6 @@ from urdfkin.robot import Robot
 from urdfkin.tree import KinematicTree
 
 #: What links and joints are called here.
-POOL = LIKE_OURS
 ASKED = (*POOL, *(f"{prefix}:{name}" for prefix in ("link", "joint") for name in POOL))
 
 #: Where the base of these tests is.
