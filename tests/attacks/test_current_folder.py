@@ -97,7 +97,7 @@ def test_compiling_runs_nothing_there(
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder.parent / "cache"))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     run(folder, command, "validate", str(ROBOTS / "one_link.urdf"), "--samples", "0")
-    assert list((folder.parent / "cache").rglob("*.nbc"))
+    assert list((folder.parent / "cache").rglob("*.kernel"))
 
 
 def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
