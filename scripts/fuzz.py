@@ -1,10 +1,16 @@
-"""Mutate real URDFs and see that nothing hurts: no crash, no hang, no traceback, no wrong number in silence.
+"""Hostile URDFs, and nothing hurts: no crash, no hang, no traceback, no wrong number in silence.
 
-    python scripts/fuzz.py --mutants 20000 --seed 0 --jobs 2
+    python scripts/fuzz.py --mutants 20000 --robots 10000 --seed 0 --jobs 2
+    python scripts/fuzz.py --family names --family followers --robots 5000
 
-Each mutant goes through `check`, `load` and Pinocchio in a worker process that is restarted when it dies or
-takes too long. Mutant i depends on the seed and on i alone, so `--only i` replays it. What went wrong is kept
-as a file with the mutant's bytes, beside a note that says what happened. Exit 0: nothing did.
+Mutants of the shipped robots are one family; the others are random whole robots, each odd in its own way:
+names that look like ours, prefixes, versions, followers, lengths, angles, axes, limits, roots, or everything.
+
+Each goes through `check` and `load`, and every quantity of it is computed in every reference, on bases near
+and far, and held against Pinocchio, in a worker process that is restarted when it dies or takes too long.
+Number i of a family depends on the seed, the family and i alone, so `--family names --only i` replays it.
+What went wrong is kept as a file with the robot's bytes, beside a note that says what happened.
+Exit 0: nothing did.
 """
 
 from __future__ import annotations
@@ -18,27 +24,37 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from functools import cache
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
-from scripts.fuzzing import GOOD
+from scripts.fuzzing import GOOD, Case, robots
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.catalogue import catalogue
 
 #: What a worker answers when it is ready; the first use compiles, which may take a while.
 READY, FIRST_WAIT = "ready", 300.0
 
+MUTANTS = "mutants"
+FAMILIES = (MUTANTS, *robots.FAMILIES)
 
+
+@cache
 def files() -> list[Path]:
     """The robots that are mutated."""
     paths = (entry.path for entry in catalogue().values())
     return [path for path in paths if path.stat().st_size <= LARGEST]
 
 
+def case(seed: int, family: str, number: int) -> Case:
+    """One document of a family."""
+    return mutant(seed, number, files()) if family == MUTANTS else robots.robot(seed, family, number)
+
+
 class Worker:
-    """A process that judges one mutant after another; it may die."""
+    """A process that judges one document after another; it may die."""
 
     def __init__(self, command: list[str], timeout: float) -> None:
         self.command, self.timeout = command, timeout
@@ -46,14 +62,14 @@ class Worker:
         self.listener: threading.Thread | None = None
         self.lines: queue.Queue[str | None] = queue.Queue()
 
-    def judge(self, number: int) -> tuple[str, str]:
+    def judge(self, family: str, number: int) -> tuple[str, str]:
         """The outcome's word and details; a death and a hang are outcomes, too."""
         if self.process is None:
             self.start()
         assert self.process is not None
         assert self.process.stdin is not None
         with contextlib.suppress(BrokenPipeError):  # dead already: the next line says so
-            self.process.stdin.write(f"{number}\n")
+            self.process.stdin.write(f"{family} {number}\n")
             self.process.stdin.flush()
         try:
             line = self.lines.get(timeout=self.timeout)
@@ -101,45 +117,45 @@ class Worker:
 
 
 def work(seed: int) -> None:
-    """The worker's side: a number in, an outcome out."""
+    """The worker's side: a family and a number in, an outcome out."""
     from scripts.fuzzing.judge import judge  # noqa: PLC0415  only the worker needs the compiler
 
-    robots = files()
     answers = sys.stdout
     sys.stdout = sys.stderr
-    judge(robots[0].read_bytes())
+    judge(Case("as it is", files()[0].read_bytes()))
     print(READY, file=answers, flush=True)
     for line in sys.stdin:
-        outcome = judge(mutant(seed, int(line), robots)[1])
+        family, number = line.split()
+        outcome = judge(case(seed, family, int(number)))
         print(json.dumps([outcome.word, outcome.details]), file=answers, flush=True)
 
 
 def fuzz(
-    numbers: Iterable[int], seed: int, jobs: int, timeout: float, keep: Path
+    asked: Iterable[tuple[str, int]], seed: int, jobs: int, timeout: float, keep: Path
 ) -> collections.Counter[str]:
-    """Judge mutants by number; keep what went wrong; count the outcomes."""
-    waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
-    for number in numbers:
-        waiting.put(number)
+    """Judge documents by family and number; keep what went wrong; count the outcomes."""
+    waiting: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
+    for each in asked:
+        waiting.put(each)
     counts: collections.Counter[str] = collections.Counter()
-    robots = files()
 
     def run() -> None:
         worker = Worker([sys.executable, __file__, "--worker", "--seed", str(seed)], timeout)
         while True:
             try:
-                number = waiting.get_nowait()
+                family, number = waiting.get_nowait()
             except queue.Empty:
                 worker.stop()
                 return
-            word, details = worker.judge(number)
+            word, details = worker.judge(family, number)
             counts[word] += 1
             if word not in GOOD:
-                what, data = mutant(seed, number, robots)
+                made = case(seed, family, number)
                 keep.mkdir(parents=True, exist_ok=True)
-                (keep / f"{seed}-{number}.urdf").write_bytes(data)
-                (keep / f"{seed}-{number}.txt").write_text(f"{what}\n{word}\n{details}\n", "utf-8")
-                print(f"mutant {number} ({what}): {word}", flush=True)
+                name = f"{family}-{seed}-{number}"
+                (keep / f"{name}.urdf").write_bytes(made.data)
+                (keep / f"{name}.txt").write_text(f"{made.words}\n{word}\n{details}\n", "utf-8")
+                print(f"{family} {number} ({made.what}): {word}", flush=True)
 
     threads = [threading.Thread(target=run) for _ in range(jobs)]
     for thread in threads:
@@ -149,16 +165,27 @@ def fuzz(
     return counts
 
 
+def shares(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str, int]]:
+    """Family and number of so many mutants, and of so many whole robots in all, from each family in turn."""
+    chosen = [family for family in families if family != MUTANTS]
+    asked = [(MUTANTS, number) for number in range(mutants) if MUTANTS in families]
+    return asked + [(chosen[i % len(chosen)], i // len(chosen)) for i in range(whole) if chosen]
+
+
 def main() -> int:
     """The command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--mutants", type=int, default=2000)
+    parser.add_argument("--mutants", type=int, default=2000, help="how many mutants")
+    parser.add_argument("--robots", type=int, default=2000, help="how many whole robots, of all families")
+    parser.add_argument(
+        "--family", action="append", choices=FAMILIES, help="only this one; may be repeated; all if left out"
+    )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--timeout", type=float, default=30.0, help="seconds for one mutant")
-    parser.add_argument("--only", type=int, help="judge this mutant alone")
+    parser.add_argument("--timeout", type=float, default=30.0, help="seconds for one robot")
+    parser.add_argument("--only", type=int, help="judge this number of the family alone")
     parser.add_argument(
         "--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for what goes wrong"
     )
@@ -167,11 +194,16 @@ def main() -> int:
     if options.worker:
         work(options.seed)
         return 0
-    numbers = range(options.mutants) if options.only is None else [options.only]
+    families = options.family or FAMILIES
+    asked = shares(families, options.mutants, options.robots)
+    if options.only is not None:
+        if len(families) != 1:
+            parser.error("--only needs one --family")
+        asked = [(families[0], options.only)]
     start = time.perf_counter()
-    counts = fuzz(numbers, options.seed, options.jobs, options.timeout, options.keep)
+    counts = fuzz(asked, options.seed, options.jobs, options.timeout, options.keep)
     seconds, total = time.perf_counter() - start, sum(counts.values())
-    print(f"{total} mutants of {len(files())} robots, seed {options.seed}, {seconds:.0f} s")
+    print(f"{total} robots of {len(families)} families, seed {options.seed}, {seconds:.0f} s")
     for word, count in counts.most_common():
         print(f"{count:8d}  {word}")
     bad = total - sum(counts[word] for word in GOOD)

@@ -1,38 +1,83 @@
 """The fuzzer makes the same mutants each time, survives its workers, and would notice what it looks for."""
 
+import re
 import sys
+from collections import Counter
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
+import numpy as np
 import pytest
 
 import urdfkin
 from scripts import fuzz
-from scripts.fuzzing import GOOD
-from scripts.fuzzing.judge import judge
+from scripts.fuzzing import GOOD, Case, robots
+from scripts.fuzzing.judge import Outcome
+from scripts.fuzzing.judge import judge as judge_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
 from tests.diagnostics.cases.arm import arm, fixed
+from urdfkin.errors import OracleError
+from urdfkin.oracle import Oracle
+from urdfkin.prepared import PreparedFrame
+from urdfkin.rotation.arrays import FloatArray
 
 pytestmark = pytest.mark.slow
 
 
+def judge(text: str) -> Outcome:
+    return judge_case(Case("by hand", text.encode()))
+
+
 def test_a_mutant_depends_on_seed_and_number_alone() -> None:
-    robots = fuzz.files()
-    mutants = [mutant(0, number, robots) for number in range(50)]
-    assert mutants == [mutant(0, number, robots) for number in range(50)]
-    assert len({data for _, data in mutants}) > 45
-    assert mutants != [mutant(1, number, robots) for number in range(50)]
+    files = fuzz.files()
+    mutants = [mutant(0, number, files) for number in range(50)]
+    assert mutants == [mutant(0, number, files) for number in range(50)]
+    assert len({each.data for each in mutants}) > 45
+    assert mutants != [mutant(1, number, files) for number in range(50)]
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("family", robots.FAMILIES)
+def test_a_robot_depends_on_seed_family_and_number_alone(family: str) -> None:
+    made = [robots.robot(0, family, number) for number in range(20)]
+    assert made == [fuzz.case(0, family, number) for number in range(20)]
+    assert len({each.data for each in made}) > 17
+    assert made != [robots.robot(1, family, number) for number in range(20)]
+
+
+def test_robots_are_of_every_oddity() -> None:
+    made = {family: [robots.robot(3, family, number) for number in range(200)] for family in robots.FAMILIES}
+    texts = {family: "".join(each.data.decode() for each in cases) for family, cases in made.items()}
+    for name in (*robots.LIKE_OURS, *robots.STRANGE):
+        assert f"name={quoteattr(name)}" in texts["names"], name
+    for prefix in robots.PREFIXES:
+        assert f"<{prefix}:" in texts["prefixes"], prefix
+    assert "xmlns:drake=" in texts["prefixes"]
+    for version in ("1.0", "1.1", "1.2"):
+        assert f'version="{version}"' in texts["versions"]
+    assert "quat_xyzw=" in texts["versions"]
+    assert texts["followers"].count("<mimic ") > 200
+    assert {each.root_joint for each in made["roots"]} == {None, "floating", "planar"}
+    for kind in robots.KINDS:
+        assert all(f'type="{kind}"' in text for text in texts.values()), kind
+    lengths = [abs(float(x)) for xyz in re.findall(r'xyz="([^"]*)"', texts["lengths"]) for x in xyz.split()]
+    assert max(lengths) > 1e280
+    assert min(x for x in lengths if x) < 1e-310
+
+
+def test_families_share_what_is_asked_for() -> None:
+    assert fuzz.shares(["mutants"], 3, 5) == [("mutants", 0), ("mutants", 1), ("mutants", 2)]
+    assert fuzz.shares(["names", "roots"], 3, 3) == [("names", 0), ("roots", 0), ("names", 1)]
+
+
 @pytest.mark.slow
 def test_every_mutator_is_used_and_nearly_all_change_something() -> None:
-    robots = fuzz.files()
-    originals = {path.stem: path.read_bytes() for path in robots}
+    files = fuzz.files()
+    originals = {path.stem: path.read_bytes() for path in files}
     used, changed = set(), 0
     for number in range(1000):
-        what, data = mutant(5, number, robots)
-        used |= set(what.split()[1:])
-        changed += data != originals[what.split()[0]]
+        made = mutant(5, number, files)
+        used |= set(made.what.split()[1:])
+        changed += made.data != originals[made.what.split()[0]]
     assert used == {mutate.__name__.strip("_") for family in FAMILIES for mutate in family}
     assert changed > 950
 
@@ -54,23 +99,45 @@ def test_every_mutator_is_used_and_nearly_all_change_something() -> None:
     ],
 )
 def test_the_judge_tells_what_happened(text: str, word: str) -> None:
-    outcome = judge(text.encode())
+    outcome = judge(text)
     assert outcome.word == word, outcome
     assert word in GOOD
 
 
 def test_a_check_that_is_blind_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(urdfkin, "check", lambda data: [], raising=False)
-    assert judge(arm(axis='<axis xyz="0 0 0"/>').encode()).word == "load refuses what check does not"
-    assert judge(arm(origin='<origin xyz="0\t0 1"/>').encode()).word not in GOOD
+    monkeypatch.setattr(urdfkin, "check", lambda data, **options: [], raising=False)
+    assert judge(arm(axis='<axis xyz="0 0 0"/>')).word == "load refuses what check does not"
+    assert judge(arm(origin='<origin xyz="0\t0 1"/>')).word not in GOOD
 
 
 def test_a_traceback_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(data: bytes) -> None:
+    def fails(data: bytes, **options: object) -> None:
         raise KeyError(data)
 
     monkeypatch.setattr(urdfkin, "check", fails, raising=False)
-    assert judge(arm().encode()).word == "traceback: KeyError"
+    assert judge(arm()).word == "traceback: KeyError"
+
+
+def test_what_pinocchio_refuses_though_check_found_nothing_is_a_finding_of_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuses(*arguments: object, **options: object) -> None:
+        raise OracleError("Pinocchio does not accept this robot", where="r", found="no reason")
+
+    monkeypatch.setattr(Oracle, "_parse", refuses)
+    outcome = judge(arm())
+    assert outcome.word == "Pinocchio refuses what passed check"
+    assert "no reason" in outcome.details
+
+
+def test_numbers_that_differ_between_two_ways_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = PreparedFrame.velocity
+
+    def nudged(*arguments: object) -> FloatArray:
+        return np.nextafter(right(*arguments), 1.0)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(PreparedFrame, "velocity", nudged)
+    assert judge(arm()).word == "the same number twice, and it is not the same"
 
 
 WORKER = "import os, sys, time; print('ready', flush=True); sys.stdin.readline(); {}"
@@ -83,13 +150,21 @@ WORKER = "import os, sys, time; print('ready', flush=True); sys.stdin.readline()
 def test_a_worker_that_dies_or_hangs_is_an_outcome_and_is_replaced(then: str, word: str) -> None:
     worker = fuzz.Worker([sys.executable, "-c", WORKER.format(then)], timeout=1.0)
     for _ in range(2):
-        assert worker.judge(0)[0] == word
+        assert worker.judge("names", 0)[0] == word
     worker.stop()
 
 
 @pytest.mark.slow
-def test_a_short_run_finds_nothing(tmp_path: Path) -> None:
-    counts = fuzz.fuzz(range(400), seed=20, jobs=1, timeout=60.0, keep=tmp_path)
+def test_a_short_run_of_mutants_finds_nothing(tmp_path: Path) -> None:
+    counts = fuzz.fuzz(fuzz.shares(["mutants"], 60, 0), seed=20, jobs=1, timeout=60.0, keep=tmp_path)
     assert set(counts) <= set(GOOD), sorted(tmp_path.iterdir())
-    assert sum(counts.values()) == 400
-    assert counts["verified"] > 100
+    assert sum(counts.values()) == 60
+    assert counts["verified"] > 15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", robots.FAMILIES)
+def test_a_short_run_of_whole_robots_finds_nothing(family: str) -> None:
+    words = Counter(judge_case(robots.robot(20, family, number)).word for number in range(8))
+    assert set(words) <= set(GOOD), words
+    assert words["verified"] > 2

@@ -1,9 +1,27 @@
-"""Parts of scripts/fuzz.py: how mutants are made, and what is asked of each."""
+"""Parts of scripts/fuzz.py: how robots are made, and what is asked of each."""
 
-#: What may happen to a mutant.
+from dataclasses import dataclass
+
+#: What may happen to a robot.
 GOOD = (
     "refused",
     "verified",
     "not verified, with a finding that says why",
     "too large to compute, with a finding",
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A document, how it is to be loaded, and in words how it was made."""
+
+    what: str
+    data: bytes
+    root_joint: str | None = None
+    mimic: bool | None = None
+
+    @property
+    def words(self) -> str:
+        """One line for the note beside a file that is kept."""
+        options = f"root_joint={self.root_joint!r}, mimic={self.mimic!r}"
+        return f"{self.what}; load(..., {options})"

@@ -1,4 +1,4 @@
-"""What is asked of one mutant: check it, load it, compute it, and have Pinocchio compute it."""
+"""What is asked of one robot: check it, load it, compute it, and have Pinocchio compute it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import urdfkin
+from scripts.fuzzing import Case
+from scripts.fuzzing.asking import MismatchError, ask, ask_prepared
 from urdfkin.diagnostics import Finding, Severity, UrdfError
 from urdfkin.errors import RangeError, UrdfkinError
 from urdfkin.robot import Robot
@@ -25,61 +27,58 @@ class Outcome:
     details: str = ""
 
 
-def judge(data: bytes) -> Outcome:
+def judge(case: Case) -> Outcome:
     """What happens to a document on its way to numbers."""
     try:
-        return _judge(data)
+        return _judge(case)
     except UrdfkinError as error:
-        return Outcome(f"raises {type(error).__name__}", str(error))
+        return Outcome(f"raises {type(error).__name__}", traceback.format_exc())
     except Exception as error:
         return Outcome(f"traceback: {type(error).__name__}", traceback.format_exc())
 
 
-def _judge(data: bytes) -> Outcome:
-    findings = urdfkin.check(data)
+def _judge(case: Case) -> Outcome:
+    findings = urdfkin.check(case.data, root_joint=case.root_joint, mimic=case.mimic)
     errors = [finding for finding in findings if finding.severity is Severity.ERROR]
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         try:
-            robot = urdfkin.load(data)
+            robot = urdfkin.load(case.data, root_joint=case.root_joint, mimic=case.mimic)
         except UrdfError as error:
             if errors:
                 return Outcome("refused", errors[0].code)
             return Outcome("load refuses what check does not", str(error))
         if errors:
             return Outcome("load takes what check refuses", str(errors[0]))
-        return _computed(robot, findings, warned)
+        return _asked(robot, findings) or _unverified(robot, findings, warned)
 
 
-def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
-    frames = [f"link:{robot.tree.links[-1]}", f"link:{robot.tree.links[len(robot.tree.links) // 2]}"]
-    generator = np.random.default_rng(0)
-    q = robot.sample(2, seed=0)
-    v, a = generator.normal(size=(2, 2, robot.nv))
+def _asked(robot: Robot, findings: list[Finding]) -> Outcome | None:
+    """What happens when everything is asked; None where results are handed out that are not verified."""
     big = bool(_SIZES & {finding.code for finding in findings})
+    too_large = "too large to compute, with a finding" if big else "a result that is no number"
     try:
-        results = [
-            result
-            for frame in frames
-            for result in (
-                robot.placement(q, frame),
-                robot.velocity(q, v, frame),
-                robot.jacobian(q, frame),
-                robot.acceleration(q, v, a, frame),
-            )
-        ]
+        for what, result in ask(robot, seed=0):
+            if not np.isfinite(result).all():
+                return Outcome(too_large, what)
+        verified = robot.certificate().verified
+        ask_prepared(robot, seed=0)
     except urdfkin.VerificationError as error:
-        word = "too large to compute, with a finding" if big else "disagrees with Pinocchio"
-        return Outcome(word, str(error))
+        return Outcome("disagrees with Pinocchio", str(error))
+    except urdfkin.TableError as error:
+        return Outcome("a table disagrees with Pinocchio", str(error))
     except RangeError as error:
-        word = "too large to compute, with a finding" if big else "a result that is no number"
-        return Outcome(word, str(error))
-    certified = robot.certificate()
-    if not all(np.isfinite(result).all() for result in results):
-        return Outcome("too large to compute, with a finding" if big else "a result that is no number")
-    if certified.verified:
-        return Outcome("verified")
+        return Outcome(too_large, str(error))
+    except MismatchError as error:
+        return Outcome("the same number twice, and it is not the same", str(error))
+    return Outcome("verified") if verified else None
+
+
+def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
+    """Whether somebody said why."""
     marked = [finding for finding in findings if finding.oracle is not None]
     if marked:
         return Outcome("not verified, with a finding that says why", marked[0].code)
-    return Outcome("not verified, and no finding says why", "; ".join(str(w.message) for w in warned))
+    if (reason := robot.cannot_verify()) is not None:
+        return Outcome("Pinocchio refuses what passed check", reason)
+    return Outcome("not verified, and nothing says why", "; ".join(str(w.message) for w in warned))

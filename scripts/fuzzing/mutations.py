@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from scripts.fuzzing import Case
+
 #: The largest file that is mutated: larger ones take longer and add nothing.
 LARGEST = 150_000
 
@@ -117,7 +119,7 @@ TAGS = (
 Mutator = Callable[[random.Random, bytes], bytes]
 
 
-def mutant(seed: int, number: int, files: Sequence[Path]) -> tuple[str, bytes]:
+def mutant(seed: int, number: int, files: Sequence[Path]) -> Case:
     """What was done to which file, and the bytes it became."""
     rng = random.Random(f"{seed}:{number}")
     path = rng.choice(list(files))
@@ -128,7 +130,7 @@ def mutant(seed: int, number: int, files: Sequence[Path]) -> tuple[str, bytes]:
         mutate = rng.choice(family)
         data = mutate(rng, data)
         done.append(mutate.__name__.strip("_"))
-    return " ".join(done), data
+    return Case(" ".join(done), data)
 
 
 # -- bytes -------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from urdfkin.chain import chain
 from urdfkin.dh.derive import choices_of, derive
+from urdfkin.dh.lengths import demand_squares
 from urdfkin.dh.snapping import checked_tolerance, row_of_constant, snap_chain, snap_thetas, statement
 from urdfkin.dh.table import DHTable
 from urdfkin.tree import KinematicTree
@@ -44,8 +45,12 @@ def dh_table(
     Raises:
         UnknownNameError: a frame or a joint that does not exist.
         InputError: an option's value, or a planar or floating joint on the way.
+        RangeError: lengths whose squares leave the range of doubles.
     """
     exact = chain(tree, tip, base)
+    # The whole way counts, whatever part of it the table is of: Pinocchio measures from the root.
+    ends = [tip] if base is None else [base, tip]
+    demand_squares(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
     choices = choices_of(
         exact,
         convention=convention,

@@ -24,6 +24,7 @@ import numpy as np
 from urdfkin.chain import motion_about_z
 from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
 from urdfkin.dh.elements import EPS, along_axis, between_axes
+from urdfkin.dh.lengths import demand_squares
 from urdfkin.dh.noise import Noise, noise_of, tilt_of
 from urdfkin.dh.normals import NearParallel, Step, cleaned_angle, cleaned_length, step_between
 from urdfkin.errors import InputError
@@ -171,7 +172,9 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
 
     Raises:
         InputError: a planar or floating joint, which has no single axis.
+        RangeError: lengths whose squares leave the range of doubles.
     """
+    demand_squares(tree.joints)
     for joint in tree.joints:
         if joint.kind not in _SIGMA:
             raise InputError(

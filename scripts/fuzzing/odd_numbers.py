@@ -1,0 +1,128 @@
+"""Numbers as a hostile URDF holds them, drawn so that most of them are still allowed."""
+
+from __future__ import annotations
+
+import math
+import random
+
+_TURNS = (0.0, math.pi, -math.pi, math.pi / 2, 1.5708, 3.14159, 1e-9)
+
+
+def written(rng: random.Random, x: float) -> str:
+    """A number in one of the ways that read back as it, or nearly."""
+    plain = repr(x)
+    if rng.random() < 0.85:
+        return plain
+    return rng.choice((f"+{plain}" if x >= 0.0 else plain, f"{x:.17g}", f"{x:.40e}", f"{x:.3g}", f"{x:E}"))
+
+
+def vector(rng: random.Random, numbers: list[float]) -> str:
+    """Several numbers, one blank between them."""
+    return " ".join(written(rng, x) for x in numbers)
+
+
+def tame_length(rng: random.Random) -> float:
+    """Some decimetres, often nothing."""
+    return rng.choice((0.0, 0.0, round(rng.uniform(-1.0, 1.0), 3), rng.uniform(-1.0, 1.0)))
+
+
+def odd_length(rng: random.Random) -> float:
+    """From 1e-320 to 1e300, mostly where sums of several do not overflow."""
+    exponent = rng.choice(
+        (rng.uniform(-320, 300), rng.uniform(-20, 20), rng.uniform(-6, 8), rng.uniform(-320, -150), -310.0)
+    )
+    return rng.choice((-1.0, 1.0)) * rng.uniform(1.0, 9.9) * 10.0**exponent
+
+
+def tame_angle(rng: random.Random) -> float:
+    """Within a turn, often a multiple of a quarter."""
+    return rng.choice((*_TURNS[:4], rng.uniform(-math.pi, math.pi)))
+
+
+def odd_angle(rng: random.Random) -> float:
+    """Up to 1e15, tiny, or nearly a multiple of a quarter turn."""
+    near = rng.choice(_TURNS) + rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-18, -3)
+    large = rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(0, 15)
+    return rng.choice((near, large, 10.0 ** rng.uniform(-320, 0), rng.uniform(-9.0, 9.0), 90.0, 180.0))
+
+
+def direction(rng: random.Random) -> list[float]:
+    """A unit vector, half of the time a coordinate axis."""
+    if rng.random() < 0.5:
+        axis = [0.0, 0.0, 0.0]
+        axis[rng.randrange(3)] = rng.choice((1.0, -1.0))
+        return axis
+    numbers = [rng.gauss(0.0, 1.0) for _ in range(3)]
+    return [x / math.hypot(*numbers) for x in numbers]
+
+
+def odd_axis(rng: random.Random) -> list[float]:
+    """An axis of odd length, or one nearly along a coordinate axis."""
+    axis = direction(rng)
+    if rng.random() < 0.5:
+        tilt = 10.0 ** rng.uniform(-20, -3)
+        axis = [x + tilt * rng.gauss(0.0, 1.0) for x in axis]
+    return [x * odd_size(rng) for x in axis] if rng.random() < 0.05 else _scaled(axis, odd_size(rng))
+
+
+def odd_quaternion(rng: random.Random) -> list[float]:
+    """Of any length, zero included; turned by nothing, by next to nothing, by anything."""
+    numbers = rng.choice(
+        (
+            [0.0, 0.0, 0.0, 1.0],
+            [rng.gauss(0.0, 1.0) for _ in range(4)],
+            [10.0 ** rng.uniform(-20, -3), 0.0, 0.0, -1.0],
+            [0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5)],
+            [rng.choice((0.0, 1.0, -1.0, 1e-310)) for _ in range(4)],
+        )
+    )
+    return _scaled(numbers, odd_size(rng))
+
+
+def odd_size(rng: random.Random) -> float:
+    """What a direction is multiplied by: mostly next to one, sometimes hardly a double."""
+    exponent = rng.choice((0.0, 0.0, rng.uniform(-1e-9, 1e-9), rng.uniform(-6, 6), rng.uniform(-170, 170)))
+    return 10.0 ** (rng.uniform(-320, 300) if rng.random() < 0.05 else exponent)
+
+
+def odd_factor(rng: random.Random) -> float:
+    """A multiplier of a follower."""
+    return rng.choice(
+        (
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            3.7,
+            -0.1,
+            1e-300,
+            5e-324,
+            rng.gauss(0.0, 1.0),
+            -(10.0 ** rng.uniform(-12, 12)),
+        )
+    )
+
+
+def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
+    """Limits of a joint: of a point, of one ulp, far away, without end; seldom upside down."""
+    a = odd_angle(rng) if turns else odd_length(rng)
+    b = odd_angle(rng) if turns else odd_length(rng)
+    if rng.random() < 0.02:
+        return max(a, b), min(a, b)
+    far = rng.uniform(-1e6, 1e6)
+    return rng.choice(
+        (
+            (min(a, b), max(a, b)),
+            (a, a),
+            (a, math.nextafter(a, math.inf)),
+            (far, far + 1.0),
+            (-1e300, 1e300),
+            (0.0, 0.0),
+            (-0.0, 5e-324),
+            (-math.pi, math.pi),
+        )
+    )
+
+
+def _scaled(numbers: list[float], factor: float) -> list[float]:
+    return [x * factor for x in numbers]
