@@ -14,6 +14,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import urdfkin
+from scripts.fuzzing.robots import LIKE_OURS
 from urdfkin import BaseMotion
 from urdfkin.errors import InputError, OracleError, UnknownNameError
 from urdfkin.frame_names import JointFrame, LinkFrame
@@ -22,10 +23,7 @@ from urdfkin.robot import Robot
 from urdfkin.tree import KinematicTree
 
 #: What links and joints are called here.
-POOL = (
-    "a", "link:a", "joint:a", "link:link:a", "link:joint:a", "universe", "root_joint", "base", "link:", "1",
-    "joint 1", "moving base (urdfkin)",
-)  # fmt: skip
+POOL = LIKE_OURS
 ASKED = (*POOL, *(f"{prefix}:{name}" for prefix in ("link", "joint") for name in POOL))
 
 #: Where the base of these tests is.
