@@ -11,6 +11,7 @@ import numpy as np
 import urdfkin
 from scripts.fuzzing import Case
 from scripts.fuzzing.asking import MismatchError, ask, ask_prepared
+from urdfkin.call import NotVerifiedWarning
 from urdfkin.diagnostics import Finding, Severity, UrdfError
 from urdfkin.errors import RangeError, UrdfkinError
 from urdfkin.robot import Robot
@@ -50,10 +51,10 @@ def _judge(case: Case) -> Outcome:
             return Outcome("load refuses what check does not", str(error))
         if errors:
             return Outcome("load takes what check refuses", str(errors[0]))
-        return _asked(robot, findings) or _unverified(robot, findings, warned)
+        return _asked(robot, findings, warned) or _unverified(robot, findings, warned)
 
 
-def _asked(robot: Robot, findings: list[Finding]) -> Outcome | None:
+def _asked(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome | None:
     """What happens when everything is asked; None where results are handed out that are not verified."""
     big = bool(_SIZES & {finding.code for finding in findings})
     too_large = "too large to compute, with a finding" if big else "a result that is no number"
@@ -61,7 +62,9 @@ def _asked(robot: Robot, findings: list[Finding]) -> Outcome | None:
         for what, result in ask(robot, seed=0):
             if not np.isfinite(result).all():
                 return Outcome(too_large, what)
-        verified = robot.certificate().verified
+        # Of tables there is no ledger: what is not verified of them is warned of.
+        doubted = any(issubclass(w.category, NotVerifiedWarning) for w in warned)
+        verified = robot.certificate().verified and not doubted
         ask_prepared(robot, seed=0)
     except urdfkin.VerificationError as error:
         return Outcome("disagrees with Pinocchio", str(error))

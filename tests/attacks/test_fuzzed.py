@@ -6,6 +6,7 @@ import pytest
 
 import urdfkin
 from urdfkin.errors import RangeError
+from urdfkin.judge import judge
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 
@@ -44,3 +45,28 @@ def test_tables_of_lengths_up_to_there_are_verified() -> None:
         robot.dh("c", "a", convention)
         robot.dh("c", "b", convention)
     robot.tree_parameters()
+
+
+TINY = """<robot name="r"><link name="a"/><link name="b"/>
+<joint name="x" type="continuous"><parent link="a"/><child link="b"/><origin xyz="1e-195 1e-196 1e-195"
+ rpy="1 0.2 0.3"/><axis xyz="0 0.6 0.8"/></joint></robot>"""
+
+
+@pytest.mark.filterwarnings("error::urdfkin.call.NotVerifiedWarning")
+def test_a_table_of_lengths_whose_squares_vanish_does_not_lose_to_rounding() -> None:
+    robot = urdfkin.load(TINY)
+    for convention in ("standard", "modified"):
+        robot.dh("b", "a", convention)
+    assert urdfkin.validate([TINY.encode()], samples=2).passed
+
+
+FAINT = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+<joint name="x" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
+<joint name="y" type="continuous"><parent link="a"/><child link="c"/><axis xyz="0 1 0"/>
+<mimic joint="x" multiplier="5e-324"/></joint></robot>"""
+
+
+def test_the_judge_counts_in_units_that_do_not_vanish() -> None:
+    for line in judge(urdfkin.load(FAINT), samples=2).lines:
+        assert line.urdfkin.worst < 100.0, line
+        assert line.pinocchio.worst < 100.0, line

@@ -12,6 +12,7 @@ d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -96,7 +97,7 @@ class DHTable:
     def span(self) -> float:
         """Metres: the sum of all |a| and |d| and of the tool's length, without any motion."""
         lengths = sum(abs(row.a) + abs(row.d) for row in self.rows)
-        return lengths + float(np.linalg.norm(self.tool[:3, 3]))
+        return lengths + math.hypot(*self.tool[:3, 3])
 
     def rounding(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
         """(...,) metres: what rounding may do to `placement(q)`; divided by `span`, radians.

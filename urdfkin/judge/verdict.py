@@ -21,7 +21,7 @@ from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
 from urdfkin.verification import bounds
-from urdfkin.verification.bounds import EPS, Quantity
+from urdfkin.verification.bounds import EPS, LEAST_UNIT, Quantity
 from urdfkin.verification.magnitudes import magnitudes
 from urdfkin.verification.sampling import Samples, draw
 
@@ -176,7 +176,7 @@ class _Work:
     ) -> Line:
         high, low = self._truth(quantity, reference, ours.shape)
         counted = np.broadcast_to(scale, ours.shape) > 0.0
-        units = EPS * np.broadcast_to(scale, ours.shape)[counted]
+        units = np.maximum(EPS * np.broadcast_to(scale, ours.shape)[counted], LEAST_UNIT)
         # The difference of doubles that are near each other is exact; the rest of the digits follows.
         mine, other = (np.abs((side - high) - low)[counted] / units for side in (ours, theirs))
         name = "" if reference is None else reference.name.lower()

@@ -116,7 +116,7 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
     motion = relative_motion(oracle, tree, table, samples)
     T = table.placement(own_q)
     apart = _Apart(
-        np.linalg.norm(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
+        np.hypot.reduce(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
         rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3]),
         np.abs(table.jacobian(own_q) - motion.jacobian[..., columns]),
         _split(np.abs(table.acceleration(own_q, own_v, own_a) - motion.acceleration)),
@@ -135,7 +135,7 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
 
 def own_length(table: DHTable) -> float:
     """Metres: all lengths of a table, base and tool included."""
-    return table.span + float(np.linalg.norm(table.base[:3, 3]))
+    return table.span + math.hypot(*table.base[:3, 3])
 
 
 def _loss(table: DHTable) -> str:
@@ -266,7 +266,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
             joint = tree.joints[i]
             joints += 1
             tilt += joint.tilt
-            reach += float(np.linalg.norm(joint.T_parent_joint[:3, 3]))
+            reach += math.hypot(*joint.T_parent_joint[:3, 3])  # squares of tiny lengths vanish
             factor, offset, leader = 1.0, 0.0, joint.name
             if (rule := joint.mimic) is not None:
                 factor, offset, leader = abs(rule.multiplier), abs(rule.offset), rule.leader
