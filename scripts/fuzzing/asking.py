@@ -96,15 +96,19 @@ def _together(
     a: FloatArray,
 ) -> Iterator[tuple[str, FloatArray]]:
     """Each quantity of all frames in a batch, of one frame in that batch, and of one configuration."""
-    how = {"base": base}
     kept = dict[str, FloatArray]()
     if reference is Reference.LOCAL_WORLD_ALIGNED:
         kept["placement"] = robot.placements(q, frames, base=base)
-    kept["velocity"] = robot.velocities(q, v, frames, reference, **how)
-    kept["jacobian"] = robot.jacobians(q, frames, reference, **how)
-    kept["acceleration"] = robot.accelerations(q, v, a, frames, reference, **how)
+    kept["velocity"] = robot.velocities(q, v, frames, reference, base=base)
+    kept["jacobian"] = robot.jacobians(q, frames, reference, base=base)
+    kept["acceleration"] = robot.accelerations(q, v, a, frames, reference, base=base)
     yield from kept.items()
-    inputs = {"placement": (q,), "velocity": (q, v), "jacobian": (q,), "acceleration": (q, v, a)}
+    inputs: dict[str, tuple[FloatArray, ...]] = {
+        "placement": (q,),
+        "velocity": (q, v),
+        "jacobian": (q,),
+        "acceleration": (q, v, a),
+    }
     for frame in alone:
         for name, every in kept.items():
             compute: Callable[..., FloatArray] = getattr(robot, name)

@@ -31,7 +31,7 @@ def odd_length(rng: random.Random) -> float:
     exponent = rng.choice(
         (rng.uniform(-320, 300), rng.uniform(-20, 20), rng.uniform(-6, 8), rng.uniform(-320, -150), -310.0)
     )
-    return rng.choice((-1.0, 1.0)) * rng.uniform(1.0, 9.9) * 10.0**exponent
+    return rng.choice((-1.0, 1.0)) * rng.uniform(1.0, 9.9) * math.pow(10.0, exponent)
 
 
 def tame_angle(rng: random.Random) -> float:
@@ -82,7 +82,7 @@ def odd_quaternion(rng: random.Random) -> list[float]:
 def odd_size(rng: random.Random) -> float:
     """What a direction is multiplied by: mostly next to one, sometimes hardly a double."""
     exponent = rng.choice((0.0, 0.0, rng.uniform(-1e-9, 1e-9), rng.uniform(-6, 6), rng.uniform(-170, 170)))
-    return 10.0 ** (rng.uniform(-320, 300) if rng.random() < 0.05 else exponent)
+    return math.pow(10.0, rng.uniform(-320, 300) if rng.random() < 0.05 else exponent)
 
 
 def odd_factor(rng: random.Random) -> float:
