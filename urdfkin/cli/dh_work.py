@@ -10,7 +10,7 @@ from typing import Any
 import click
 import numpy as np
 
-from urdfkin.cli.door import say
+from urdfkin.cli.door import say, say_file
 from urdfkin.cli.output import write_file
 from urdfkin.dh import DHTable, Units, export, read_table, units_of
 from urdfkin.dh.compare import CellDifference, Comparison, compare, comparison_text
@@ -250,7 +250,9 @@ def _difference(one: CellDifference) -> dict[str, Any]:
 
 
 def _put(work: Work, text: str) -> None:
-    if work.output is None:
+    if work.output is not None:
+        write_file(work.output, text.encode())
+    elif work.format_ in _READ:
         click.echo(text, nl=False)
     else:
-        write_file(work.output, text.encode())
+        say_file(text)

@@ -52,6 +52,12 @@ class Door:
         """What is meant as commands for a CI service."""
         self._hand_on(_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
 
+    def write_file(self, text: str) -> None:
+        """A file's text: the same bytes whatever letters the stream knows."""
+        self.stream.flush()
+        self.stream.buffer.write(self._tamed(_plain(text)).encode())
+        self.stream.buffer.flush()
+
     def _hand_on(self, text: str) -> None:
         encoding = self.stream.encoding or "utf-8"
         if not text.isascii():
@@ -107,6 +113,11 @@ def say_styled(*words: tuple[str, dict[str, Any]]) -> None:
         click.style(printable(text), **style) if door.styled else printable(text) for text, style in words
     )
     door.write("".join(texts) + "\n")
+
+
+def say_file(text: str) -> None:
+    """What would be a file, were one named."""
+    Door(sys.stdout).write_file(text)
 
 
 def command_lines(text: str) -> None:
