@@ -97,7 +97,7 @@ def test_a_reader_that_leaves_ends_a_command_quietly_and_as_no_disagreement(word
 # -- what the terminal is like -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("columns", ["", "abc", "0", "-5", "1_0", "1e3", "9" * 20, "7", "1"])
+@pytest.mark.parametrize("columns", ["", "abc", "0", "-5", "1_0", "1e3", "9999", "7", "1"])
 def test_any_columns_give_a_table(columns: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", columns)
     done = running.urdfkin("info", "ur5")

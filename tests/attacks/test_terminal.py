@@ -81,6 +81,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
         "model": None,
     }
     report["robots"] += [refused | {"joints": [], "frames": [], "chains": [], "results": 0}]
+    report |= {"asked": 2, "passed": False, "reason": "1 of 2 robots bad input"}
     report["command"], report["started"] = NAMES["colours"], NAMES["erased"]
     Path(made["REPORT"]).write_text(json.dumps(report))
     return made | {"FRAME": NAMES["line"]}
@@ -172,7 +173,10 @@ def test_machine_formats_say_the_names_as_they_are(files: dict[str, str]) -> Non
 
 
 def test_a_crash_says_its_last_words_through_the_door() -> None:
-    code = f"import urdfkin.cli as c\ndef crash(**_): raise ValueError({FILE!r})\nc.cli = crash\nc.main()"
+    code = (
+        "import urdfkin.cli as c\nclass Crash:\n  @staticmethod\n"
+        f"  def main(**_): raise ValueError({FILE!r})\nc.cli = Crash\nc.main()"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert "ValueError" in done.stderr
     assert acts(done.stderr) == []
@@ -246,7 +250,8 @@ def test_what_is_printed_goes_through_the_door() -> None:
         "check.py": ("click.echo(as_json(", "click.echo(as_sarif(", "click.echo(summary(", "click.echo(f\"'"),
         "report.py": ("click.echo(asset(",), "compare.py": ("click.echo(json.dumps(",),
         "dh_work.py": ("click.echo(text, nl=False)",),
-        "__init__.py": ('click.echo(f"urdfkin {found', 'click.echo(f"urdfkin: error: {error}'),
+        "__init__.py": ('click.echo(f"urdfkin {found',),
+        "crash.py": ('click.echo("urdfkin: interrupted', 'click.echo("".join(traceback.', "click.echo("),
     }  # fmt: skip
     folder = Path(__file__).parents[2] / "urdfkin" / "cli"
     for path in folder.glob("*.py"):

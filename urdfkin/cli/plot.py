@@ -85,7 +85,7 @@ def command(
     if trajectory is not None:
         motion = read_trajectory(loaded, trajectory)
         for note in (*motion.notes, *loaded.limit_violations(motion.q)):
-            click.echo(f"warning: {note}", err=True)
+            say(f"warning: {note}", err=True)
     else:
         motion = _line(loaded, start, end or "", duration, samples, seed)
     with compiling():

@@ -14,8 +14,7 @@ import sys
 import warnings
 from typing import Any
 
-import click
-
+from urdfkin.cli.door import say
 from urdfkin.errors import SourceError
 
 #: How a process ends that its reader has left: as shells report it of programs that a signal ends.
@@ -101,6 +100,6 @@ def _warn(
 ) -> None:
     """Urdfkin's own warnings in a line; others as Python shows them."""
     if category.__module__.startswith("urdfkin."):
-        click.echo(f"urdfkin: warning: {message}", err=True)
+        say(f"urdfkin: warning: {message}", err=True)
     else:
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
