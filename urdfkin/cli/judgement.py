@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import click
+from urdfkin.cli.door import say
 
 if TYPE_CHECKING:
     from urdfkin.judge import Judgement
@@ -51,5 +51,5 @@ def _judged(source: Robot | str, samples: int, seed: int, how: dict[str, Any]) -
         return judge(loaded, samples=samples, seed=seed)
     except Exception as error:
         name = source if isinstance(source, str) else source.source
-        click.echo(f"urdfkin: {name}: not judged: {type(error).__name__}: {error}", err=True)
+        say(f"urdfkin: {name}: not judged: {type(error).__name__}: {error}", err=True)
         return None
