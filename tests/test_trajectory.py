@@ -41,7 +41,7 @@ def test_a_lines_rates_are_its_derivatives(robot: Robot) -> None:
 
 @pytest.mark.parametrize(("duration", "samples"), [(0.0, 10), (-1.0, 10), (float("nan"), 10), (1.0, 2)])
 def test_a_line_without_time_or_samples_is_refused(robot: Robot, duration: float, samples: int) -> None:
-    with pytest.raises(InputError, match="a duration above 0 and 3 samples"):
+    with pytest.raises(InputError, match="duration"):
         line(robot, robot.neutral(), END, duration, samples)
 
 

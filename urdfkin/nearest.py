@@ -25,7 +25,7 @@ def nearest(
         cutoff: How alike they must be, from 0 to 1.
         work: Pairs of characters to compare before the search ends with what it has.
 
-    >>> nearest("pandahand", ["panda_hand", "panda_link1", "base"])
+    >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
     """
     begins = word[:_COMPARED]

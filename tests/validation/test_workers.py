@@ -153,7 +153,7 @@ def test_a_worker_runs_nothing_of_the_current_folder(
     monkeypatch.syspath_prepend("")
     with pytest.raises(RecordedError):
         workers._interpreter(3)
-    assert codes[0][1] == "-P"
+    assert codes[0][1] == "-I"
     path = codes[0][3].partition("sys.path[:] = ")[2].partition("; from")[0]
     assert "''" not in path
     assert "site-packages" in path

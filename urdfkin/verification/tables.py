@@ -33,6 +33,7 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.oracle import Oracle
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray, KinematicTree
+from urdfkin.verification.bounds import ROUNDINGS
 from urdfkin.verification.sampling import Samples
 
 _EPS = float(np.finfo(np.float64).eps)
@@ -285,7 +286,9 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
     # An axis that Pinocchio takes for another turns each factor by twice the tilt (`verification.bounds`), of
     # which the acceleration seen from the base has four.
     left = left_out(chain(tree, table.tip_frame, table.base_frame)) + 8.0 * tilt
-    rounding = _EPS * (8.0 + 8.0 * (joints + len(table.rows)) + angles) + left
+    # A joint costs what it does anywhere, in Pinocchio and in our reading of the chain that rows are made of
+    # (`bounds.ROUNDINGS`); a row's own turns and products 8 more, its angle aside.
+    rounding = _EPS * (8.0 + ROUNDINGS * joints + 8.0 * len(table.rows) + angles) + left
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 

@@ -15,12 +15,12 @@ import io
 import logging
 import secrets
 import socket
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.forking import lock_over_forks
 from urdfkin.view.gate import HEADERS, Gate, policy
 
 LOOPBACK = "127.0.0.1"
@@ -32,7 +32,7 @@ _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
 )
-_swapping = threading.Lock()
+_swapping = lock_over_forks()
 
 
 class UnguardedError(UrdfkinError, RuntimeError):
