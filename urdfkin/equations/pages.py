@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import re
+import textwrap
 
 from urdfkin.equations.registry import LAST, LOST, Equation, equations, sections
+from urdfkin.kinematics import equations as chapter
+from urdfkin.kinematics.latex import latex
 
 _NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECASE)
 
@@ -50,4 +54,12 @@ def _page(equation: Equation) -> str:
         *(f"tested by     {test}" for test in equation.tests),
         f"checked with  {equation.against}",
     ]
+    for name in equation.written:
+        lines += ["", *_source(name), "", f"    {latex(name)}"]
     return "\n".join(lines)
+
+
+def _source(name: str) -> list[str]:
+    """The equation as it runs, on every kind of number."""
+    source = textwrap.indent(inspect.getsource(getattr(chapter, name)).rstrip(), "    ")
+    return ["written once, in urdfkin/kinematics/equations.py; in code, and in LaTeX", "", source]

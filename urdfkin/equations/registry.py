@@ -36,6 +36,7 @@ class Equation:
         number: As printed, "7.130".
         statement: In urdfkin's notation, plain characters.
         meaning: One or two sentences.
+        written: The functions of `urdfkin.kinematics.equations` that are it, by name.
         functions: What computes it, "module:name".
         tests: Tests that fail without it, "file::name".
         against: The independent source that the tests compare with.
@@ -44,6 +45,7 @@ class Equation:
     number: str
     statement: str
     meaning: str
+    written: tuple[str, ...]
     functions: tuple[str, ...]
     tests: tuple[str, ...]
     against: str
@@ -121,6 +123,7 @@ def _equation(entry: dict[str, Any]) -> Equation:
         number=entry["number"],
         statement=entry["statement"],
         meaning=entry["meaning"],
+        written=tuple(entry.get("written", ())),
         functions=tuple(entry["functions"]),
         tests=tuple(f"{entry['test_file']}::{name}" for name in names),
         against=entry["against"],

@@ -11,6 +11,7 @@ from functools import reduce
 
 import numpy as np
 
+from urdfkin.kinematics.arrays import chapter as eq
 from urdfkin.rotation.arrays import FloatArray, rotations, vectors
 
 
@@ -70,13 +71,9 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
         R @ inner.R_0_1,
         outer.d_0_1 + d_12,
         w + w_12,
-        outer.v_0_1 + np.cross(w, d_12) + v_12,
-        outer.alpha_0_1 + alpha_12 + np.cross(w, w_12),
-        outer.a_0_1
-        + np.cross(outer.alpha_0_1, d_12)
-        + np.cross(w, np.cross(w, d_12))
-        + 2.0 * np.cross(w, v_12)
-        + a_12,
+        eq.moving_point_velocity(outer.v_0_1, w, d_12, v_12),
+        eq.free_angular_acceleration(outer.alpha_0_1, w, w_12, alpha_12),
+        eq.moving_point_acceleration(outer.a_0_1, outer.alpha_0_1, w, d_12, v_12, a_12),
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.kinematics.arrays import chapter as eq
 from urdfkin.rotation.arrays import FloatArray, scalars, unit_vectors, vectors
 
 
@@ -31,8 +32,9 @@ def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -
         >>> interorigin_vector(0.3, [0.0, 0.0, 1.0], 0.5, [1.0, 0.0, 0.0])
         array([0.5, 0. , 0.3])
     """
-    along = scalars(d, "d")[..., np.newaxis] * unit_vectors(z, "z")
-    vector: FloatArray = along + scalars(a, "a")[..., np.newaxis] * unit_vectors(x, "x")
+    vector: FloatArray = eq.interorigin_vector(
+        scalars(d, "d"), unit_vectors(z, "z"), scalars(a, "a"), unit_vectors(x, "x")
+    )
     return vector
 
 
@@ -74,7 +76,7 @@ def interorigin_velocity(
     Raises:
         InputError: a shape, or an axis that is not of unit length.
     """
-    carried = np.cross(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
+    carried: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
     slid: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
     return carried if turns else carried + slid
 
@@ -94,5 +96,5 @@ def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
         InputError: a shape, or an axis that is not of unit length.
     """
     z, arm = np.broadcast_arrays(unit_vectors(z, "z"), vectors(arm, "arm"))
-    linear, angular = (np.cross(z, arm), z) if turns else (z, np.zeros_like(z))
+    linear, angular = eq.turning_column(z, arm) if turns else (z, np.zeros_like(z))
     return np.concatenate((linear, angular), axis=-1)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.kinematics.arrays import chapter as eq
 from urdfkin.motion.frames import MovingFrame, turned
 from urdfkin.rotation.arrays import FloatArray, vectors
 
@@ -74,7 +75,8 @@ def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
     Raises:
         InputError: a shape or a value that is not finite.
     """
-    return frame.d_0_1 + turned(frame.R_0_1, vectors(p_1, "p_1"))
+    p_0: FloatArray = eq.point_position(frame.d_0_1, frame.R_0_1, vectors(p_1, "p_1"))
+    return p_0
 
 
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _STILL) -> VelocityParts:
@@ -92,7 +94,7 @@ def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _STILL) 
         InputError: a shape or a value that is not finite.
     """
     p_0 = turned(frame.R_0_1, vectors(p_1, "p_1"))
-    rotation = np.cross(frame.w_0_1, p_0)
+    rotation = eq.tangential(frame.w_0_1, p_0)
     relative = turned(frame.R_0_1, vectors(v_1, "v_1"))
     return VelocityParts(*np.broadcast_arrays(rotation, relative, frame.v_0_1))
 
@@ -117,7 +119,6 @@ def point_acceleration(
     p_0 = turned(frame.R_0_1, vectors(p_1, "p_1"))
     v_0 = turned(frame.R_0_1, vectors(v_1, "v_1"))
     a_0 = turned(frame.R_0_1, vectors(a_1, "a_1"))
-    transverse = np.cross(frame.alpha_0_1, p_0)
-    centripetal = np.cross(frame.w_0_1, np.cross(frame.w_0_1, p_0))
-    coriolis = 2.0 * np.cross(frame.w_0_1, v_0)
+    transverse = eq.transverse(frame.alpha_0_1, p_0)
+    centripetal, coriolis = eq.centripetal(frame.w_0_1, p_0), eq.coriolis(frame.w_0_1, v_0)
     return AccelerationParts(*np.broadcast_arrays(transverse, centripetal, coriolis, a_0, frame.a_0_1))

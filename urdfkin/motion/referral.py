@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.kinematics.arrays import chapter as eq
 from urdfkin.rotation.arrays import FloatArray, vectors
 
 
@@ -26,7 +27,7 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
     """
     velocity, d = vectors(velocity, "velocity", 6), vectors(d_n_tool, "d_n_tool")
     linear, w = velocity[..., :3], velocity[..., 3:]
-    moved = linear + np.cross(w, d)
+    moved = eq.point_velocity(linear, w, d)
     return np.concatenate(np.broadcast_arrays(moved, w), axis=-1)
 
 

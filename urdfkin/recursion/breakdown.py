@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from urdfkin.errors import NotFiniteError, RangeError
+from urdfkin.kinematics.arrays import chapter as eq
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.recursion.evaluate import placements, velocities
 from urdfkin.recursion.plan import make_plan
@@ -145,12 +146,11 @@ def _moved(base: FloatArray, by: FloatArray) -> FloatArray:
 def _terms(rate: _Moves, rate_2: _Moves, w_before: FloatArray, d: FloatArray) -> FloatArray:
     """(n, 4, 6) what one joint contributes."""
     nothing = np.zeros_like(d)
-    turning = np.cross(rate.turn, d)
-    twice = 2.0 * np.cross(w_before, turning + rate.slide) + np.cross(rate.turn, rate.slide)
+    u = eq.point_velocity(rate.slide, rate.turn, d)
     kinds = (
-        (np.cross(rate_2.turn, d), rate_2.turn),
-        (np.cross(rate.turn, turning), nothing),
-        (twice, np.cross(w_before, rate.turn)),
+        (eq.transverse(rate_2.turn, d), rate_2.turn),
+        (eq.centripetal(rate.turn, d), nothing),
+        (eq.coriolis(w_before, u) + eq.axis_rate(rate.turn, rate.slide), eq.axis_rate(w_before, rate.turn)),
         (rate_2.slide, nothing),
     )
     return np.stack([np.concatenate(pair, axis=-1) for pair in kinds], axis=-2)
@@ -172,7 +172,7 @@ def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
 def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
     """The acceleration of a point that rides on the base, d from its origin (7.123)."""
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
-    linear = a + np.cross(alpha, d) + np.cross(w, np.cross(w, d))
+    linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)
 
 

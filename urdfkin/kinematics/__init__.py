@@ -1,0 +1,1 @@
+"""The chapter's kinematics, each equation written once."""
