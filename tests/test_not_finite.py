@@ -10,7 +10,7 @@ from tests.laws.subjects import robot_of, state
 from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.frame_motion import frame_motion
 from urdfkin.recursion.base import BaseMotion
-from urdfkin.recursion.lanes import LANES
+from urdfkin.recursion.registers import LANES
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
 

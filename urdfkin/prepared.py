@@ -1,21 +1,22 @@
 """One frame in one configuration after the other, as fast as Python can ask: for control loops and solvers.
 
-The walk is that of `Robot`, one lane wide. The kernels are bound to a plan and to scratch memory of their
-own, so that a call hands over nothing but its arrays. They keep the interpreter's lock: for a microsecond
-it is not worth releasing, and so the scratch memory needs no other protection.
+The walk is that of `Robot`, with the configuration in every lane. The kernels are bound to a program and to
+scratch memory of their own, so that a call hands over nothing but its arrays. Where another thread is at
+work in them, a call goes the robot's way, with the same result.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.recursion.compiling import NoKernelError
-from urdfkin.recursion.plan import Packed, Plan
-from urdfkin.recursion.scratch import scratch
+from urdfkin.recursion.plan import IntArray, Plan
+from urdfkin.recursion.task import Task
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
 from urdfkin.verification.bounds import Quantity
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
 _empty = np.empty
 #: Numba takes a masked array for a plain one, once it has seen a plain one.
 _ARRAY = np.ndarray
-#: What the kernels count, in the order of `Packed.COUNTS`.
-_COUNTED = Quantity.PLACEMENT, Quantity.VELOCITY, Quantity.ACCELERATION, Quantity.JACOBIAN
+_NO_TASK = np.zeros(0, dtype=np.int64)
+_Kernel = Callable[..., int]
 #: What Numba raises for arguments that are no arrays of the kernel's kind; an empty list has no type at all.
 _NOT_TAKEN = (TypeError, ValueError, OverflowError, NoKernelError)
 
@@ -54,24 +55,21 @@ class PreparedFrame:
     """
 
     __slots__ = (
-        "_jacobian", "_motion", "_packed", "_placement", "_plain", "_plan", "_robot", "_scratch", "_shape",
-        "frame", "reference",
+        "_acceleration", "_acceleration_task", "_jacobian", "_jacobian_task", "_kept", "_placement",
+        "_placement_task", "_plan", "_robot", "_shape", "_velocity", "_velocity_task", "frame", "reference",
     )  # fmt: skip
 
     def __init__(self, robot: Robot, frame: str, reference: Reference, plan: Plan) -> None:
         self.frame, self.reference = frame, reference
         self._robot, self._plan = robot, plan
-        self._scratch = scratch(plan)
-        self._packed = np.array([*plan.packed, self._scratch.ctypes.data, int(reference), *(4 * [0])])
         self._shape = (6, plan.nv)
-        for place, quantity in enumerate(_COUNTED, Packed.COUNTS):
-            robot.ledger.account(quantity).counters.append((self._packed, place))
-        # Quaternions are brought to norm 1 first, and what may overflow is looked at: the robot's business.
-        self._plain = not robot.tree.floating_joints and not plan.is_large
+        self._kept: list[object] = []
         # Compiled, or read from disk, when they are first called.
-        self._placement: Callable[..., int] = self._first_placement
-        self._jacobian: Callable[..., int] = self._first_jacobian
-        self._motion: Callable[..., int] = self._first_motion
+        self._placement: _Kernel = partial(self._first, Quantity.PLACEMENT)
+        self._velocity: _Kernel = partial(self._first, Quantity.VELOCITY)
+        self._jacobian: _Kernel = partial(self._first, Quantity.JACOBIAN)
+        self._acceleration: _Kernel = partial(self._first, Quantity.ACCELERATION)
+        self._placement_task = self._velocity_task = self._jacobian_task = self._acceleration_task = _NO_TASK
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
         # It holds addresses of this process: a copy prepares itself anew.
@@ -84,7 +82,7 @@ class PreparedFrame:
         """(4, 4) T_world_frame: eq. 7.77."""
         pose = _empty((4, 4)) if out is None else out
         try:
-            if type(q) is _ARRAY and self._placement(self._packed, q, pose) == 1:
+            if type(q) is _ARRAY and self._placement(self._placement_task, q, pose) == 1:
                 return pose
         except _NOT_TAKEN:
             pass
@@ -94,7 +92,8 @@ class PreparedFrame:
         """(6,) [linear; angular] m/s, rad/s: eq. 7.127, 7.128."""
         six = _empty(6) if out is None else out
         try:
-            if type(q) is type(v) is _ARRAY and self._motion(1, self._packed, q, v, v, six) == 1:
+            plain = type(q) is type(v) is _ARRAY
+            if plain and self._velocity(self._velocity_task, q, v, v, six) == 1:
                 return six
         except _NOT_TAKEN:
             pass
@@ -104,7 +103,7 @@ class PreparedFrame:
         """(6, nv): eq. 7.85."""
         J = _empty(self._shape) if out is None else out
         try:
-            if type(q) is _ARRAY and self._jacobian(self._packed, q, J) == 1:
+            if type(q) is _ARRAY and self._jacobian(self._jacobian_task, q, J) == 1:
                 return J
         except _NOT_TAKEN:
             pass
@@ -117,32 +116,22 @@ class PreparedFrame:
         six = _empty(6) if out is None else out
         try:
             plain = type(q) is type(v) is type(a) is _ARRAY
-            if plain and self._motion(2, self._packed, q, v, a, six) == 1:
+            if plain and self._acceleration(self._acceleration_task, q, v, a, six) == 1:
                 return six
         except _NOT_TAKEN:
             pass
         return self._robot.acceleration(q, v, a, self.frame, self.reference, out=out, verify=False, threads=1)
 
-    def _first_placement(self, *arguments: object) -> int:
-        from urdfkin.recursion.motion_kernel import placement  # noqa: PLC0415
+    def _first(self, quantity: Quantity, _: IntArray, *arrays: object) -> int:
+        """Make what computes a quantity, and compute."""
+        # Quaternions are brought to norm 1 first, and what may overflow is looked at: the robot's business.
+        if self._robot.tree.floating_joints or self._plan.is_large:
+            return 0
+        from urdfkin.recursion.single import single  # noqa: PLC0415  compiles
 
-        self._placement = placement.compiled if self._plain else _refused
-        return self._placement(*arguments)
-
-    def _first_jacobian(self, *arguments: object) -> int:
-        from urdfkin.recursion.jacobian_kernel import jacobian  # noqa: PLC0415
-
-        self._jacobian = jacobian.compiled if self._plain else _refused
-        return self._jacobian(*arguments)
-
-    def _first_motion(self, *arguments: object) -> int:
-        from urdfkin.recursion.local_kernel import local_motion  # noqa: PLC0415
-        from urdfkin.recursion.motion_kernel import motion  # noqa: PLC0415
-
-        kernel = local_motion if self.reference is Reference.LOCAL else motion
-        self._motion = kernel.compiled if self._plain else _refused
-        return self._motion(*arguments)
-
-
-def _refused(*_: object) -> int:
-    return 0
+        made = single(quantity, self._plan, self.reference)
+        self._kept.append(made.kept)
+        self._robot.ledger.account(quantity).counters.append((made.task, Task.COUNT))
+        setattr(self, f"_{quantity}_task", made.task)
+        setattr(self, f"_{quantity}", made.kernel)
+        return int(made.kernel(made.task, *arrays))

@@ -1,47 +1,139 @@
-"""How many multiplications and additions one configuration takes: the equations, counted.
+"""How many additions and multiplications one configuration takes, counted by doing them.
 
-A cross product is 6 multiplications and 3 additions, a rotation times a vector 9 and 6. Signs are free.
+The walk's own functions run on numbers that count. A fused multiply-add counts as two, as in the machine's
+figures; signs are free, and so is what is multiplied by a 0 or a 1 that is known beforehand.
 """
 
 from __future__ import annotations
 
-from urdfkin.recursion.plan import Motion, Plan, Step
+from dataclasses import dataclass, field
+from types import FunctionType, SimpleNamespace
+from typing import Any
 
-_CROSS, _SUM, _SCALED, _ROTATED = 9, 3, 3, 15
-_TIMES_CONSTANT_ROTATION = 3 * _ROTATED
-#: Range reduction 9, quarter turns 18, two polynomials of degree 13 and 14: 30 (`lanes.sine_cosine`).
-_SINE_COSINE = 57
-_ABOUT_Z = 18
-#: 7.77; 7.128 on top; 7.130 on top of both, for going from one point of a link to another.
-_CARRIED = (_SUM, _CROSS + _SUM, 3 * _CROSS + 2 * _SUM)
-#: The coordinate; its rate; its second rate: a follower's rule is applied to every joint.
-_GATHERED = (2, 1, 1)
-#: 7.127, then 7.129.
-_TURNED = (0, _SCALED + _SUM, _SCALED + _CROSS + _SCALED + 2 * _SUM)
-#: 7.128, then 7.130.
-_SLID = (0, _SCALED + _SUM, 1 + _SCALED + _CROSS + _SCALED + 2 * _SUM)
-#: A column of 7.85 for a joint that turns: z x d.
-_COLUMN = _SUM + _CROSS
+import numpy as np
+
+from urdfkin.kinematics.arithmetic import bound
+from urdfkin.recursion import outputs, walk
+from urdfkin.recursion.plan import Plan
+from urdfkin.recursion.program import KEPT_ROWS, WIDTH, Head, Op, program_of
+
+#: Range reduction 6, two polynomials 27, the sine's and the cosine's last steps 8 (`recursion.sine`).
+_SINE_COSINE = 41
+
+
+@dataclass(frozen=True, eq=False)
+class Number:
+    """A number that remembers what it was made of.
+
+    Attributes:
+        known: 0 or 1 where that is known beforehand.
+        nothing: Whether nobody asks for it: what is computed from it is nothing, and costs as much.
+        made_of: What was added or multiplied; empty for what is given.
+    """
+
+    known: int | None = None
+    nothing: bool = False
+    made_of: tuple[Number, ...] = ()
+
+    def __add__(self, other: Number) -> Number:
+        if self.nothing or other.nothing:
+            return self if self.nothing else other
+        if self.known == 0 or other.known == 0:
+            return other if self.known == 0 else self
+        return Number(made_of=(self, other))
+
+    __sub__ = __add__
+
+    def __mul__(self, other: Number) -> Number:
+        if self.nothing or other.nothing:
+            return self if self.nothing else other
+        if self.known is not None:
+            return other if self.known else self
+        if other.known is not None:
+            return self if other.known else other
+        return Number(made_of=(self, other))
+
+    def __rmul__(self, other: int) -> Number:
+        return self * Number()
+
+    def __rsub__(self, other: int) -> Number:
+        return self + Number()
+
+    def __neg__(self) -> Number:
+        return self
+
+
+def count(results: Any) -> int:
+    """How many operations it takes to have these numbers, each done once."""
+    waiting, seen = [results], set[Number]()
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, Number):
+            if value.made_of and value not in seen:
+                seen.add(value)
+                waiting += value.made_of
+        elif isinstance(value, tuple | list):
+            waiting += value
+    return len(seen)
+
+
+@dataclass
+class _Walk:
+    """The functions of `walk` and `outputs` on such numbers."""
+
+    written: list[Any] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        x, zero, one = Number(), Number(0), Number(1)
+        triple = (x, x, x)
+        self.names: dict[str, Any] = {
+            "eq": bound(),
+            **{name: lambda *_: x for name in ("number", "number_if", "constant", "same")},
+            **{name: lambda *_: triple for name in ("vector", "_vector", "_vector_if")},
+            **{name: lambda *words: self.written.append(words[-1]) for name in ("put", "put_vector")},
+            **{name: lambda *_: None for name in ("write_rows", "numbers_of")},
+            "_coordinate": lambda *_: x,
+            "_rate": lambda *_: x,
+            "zero": lambda: zero,
+            "one": lambda: one,
+        }
+        for module in (walk, outputs):
+            for name, value in vars(module).items():
+                if hasattr(value, "py_func"):
+                    self.names.setdefault(name, FunctionType(value.py_func.__code__, self.names, name))
+                elif isinstance(value, int | np.ndarray):
+                    self.names.setdefault(name, value)
+        self.call = SimpleNamespace(**self.names)
+        self.state = (triple, triple, triple), triple, triple, triple, triple, triple
 
 
 def operations(plan: Plan, quantity: str) -> int:
-    """For a plan of revolute and prismatic joints and one frame, in LOCAL_WORLD_ALIGNED.
+    """For one frame in LOCAL_WORLD_ALIGNED: "jacobian", "velocity" or "acceleration"."""
+    columns = quantity == "jacobian"
+    program, run = program_of(plan, turned=False, columns=columns), _Walk()
+    words: list[int] = program.words.tolist()
+    angles = (words[Head.ANGLES_END] - words[Head.ANGLES]) // 4
+    follow = {"jacobian": 2, "velocity": 4, "acceleration": 6}[quantity]
+    total, at = angles * _SINE_COSINE, int(words[Head.CODE])
+    while words[at] != Op.END:
+        total += _cost(run, words[at : at + WIDTH], quantity, follow)
+        at += WIDTH
+    return total
 
-    Raises:
-        ValueError: another kind of joint.
-    """
-    order = {"jacobian": 0, "velocity": 1, "acceleration": 2}[quantity]
-    return (
-        sum(_step(kind, order, quantity == "jacobian") for kind in plan.steps[:, Step.KIND].tolist())
-        + _ROTATED
-        + sum(_CARRIED[: order + 1])
-    )
 
-
-def _step(kind: int, order: int, column: bool) -> int:
-    shared = _TIMES_CONSTANT_ROTATION + _ROTATED + sum(_CARRIED[: order + 1]) + sum(_GATHERED[: order + 1])
-    if kind == Motion.TURN:
-        return shared + _SINE_COSINE + _ABOUT_Z + sum(_TURNED[: order + 1]) + column * _COLUMN
-    if kind == Motion.SLIDE:
-        return shared + _ROTATED + _SUM + sum(_SLID[: order + 1])
-    raise ValueError("only joints that turn or slide are counted")
+def _cost(run: _Walk, instruction: list[int], quantity: str, follow: int) -> int:
+    """What one instruction takes, of the parts of the state that the quantity follows."""
+    op, row, _, how, c = instruction
+    nothing = 3 * (Number(nothing=True),)
+    state = tuple(part if i < follow else nothing for i, part in enumerate(run.state))
+    run.written.clear()
+    if op <= Op.TURN:
+        return count(run.call._along_link(op, state, None, c))
+    if op <= Op.FLOATING:
+        return count(run.call._over_joint(op, state, None, row, 0, 0, how, None, c))
+    if op == Op.COLUMN:
+        run.call.column_jacobian(None, row % KEPT_ROWS, 0, how, None, c, 2, state)
+    elif op == Op.EMIT and quantity != "jacobian":
+        emit = run.call.emit_velocity if quantity == "velocity" else run.call.emit_acceleration
+        emit(1, None, [1] * len(Head), 0, 0, 0, 2, state, None)
+    return count(run.written)

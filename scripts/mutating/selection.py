@@ -12,8 +12,7 @@ PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 #: Compiled by Numba from their files, which a slip made while they are read does not reach: their terms are
 #: changed by tests/laws/test_mutation.py, run without the compiler.
 _COMPILED = {
-    "lanes", "transposing", "steps", "walk", "columns", "motion_kernel", "local_kernel", "jacobian_kernel",
-    "jacobian_rate_kernel", "worst", "scratch",
+    "numbers", "registers", "sine", "memory", "walk", "outputs", "cores", "single", "equations", "worst",
 }  # fmt: skip
 
 

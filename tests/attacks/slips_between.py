@@ -51,8 +51,8 @@ from urdfkin.urdf.reader import read_tree
 MODULES = (
     "asked", "call", "chain", "checks", "configuration", "coupling", "dh.to_tree", "followers",
     "frame_names", "from_table", "manipulator", "motion.representation", "oracle", "oracle_base",
-    "oracle_frames", "oracle_layout", "recursion.base", "recursion.batch", "recursion.columns",
-    "recursion.evaluate", "recursion.plan", "recursion.rows", "reference", "robot",
+    "oracle_frames", "oracle_layout", "recursion.base", "recursion.batch", "recursion.evaluate",
+    "recursion.plan", "recursion.program", "reference", "robot",
     "rotation.aligning", "rotation.arrays", "rotation.euler", "rotation.euler_rates",
     "rotation.nearest", "rotation.quaternion", "rotation.quaternion_rates", "tables", "tree",
     "urdf.reader", "urdf.skeleton", "urdf.writer", "verification.bounds",

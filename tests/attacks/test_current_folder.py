@@ -107,7 +107,7 @@ def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
 
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend("")  # as in `python -c`
-    assert announcing._compile_elsewhere({}).wait() == 0
+    assert announcing._compile_elsewhere(()).wait() == 0
     assert planted_code_ran(folder) == []
 
 

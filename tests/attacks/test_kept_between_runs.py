@@ -212,7 +212,7 @@ def test_a_command_with_a_damaged_cache_says_so_in_a_line_and_mends_it(tmp_path:
     shutil.copytree(compiled_for_placements(), tmp_path / "urdfkin" / compiled_for_placements().name)
     (tmp_path / "urdfkin").chmod(0o700)
     process("placement", "ur5", **home)
-    files = [path for path in tmp_path.rglob("*.*.kernel") if "motion_kernel" in path.name]
+    files = [path for path in tmp_path.rglob("*.*.kernel") if "cores.placements" in path.name]
     for path in files:
         path.write_bytes(flipped(path.read_bytes()))
     done = process("placement", "ur5", **home)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from urdfkin import keeping, recursion, tree, urdf
+from urdfkin import keeping, kinematics, recursion, tree, urdf
 from urdfkin.keeping import kept_folder
 from urdfkin.recursion import compiling
 from urdfkin.urdf import remembering
@@ -27,7 +27,7 @@ def test_a_change_in_any_source_leads_to_another_folder(changed: int, tmp_path: 
 @pytest.mark.parametrize(
     ("module", "ask", "needed"),
     [
-        (compiling, compiling.cache_folder, [recursion]),
+        (compiling, compiling.cache_folder, [recursion, kinematics]),
         (remembering, remembering._folder, [urdf, tree]),
     ],
     ids=["kernels", "trees"],

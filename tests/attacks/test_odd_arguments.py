@@ -16,7 +16,7 @@ import pytest
 
 import urdfkin
 from urdfkin.recursion import batch
-from urdfkin.recursion.lanes import LANES
+from urdfkin.recursion.registers import LANES
 from urdfkin.robot import Robot
 from urdfkin.trajectory import line
 

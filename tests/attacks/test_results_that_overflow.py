@@ -8,8 +8,8 @@ import pytest
 import urdfkin
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.recursion.base import BaseMotion
-from urdfkin.recursion.lanes import LANES
 from urdfkin.recursion.plan import LARGE
+from urdfkin.recursion.registers import LANES
 from urdfkin.robot import Robot
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")

@@ -8,7 +8,7 @@ import pytest
 import urdfkin
 from urdfkin.errors import InputError
 from urdfkin.recursion.batch import in_blocks
-from urdfkin.recursion.lanes import LANES
+from urdfkin.recursion.registers import LANES
 from urdfkin.tree import FloatArray
 
 
@@ -42,19 +42,19 @@ def test_less_than_one_thread_is_refused(panda: urdfkin.Robot) -> None:
         panda.placement(panda.neutral(), "panda_hand", threads=0)
 
 
-@pytest.mark.parametrize("rows", [1, 2, LANES - 1])
-def test_a_block_is_filled_whole_so_that_nothing_beyond_the_inputs_is_read(rows: int) -> None:
-    seen: list[list[tuple[int, ...]]] = []
-
+def test_what_was_bad_in_any_part_is_told() -> None:
     def compute(inputs: Sequence[FloatArray], out: FloatArray) -> int:
-        seen.append([x.shape for x in inputs])
         out[:] = inputs[1][:, :1]
-        return 1
+        return int(inputs[1][:, 0].max())
 
-    base, q, out = np.zeros((1, 24)), np.arange(3.0 * rows).reshape(rows, 3), np.empty((rows, 1))
-    in_blocks(compute, [base, q], out, threads=1)
-    np.testing.assert_array_equal(out[:, 0], q[:, 0])
-    assert seen == [[(LANES if rows == 1 else 1, 24), (LANES, 3)]]
+    base, out = np.zeros((1, 24)), np.empty((5 * LANES, 1))
+    for bad in (None, 0, 2 * LANES, 5 * LANES - 1):
+        q = np.zeros((5 * LANES, 3))
+        if bad is not None:
+            q[bad] = 1.0
+        for threads in (1, 2):
+            assert in_blocks(compute, [base, q], out, threads) == int(bad is not None)
+            np.testing.assert_array_equal(out[:, 0], q[:, 0])
 
 
 def test_a_single_configuration_gives_the_same_bits_whatever_lies_beside_it(panda: urdfkin.Robot) -> None:

@@ -10,8 +10,9 @@ import pytest
 import urdfkin
 from tests.laws.subjects import robot_of, state
 from urdfkin.recursion import evaluate
-from urdfkin.recursion.lanes import LANES
 from urdfkin.recursion.plan import Plan, make_plan
+from urdfkin.recursion.program import program_of
+from urdfkin.recursion.registers import LANES
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
@@ -93,16 +94,18 @@ def test_a_plan_comes_back_from_a_pickle_with_addresses_of_its_own() -> None:
     q, v, a = state(robot, 21, 4)
     plan = make_plan(robot.tree, links)
     expected = [evaluate.jacobians(plan, q), evaluate.accelerations(plan, q, v, a)]
-    addresses = set(plan.packed[:10].tolist())
+    program = program_of(plan, turned=False)
     text = pickle.dumps(plan)
     again: Plan = pickle.loads(text)
-    assert not addresses & set(again.packed[:10].tolist())
-    assert again.packed[10:].tolist() == plan.packed[10:].tolist()
-    del plan
+    anew = program_of(again, turned=False)
+    assert not set(program.addresses) & set(anew.addresses)
+    assert anew.words.tolist() == program.words.tolist()
+    assert anew.constants.tolist() == program.constants.tolist()
+    del plan, program
     gc.collect()
     rubbish = [np.full(256, -1) for _ in range(200)]  # over what the first plan left
     found = [evaluate.jacobians(again, q), evaluate.accelerations(again, q, v, a)]
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_array_equal(one, other)
     assert len(rubbish) == 200
-    assert not any(x.flags.writeable for x in (again.steps, again.geometry, again.sources))
+    assert not any(x.flags.writeable for x in (again.steps, again.geometry, again.leaders))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
 import subprocess
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -39,13 +38,12 @@ def announced(tell: Callable[[], None]) -> Iterator[None]:
         yield
 
 
-#: The kernels for batches, by the module they stand in: half of the work each.
-_ONE_HALF = {"jacobian_kernel": "jacobians", "motion_kernel": "motions"}
-_OTHER_HALF = {"jacobian_rate_kernel": "jacobian_rates", "local_kernel": "local_motions"}
+#: The cores: half of the work each.
+_ONE_HALF, _OTHER_HALF = ("accelerations", "velocities"), ("jacobians", "jacobian_rates", "placements")
 
 
 def load_kernels() -> None:
-    """Compile every kernel for batches, or read it from disk: before processes start that would all compile.
+    """Compile every core, or read it from disk: before processes start that would all compile.
 
     Compiling takes one processor; a second process does half of it, and this one then reads it from disk.
     """
@@ -58,19 +56,21 @@ def load_kernels() -> None:
     _compile(_OTHER_HALF)
 
 
-def _compile(kernels: Mapping[str, str]) -> None:
-    for module, name in kernels.items():
-        _ = getattr(importlib.import_module(f"urdfkin.recursion.{module}"), name).compiled
+def _compile(names: Sequence[str]) -> None:
+    from urdfkin.recursion import cores  # noqa: PLC0415
+
+    for name in names:
+        _ = getattr(cores, name).compiled
 
 
 def _on_disk(name: str) -> bool:
     folder = cache_folder()
-    return folder is None or any(folder.glob(f"{name}.*.kernel"))
+    return folder is None or any(folder.glob(f"cores.{name}.*.kernel"))
 
 
-def _compile_elsewhere(kernels: Mapping[str, str]) -> subprocess.Popen[bytes]:
+def _compile_elsewhere(names: Sequence[str]) -> subprocess.Popen[bytes]:
     """Another interpreter that does nothing but compile; what it fails to do is done here after all."""
-    code = f"from urdfkin.recursion import announcing; announcing._compile({dict(kernels)!r})"
+    code = f"from urdfkin.recursion import announcing; announcing._compile({tuple(names)!r})"
     return subprocess.Popen(
         own_python(code),
         stdin=subprocess.DEVNULL,

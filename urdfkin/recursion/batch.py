@@ -1,8 +1,6 @@
-"""A batch in whole blocks of lanes, spread over threads.
+"""A batch spread over threads.
 
-Kernels take whole blocks; where a part is not a multiple, its last block reaches back into the one before. A
-batch of less than a block is filled up with copies of its last configuration. No lane depends on its
-neighbours: results are equal for any number of threads, to the last bit.
+No configuration depends on its neighbours: results are equal for any number of threads, to the last bit.
 """
 
 from __future__ import annotations
@@ -13,16 +11,14 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
 
-import numpy as np
-
 from urdfkin.demands import whole_number
-from urdfkin.recursion.lanes import LANES
+from urdfkin.recursion.registers import LANES
 from urdfkin.tree import FloatArray
 
 #: A batch is spread over threads by itself only from here on: a thread costs some ten microseconds.
 _WORTH_THREADS = 4096
 
-#: Computes rows of inputs into rows of an output, (inputs, out); 0 where an input is not ordinary.
+#: Computes rows of inputs into rows of an output, (inputs, out); 0, or 1 where an input is not ordinary.
 Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
@@ -36,11 +32,11 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> bool:
-    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...) for all; whether these are ordinary.
+def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> int:
+    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...) for all; whether any is not ordinary.
 
     Args:
-        compute: A kernel for whole blocks; releases the interpreter's lock.
+        compute: Releases the interpreter's lock.
         inputs: C-contiguous.
         out: C-contiguous.
         threads: How many at most; None for `default_threads`.
@@ -50,20 +46,13 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
     """
     n = len(out)
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
-    if n < LANES:
-        return n == 0 or _in_one_block(compute, inputs, out)
-    parts = _parts(n, min(threads, n // LANES, _processors()))
+    if n == 0:
+        return 0
+    parts = _parts(n, min(threads, max(n // LANES, 1), _processors()))
     if len(parts) == 1:
-        return bool(compute(inputs, out))
+        return compute(inputs, out)
     work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
-    return min(future.result() for future in work) > 0  # waits for all of them
-
-
-def _in_one_block(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray) -> bool:
-    filled = np.empty((LANES, *out.shape[1:]))
-    good = compute([_filled(x, len(out)) for x in inputs], filled)
-    out[:] = filled[: len(out)]
-    return bool(good)
+    return max([future.result() for future in work])  # waits for all of them
 
 
 def _parts(n: int, threads: int) -> list[tuple[int, int]]:
@@ -75,11 +64,6 @@ def _parts(n: int, threads: int) -> list[tuple[int, int]]:
 
 def _rows(inputs: Sequence[FloatArray], n: int, start: int, stop: int) -> list[FloatArray]:
     return [x[start:stop] if len(x) == n else x for x in inputs]
-
-
-def _filled(x: FloatArray, rows: int) -> FloatArray:
-    """A whole block from fewer rows; an input that is one for all stays so."""
-    return np.concatenate((x, np.repeat(x[-1:], LANES - rows, axis=0))) if len(x) == rows else x
 
 
 @cache

@@ -1,12 +1,14 @@
 """Compile once a machine: kernels are kept on disk, under a digest of the sources they are made from.
 
-Every source file of `recursion` enters the folder's name: a kernel is made of all that it is inlined from.
+Every source file of `recursion` and of `kinematics` enters the folder's name: a kernel is made of all that it
+is inlined from.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,16 +16,48 @@ from typing import Any
 import llvmlite
 import numba
 from numba import types
+from numba.core.ccallback import CFunc
 
 from urdfkin.forking import lock_over_forks
 from urdfkin.keeping import kept_folder
+from urdfkin.kinematics import equations
 from urdfkin.recursion.kept_kernels import KeptKernel
-from urdfkin.recursion.lanes import compiling_allowed, jitted
 
 #: What Numba raises of its own where a kernel does not take an argument.
 NoKernelError: type[Exception] = numba.core.errors.NumbaError
 
 _config: Any = numba.config  # settings that numba sets at run time
+
+#: How everything here is compiled. Nothing is reordered, and what is fused says so itself (`numbers`):
+#: results must not depend on the compiler's choices. Division by zero gives inf as in C, so that no loop
+#: carries a branch that raises. Nothing is allocated, so that arrays need no reference counts.
+COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+#: Of a part that is only ever inlined, no form of its own is made that Python or C could call.
+_PART: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+@contextmanager
+def compiling_allowed() -> Iterator[None]:
+    """NUMBA_DISABLE_JIT is not obeyed: it is meant for functions that Python could run instead."""
+    before, _config.DISABLE_JIT = _config.DISABLE_JIT, 0
+    try:
+        yield
+    finally:
+        _config.DISABLE_JIT = before
+
+
+def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Decorator: Numba's, with the options of every function here, and those given."""
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        with compiling_allowed():
+            return numba.njit(**options, **COMPILED)(function)
+
+    return decorate
+
+
+#: Decorator for functions that kernels are made of.
+compiled = jitted(**_PART)
 
 # Inputs may be read-only; a writable array converts without a copy. One signature, compiled once.
 PLAN = types.Array(types.int64, 1, "C", readonly=True)
@@ -82,9 +116,41 @@ class Kernel:
         return int(self.compiled(*arguments))
 
 
+class Core(Kernel):
+    """A function of one address, with C's calling convention: kernels call it, and Python by ctypes.
+
+    Python calls it without the interpreter's lock.
+    """
+
+    def __init__(self, function: Callable[[int], int]) -> None:
+        super().__init__(function, (types.int64,), nogil=True)
+
+    def _compile(self) -> Any:
+        core: Any = CFunc(self._function, ((types.int64,), types.int64), {}, COMPILED)
+        if (folder := cache_folder()) is not None:
+            core._cache = KeptKernel(self._function, folder)
+        with compiling_allowed():
+            core.compile()
+        return core
+
+    @property
+    def address(self) -> int:
+        """Where it lies in this process."""
+        return int(self.compiled.address)
+
+    def __call__(self, *arguments: Any) -> int:
+        """Compute."""
+        return int(self.compiled.ctypes(*arguments))
+
+
+def core(function: Callable[[int], int]) -> Core:
+    """Decorator: compile when first called, keep the result on disk."""
+    return Core(function)
+
+
 def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Decorator for what kernels call; options are Numba's, beside those of every kernel."""
-    return jitted(forceinline=True, **options)
+    return jitted(**_PART, **options)
 
 
 def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
@@ -102,4 +168,5 @@ def cache_folder() -> Path | None:
     """Where compiled kernels are kept; None if no folder can be written."""
     root = Path(_config.CACHE_DIR) if _config.CACHE_DIR else None
     versions = numba.__version__, llvmlite.__version__, sys.implementation.cache_tag
-    return kept_folder("kernels", sorted(Path(__file__).parent.glob("*.py")), *versions, root=root)
+    sources = [*Path(__file__).parent.glob("*.py"), *Path(equations.__file__).parent.glob("*.py")]
+    return kept_folder("kernels", sorted(sources), *versions, root=root)

@@ -1,7 +1,7 @@
 """Arrays in, arrays out: the compiled walks behind plain functions.
 
 Inputs are flat batches, (n, nq) and (n, nv), already checked; `urdfkin.robot` checks, reshapes and verifies.
-A kernel is loaded when it is first needed, so that a first use compiles only what it needs.
+A core is loaded when it is first needed, so that a first use compiles only what it needs.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ import numpy as np
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.recursion.batch import in_blocks
+from urdfkin.recursion.compiling import Core
 from urdfkin.recursion.plan import LARGE, Plan
-from urdfkin.recursion.scratch import scratch
+from urdfkin.recursion.program import Program, program_of
+from urdfkin.recursion.task import Task, scratch
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
 
@@ -30,9 +32,11 @@ def placements(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 4, 4) T_world_frame: 7.77 with the rotations alongside."""
+    from urdfkin.recursion.cores import placements as core  # noqa: PLC0415
+
     shape = len(q), len(plan.frames), 16
     flat = np.empty(shape) if out is None else out.reshape(shape)
-    _motion(plan, 0, [q, q, q], _ALIGNED, base, flat, threads)
+    _run(core, plan, program_of(plan, turned=True), [q], _ALIGNED, base, flat, threads)
     return flat.reshape(len(q), len(plan.frames), 4, 4)
 
 
@@ -47,8 +51,19 @@ def velocities(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 6) [linear; angular]: 7.127, 7.128."""
+    from urdfkin.recursion.cores import velocities as core  # noqa: PLC0415
+
     out = np.empty((len(q), len(plan.frames), 6)) if out is None else out
-    _motion(plan, 1, [q, v, v], reference, base, out, threads)
+    _run(
+        core,
+        plan,
+        program_of(plan, turned=reference is Reference.LOCAL),
+        [q, v],
+        reference,
+        base,
+        out,
+        threads,
+    )
     return out
 
 
@@ -64,33 +79,20 @@ def accelerations(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 6) [linear; angular], classical: 7.129, 7.130."""
+    from urdfkin.recursion.cores import accelerations as core  # noqa: PLC0415
+
     out = np.empty((len(q), len(plan.frames), 6)) if out is None else out
-    _motion(plan, 2, [q, v, a], reference, base, out, threads)
+    _run(
+        core,
+        plan,
+        program_of(plan, turned=reference is Reference.LOCAL),
+        [q, v, a],
+        reference,
+        base,
+        out,
+        threads,
+    )
     return out
-
-
-def _motion(
-    plan: Plan,
-    order: int,
-    qva: Sequence[FloatArray],
-    reference: Reference,
-    base: FloatArray,
-    out: FloatArray,
-    threads: int | None,
-) -> None:
-    packed = plan.packed
-    if order and reference is Reference.LOCAL:
-        from urdfkin.recursion.local_kernel import local_motions  # noqa: PLC0415
-
-        def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
-            return local_motions(order, packed, *x, part, scratch(plan))
-    else:
-        from urdfkin.recursion.motion_kernel import motions  # noqa: PLC0415
-
-        def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
-            return motions(order, int(reference), packed, *x, part, scratch(plan))
-
-    _demand(in_blocks(compute, [base, *qva], out, threads), plan, [base, *qva], out)
 
 
 def jacobians(
@@ -103,15 +105,11 @@ def jacobians(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 6, nv) velocity Jacobians: 7.85."""
-    from urdfkin.recursion.jacobian_kernel import jacobians as kernel  # noqa: PLC0415
+    from urdfkin.recursion.cores import jacobians as core  # noqa: PLC0415
 
     out = np.empty((len(q), len(plan.frames), 6, plan.nv)) if out is None else out
-    packed = plan.packed
-
-    def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
-        return kernel(int(reference), packed, *x, part, scratch(plan))
-
-    _demand(in_blocks(compute, [base, q], out, threads), plan, [base, q], out)
+    program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
+    _run(core, plan, program, [q], reference, base, out, threads)
     return out
 
 
@@ -126,24 +124,55 @@ def jacobian_rates(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 6, nv) time derivatives of the velocity Jacobians: the J-dot of 7.126."""
-    from urdfkin.recursion.jacobian_rate_kernel import jacobian_rates as kernel  # noqa: PLC0415
+    from urdfkin.recursion.cores import jacobian_rates as core  # noqa: PLC0415
 
     out = np.empty((len(q), len(plan.frames), 6, plan.nv)) if out is None else out
-    packed = plan.packed
-
-    def compute(x: Sequence[FloatArray], part: FloatArray) -> int:
-        return kernel(int(reference), packed, *x, part, scratch(plan))
-
-    _demand(in_blocks(compute, [base, q, v], out, threads), plan, [base, q, v], out)
+    program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
+    _run(core, plan, program, [q, v], reference, base, out, threads)
     return out
 
 
-def _demand(ordinary: bool, plan: Plan, inputs: Sequence[FloatArray], out: FloatArray) -> None:
+def _run(
+    core: Core,
+    plan: Plan,
+    program: Program,
+    inputs: Sequence[FloatArray],
+    reference: Reference,
+    base: FloatArray,
+    out: FloatArray,
+    threads: int | None,
+) -> None:
+    """Have a core fill `out` from q, and v, and a.
+
+    Raises:
+        NotFiniteError: an input is not finite.
+        RangeError: a result is not, although the inputs are.
+    """
+    moving = base is not STILL_STATE
+
+    def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
+        memory, task = scratch(program), np.zeros(len(Task), dtype=np.int64)
+        task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
+        task[Task.SCRATCH], task[Task.OUT] = memory.ctypes.data, part.ctypes.data
+        task[Task.REFERENCE], task[Task.N] = reference, len(part)
+        for place, x in zip((Task.BASE, Task.Q, Task.V, Task.A), parts, strict=False):
+            task[place] = x.ctypes.data
+        if moving:
+            task[Task.STRIDE] = 0 if len(parts[0]) == 1 else parts[0].shape[1]
+        else:
+            task[Task.BASE] = 0
+        return core(task.ctypes.data)
+
+    if in_blocks(compute, [base, *inputs], out, threads) or plan.is_large or _is_large(base):
+        _demand_finite([base, *inputs], out)
+
+
+def _is_large(base: FloatArray) -> bool:
+    return base is not STILL_STATE and not float(np.abs(base).max(initial=0.0)) < LARGE
+
+
+def _demand_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
     """Results that are finite, from inputs that are; where all is ordinary nothing needs to be looked at."""
-    base = inputs[0]
-    ordinary = ordinary and not plan.is_large
-    if ordinary and (base is STILL_STATE or float(np.abs(base).max(initial=0.0)) < LARGE):
-        return
     if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")
     finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from urdfkin.recursion import rows
 from urdfkin.rotation.aligning import axis_aligning
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree
 
@@ -33,40 +32,8 @@ class Step(IntEnum):
     """Columns of `Plan.steps` (whole numbers)."""
 
     KIND = 0
-    RESUME = 1
-    SAVE = 2
-    Q = 3
-    V = 4
-
-
-class Packed(IntEnum):
-    """Entries of `Plan.packed`: addresses of the plan's arrays, then their sizes, then rows of scratch.
-
-    Kernels for one configuration find more behind them: the address of their scratch array, the reference,
-    and how often they have computed a placement, velocity, acceleration and Jacobian.
-    """
-
-    STEPS = 0
-    GEOMETRY = 1
-    FRAMES = 2
-    OFFSETS = 3
-    COLUMNS = 4
-    MULTIPLIERS = 5
-    LEADERS = 6
-    SOURCES = 7
-    BLOCKS_Q = 8
-    BLOCKS_V = 9
-    STEP_COUNT = 10
-    FRAME_COUNT = 11
-    COLUMN_COUNT = 12
-    BLOCK_COUNT_Q = 13
-    BLOCK_COUNT_V = 14
-    NQ = 15
-    NV = 16
-    AREAS = 17
-    SCRATCH = 24
-    REFERENCE = 25
-    COUNTS = 26
+    Q = 1
+    V = 2
 
 
 class Motion(IntEnum):
@@ -79,7 +46,7 @@ class Motion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Columns of `Plan.geometry`: R (9), the offset in the new axes (3), then the mimic rule."""
+    """Columns of `Plan.geometry`: R (9), the offset in the axes before (3), then the mimic rule."""
 
     R = 0
     OFFSET = 9
@@ -94,11 +61,6 @@ class Column(IntEnum):
     AXIS = 1
     TURNS = 2
     V = 3
-
-
-#: Numbers in a row of `Plan.steps`, `geometry`, `offsets` and `columns`.
-STEP_WIDTH, GEOMETRY_WIDTH, OFFSET_WIDTH = len(Step), int(Geometry.CONSTANT) + 1, 12
-COLUMN_WIDTH = len(Column)
 
 
 _MOTION = {
@@ -126,10 +88,8 @@ class Plan:
         nq: Length of `q`.
         nv: Length of `v` and `a`.
         joints: The moving joint of each step, as an index into the tree's joints.
-        steps: (steps, 5) whole numbers, columns `Step`. RESUME is -1 to go on from the step before, else
-            the slot of saved state to go on from; SAVE is the slot to save this step's state in, or -1.
+        steps: (steps, 3) whole numbers, columns `Step`.
         geometry: (steps, 14), columns `Geometry`.
-        slots: How many slots of saved state the walk needs; slot 0 holds the base.
         frames: (frames, 2): the step after which a frame is met (-1: the base), and its place in the
             output; ordered by step.
         offsets: (frames, 12): rotation (9) and offset (3) from the step's frame to the frame, the offset
@@ -138,9 +98,7 @@ class Plan:
         multipliers: (columns,) the mimic multiplier of each column.
         leaders: (frames, columns): -1 where the column is not the frame's ancestor, else the column that
             it is added to: itself, but for followers.
-        sources: (frames, 6 * nv): for each number of a frame's Jacobian, the row of scratch that holds it.
-        blocks_q: Where the blocks of eight coordinates begin of which the walk needs at least one.
-        blocks_v: The same for rates.
+        places_q: Which coordinates the walk needs.
         parents: (steps,) the step that each step goes on from, -1 for the base.
         lengths: (steps + frames,) metres: the sum of the lengths of all URDF offsets, fixed joints' too,
             from a step's parent to it, then from a frame's step to the frame (in the order of `frames`).
@@ -153,15 +111,12 @@ class Plan:
     joints: tuple[int, ...]
     steps: IntArray
     geometry: FloatArray
-    slots: int
     frames: IntArray
     offsets: FloatArray
     columns: IntArray
     multipliers: FloatArray
     leaders: IntArray
-    sources: IntArray
-    blocks_q: IntArray
-    blocks_v: IntArray
+    places_q: tuple[int, ...]
     parents: IntArray
     lengths: FloatArray
     depth: IntArray
@@ -176,31 +131,15 @@ class Plan:
                 value.setflags(write=False)
 
     @cached_property
-    def areas(self) -> rows.Areas:
-        """Where the rows of scratch begin that depend on the plan."""
-        return rows.areas(self.nq, self.nv, self.slots, len(self.columns))
+    def programs(self) -> dict[object, Any]:
+        """What was made of the plan; `program.program_of` keeps it here."""
+        return {}
 
     @cached_property
     def is_large(self) -> bool:
         """Whether results may overflow although coordinates and rates are ordinary."""
         numbers = self.geometry, self.offsets, self.lengths
         return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
-
-    @cached_property
-    def packed(self) -> IntArray:
-        """Everything a kernel needs, as one array: handing over each array by itself costs more than a step.
-
-        It holds addresses, and is good while the plan lives.
-        """
-        arrays = (
-            self.steps, self.geometry, self.frames, self.offsets, self.columns, self.multipliers,
-            self.leaders, self.sources, self.blocks_q, self.blocks_v,
-        )  # fmt: skip
-        sizes = (
-            len(self.steps), len(self.frames), len(self.columns), len(self.blocks_q), len(self.blocks_v),
-            self.nq, self.nv,
-        )  # fmt: skip
-        return np.array([*(array.ctypes.data for array in arrays), *sizes, *self.areas], dtype=np.int64)
 
     def __reduce__(self) -> tuple[type[Plan], tuple[Any, ...]]:
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
@@ -223,11 +162,9 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
     anchors = _anchors(tree, step_of_joint, [link - 1 for link in depths if link])
     steps, geometry = _steps(tree, needed, anchors)
     parents = [anchors[tree.joints[i].parent].step for i in needed]
-    slots = _slots(steps, parents)
     columns, multipliers = _columns(steps, geometry)
     leaders = _leaders(columns, parents, [anchors[link].step for link in links])
     places = zip(steps[:, Step.Q].tolist(), needed, strict=True)
-    layout = rows.areas(tree.nq, tree.nv, slots, len(columns))
     order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)
     ends = [anchors[links[place]] for place in order]
     return Plan(
@@ -236,7 +173,6 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
         joints=tuple(needed),
         steps=steps,
         geometry=geometry,
-        slots=slots,
         frames=np.array(
             [[end.step, place] for end, place in zip(ends, order, strict=True)], dtype=np.int64
         ).reshape(-1, 2),
@@ -244,9 +180,7 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
         columns=columns,
         multipliers=multipliers,
         leaders=leaders[order],
-        sources=_sources(columns, leaders[order], layout.results, tree.nv),
-        blocks_q=_blocks(at + c for at, i in places for c in range(tree.joints[i].kind.nq)),
-        blocks_v=_blocks(columns[:, Column.V]),
+        places_q=tuple(at + c for at, i in places for c in range(tree.joints[i].kind.nq)),
         parents=np.array(parents, dtype=np.int64),
         lengths=np.array(
             [anchors[tree.joints[i].parent].length + _length(tree.joints[i]) for i in needed]
@@ -310,8 +244,8 @@ def turned(joint: Joint) -> FloatArray:
 
 
 def _flat(T: FloatArray) -> FloatArray:
-    """R row by row, then R^T p: the offset seen in the new axes."""
-    return np.concatenate((T[:3, :3].ravel(), T[:3, :3].T @ T[:3, 3]))
+    """R row by row, then the offset in the axes before."""
+    return np.concatenate((T[:3, :3].ravel(), T[:3, 3]))
 
 
 def _steps(
@@ -329,18 +263,6 @@ def _steps(
         rule = joint.mimic
         geometry[row, Geometry.MULTIPLIER :] = (1.0, 0.0) if rule is None else (rule.multiplier, rule.offset)
     return steps, geometry
-
-
-def _slots(steps: IntArray, parents: Sequence[int]) -> int:
-    """Fill RESUME and SAVE: a step whose parent is not the step before goes on from saved state."""
-    slot_of = {-1: 0}
-    for row, parent in enumerate(parents):
-        if parent != row - 1:
-            slot = slot_of.setdefault(parent, len(slot_of))
-            steps[row, Step.RESUME] = slot
-            if parent >= 0:
-                steps[parent, Step.SAVE] = slot
-    return len(slot_of)
 
 
 def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -367,15 +289,3 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
             if column[Column.STEP] in ancestors:
                 leaders[frame, c] = first.setdefault(column[Column.V], c)
     return leaders
-
-
-def _sources(columns: IntArray, leaders: IntArray, first: int, nv: int) -> IntArray:
-    sources = np.full((len(leaders), 6, nv), rows.ZERO, dtype=np.int64)
-    for frame, c in zip(*np.nonzero(leaders == np.arange(len(columns))), strict=True):
-        sources[frame, :, columns[c, Column.V]] = first + rows.COLUMN_ROWS * c + np.arange(6)
-    return sources.reshape(len(leaders), 6 * nv)
-
-
-def _blocks(places: Iterable[int]) -> IntArray:
-    """Where the blocks of eight begin that hold any of the places."""
-    return np.array(sorted({int(place) // 8 * 8 for place in places}), dtype=np.int64)

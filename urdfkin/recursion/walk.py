@@ -1,202 +1,368 @@
-"""What every walk shares: its inputs, initial conditions, going on from saved state, frames fixed to a link.
+"""The walk from the base outwards: section 7.7's recursion, link by link, for a block of configurations.
 
-Each kernel works through a batch in whole blocks of `LANES` configurations; `batch` cuts and fills them. The
-same walk takes a single configuration, one lane wide: the number of lanes `m` is a constant in both.
+The state of a link is the rotation R and the origin p of its frame in the world's axes, and, in the link's
+own axes, its angular velocity w, its origin's velocity vel, its angular acceleration alpha and its origin's
+acceleration acc. In its own axes z is (0, 0, 1) and the interorigin vector a constant: fewer operations
+than in the world's, and smaller errors. The equations are those of `urdfkin.kinematics.equations`.
 
-`0 * b` is 0 to the compiler but not a literal to Numba, which would compile what it is handed to once more.
+What an output does not follow is nothing (`numbers.nothing`), and what is computed from it costs nothing.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-from urdfkin.recursion.base import STILL_STATE
-from urdfkin.recursion.lanes import (
+from urdfkin.recursion import compiled_equations as eq
+from urdfkin.recursion.compiling import compiled
+from urdfkin.recursion.memory import fetch, ordinary, read_rows
+from urdfkin.recursion.numbers import one, rounded, zero
+from urdfkin.recursion.program import ANGLE_ROW, ANGLE_WIDTH, ONE_ROW, STATE_ROWS, WIDTH, ZERO_ROW, Head, Op
+from urdfkin.recursion.registers import (
     LANES,
-    copy_rows,
-    jitted,
-    lane_function,
+    constant,
+    number,
+    number_if,
     numbers_at,
-    pointer_to,
+    put,
+    same,
     whole_numbers_at,
 )
-from urdfkin.recursion.plan import LARGE, OFFSET_WIDTH, STEP_WIDTH, Packed, Step
-from urdfkin.recursion.rows import FRAME, ONE, STATE_ROWS, ZERO
-from urdfkin.recursion.steps import carry, interorigin, turn_by_constant
-from urdfkin.recursion.transposing import fetch_inputs, read_rows
+from urdfkin.recursion.sine import sine_cosine
+from urdfkin.recursion.task import Task
 
 # Enumerations are Python's; compiled code takes plain numbers.
-_STEPS, _GEOMETRY, _FRAMES = int(Packed.STEPS), int(Packed.GEOMETRY), int(Packed.FRAMES)
-_OFFSETS, _COLUMNS, _MULTIPLIERS = int(Packed.OFFSETS), int(Packed.COLUMNS), int(Packed.MULTIPLIERS)
-_LEADERS, _SOURCES = int(Packed.LEADERS), int(Packed.SOURCES)
-_BLOCKS_Q, _BLOCKS_V = int(Packed.BLOCKS_Q), int(Packed.BLOCKS_V)
-_SIZES, _AREAS = int(Packed.STEP_COUNT), int(Packed.AREAS)
-_SCRATCH, _COUNTS = int(Packed.SCRATCH), int(Packed.COUNTS)
-REFERENCE = int(Packed.REFERENCE)
-_RESUME, _SAVE = int(Step.RESUME), int(Step.SAVE)
+_PROGRAM, _CONSTANTS, _SCRATCH, _OUT = map(int, (Task.PROGRAM, Task.CONSTANTS, Task.SCRATCH, Task.OUT))
+_N, _Q, _V, _A, _BASE, _STRIDE = map(int, (Task.N, Task.Q, Task.V, Task.A, Task.BASE, Task.STRIDE))
+_REFERENCE = int(Task.REFERENCE)
+_CODE, _NQ, _NV, _ROW_Q, _ROW_V, _ROW_A, _ROW_BASE = map(
+    int, (Head.CODE, Head.NQ, Head.NV, Head.Q, Head.V, Head.A, Head.BASE)
+)
+_BLOCKS_Q, _BLOCKS_V, _BLOCKS_END = int(Head.BLOCKS_Q), int(Head.BLOCKS_V), int(Head.BLOCKS_END)
+_ANGLES, _ANGLES_END = int(Head.ANGLES), int(Head.ANGLES_END)
+_END, _CARRY_X, _CARRY_Y, _CARRY_Z, _CARRY = map(int, (Op.END, Op.CARRY_X, Op.CARRY_Y, Op.CARRY_Z, Op.CARRY))
+_TURN_X, _TURN_Y, _TURN_Z, _TURN = map(int, (Op.TURN_X, Op.TURN_Y, Op.TURN_Z, Op.TURN))
+_REVOLUTE, _PRISMATIC, _PLANAR, _FLOATING = map(int, (Op.REVOLUTE, Op.PRISMATIC, Op.PLANAR, Op.FLOATING))
+_SAVE, _RESUME, _KEEP, _COLUMN = map(int, (Op.SAVE, Op.RESUME, Op.KEEP, Op.COLUMN))
 
-_STILL = STILL_STATE[0].copy()
-
-
-class Walk(NamedTuple):
-    """A plan in a kernel: where its arrays lie, their sizes, and the first row of each area of scratch."""
-
-    steps: Any
-    geometry: Any
-    frames: Any
-    offsets: Any
-    columns: Any
-    multipliers: Any
-    leaders: Any
-    sources: Any
-    blocks_q: Any
-    blocks_v: Any
-    step_count: int
-    frame_count: int
-    column_count: int
-    block_count_q: int
-    block_count_v: int
-    nq: int
-    nv: int
-    q: int
-    v: int
-    a: int
-    slots: int
-    kept: int
-    results: int
+# -- a link and the next ------------------------------------------------------------------------------
 
 
-@lane_function
-def walk_of(packed):
-    """The plan that `Plan.packed` was made from."""
-    return Walk(
-        whole_numbers_at(packed[_STEPS]),
-        numbers_at(packed[_GEOMETRY]),
-        whole_numbers_at(packed[_FRAMES]),
-        numbers_at(packed[_OFFSETS]),
-        whole_numbers_at(packed[_COLUMNS]),
-        numbers_at(packed[_MULTIPLIERS]),
-        whole_numbers_at(packed[_LEADERS]),
-        whole_numbers_at(packed[_SOURCES]),
-        whole_numbers_at(packed[_BLOCKS_Q]),
-        whole_numbers_at(packed[_BLOCKS_V]),
-        packed[_SIZES],
-        packed[_SIZES + 1],
-        packed[_SIZES + 2],
-        packed[_SIZES + 3],
-        packed[_SIZES + 4],
-        packed[_SIZES + 5],
-        packed[_SIZES + 6],
-        packed[_AREAS],
-        packed[_AREAS + 1],
-        packed[_AREAS + 2],
-        packed[_AREAS + 3],
-        packed[_AREAS + 4],
-        packed[_AREAS + 5],
+@compiled
+def carried(state, d):
+    """Along the rigid link, by d in its axes: 7.58, 7.128, 7.130."""
+    R, p, w, vel, alpha, acc = state
+    return (
+        R,
+        eq.point_position(p, R, d),
+        w,
+        eq.point_velocity(vel, w, d),
+        alpha,
+        eq.point_acceleration(acc, alpha, w, d),
     )
 
 
-@lane_function
-def read_input(m, s, x, b, width, blocks, count, row):
-    """The numbers that the walk needs of `m` rows of x (n, width), from row `b` on, into rows of lanes."""
-    for block in range(count):
-        at = blocks[block]
+@compiled
+def turned(state, S):
+    """Into the axes of a frame that is turned by S: the same motion, seen from there."""
+    R, p, w, vel, alpha, acc = state
+    back = eq.transposed(S)
+    return (
+        eq.product(R, S),
+        p,
+        eq.rotate(back, w),
+        eq.rotate(back, vel),
+        eq.rotate(back, alpha),
+        eq.rotate(back, acc),
+    )
+
+
+@compiled
+def _turned_about_z(state, s, row):
+    """By a joint's angle (7.5), whose sine and cosine stand in a row and the one after it."""
+    return turned(state, eq.about_z(number(s, row), number(s, row + 1), zero(), one()))
+
+
+@compiled
+def revolute(state, s, row, v, a):
+    """7.129, then 7.127, then the turn itself."""
+    R, p, w, vel, alpha, acc = state
+    z = (zero(), zero(), one())
+    alpha = eq.angular_acceleration(alpha, w, z, v, a)
+    return _turned_about_z((R, p, eq.angular_velocity(w, z, v), vel, alpha, acc), s, row)
+
+
+@compiled
+def prismatic(state, slide, v, a):
+    """The slide is a part of the interorigin vector (7.64); then 7.130 and 7.128."""
+    R, p, w, vel, alpha, acc = carried(state, (zero(), zero(), slide))
+    z = (zero(), zero(), one())
+    return R, p, w, eq.sliding_velocity(vel, z, v), alpha, eq.sliding_acceleration(acc, w, z, v, a)
+
+
+@compiled
+def free(state, o, u, o_rate, u_rate):
+    """A planar or floating joint that has been carried and turned: its rates are in the moved axes."""
+    R, p, w, vel, alpha, acc = state
+    return (
+        R,
+        p,
+        eq.plus(w, o),
+        eq.plus(vel, u),
+        eq.free_angular_acceleration(alpha, w, o, o_rate),
+        eq.free_acceleration(acc, w, o, u, u_rate),
+    )
+
+
+@compiled
+def _coordinate(s, row, g, c, follows):
+    """A joint's coordinate. A follower's is rounded as Pinocchio's is, in two steps."""
+    x = number(s, row)
+    if follows:
+        x = rounded(constant(g, c) * x) + constant(g, c + 1)
+    return x
+
+
+@compiled
+def _rate(wanted, s, row, g, c, follows):
+    x = number_if(wanted, s, row)
+    if follows:
+        x = rounded(constant(g, c) * x)
+    return x
+
+
+@compiled
+def _vector_if(wanted, s, row):
+    """Three numbers in rows that follow on one another; nothing where `wanted` is nothing."""
+    return number_if(wanted[0], s, row), number_if(wanted[1], s, row + 1), number_if(wanted[2], s, row + 2)
+
+
+@compiled
+def _planar(state, s, q, row, v, a):
+    """Slides along x and y and turns about z."""
+    state = carried(state, (number(s, q), number(s, q + 1), zero()))
+    state = _turned_about_z(state, s, row)
+    w, alpha = state[2][0], state[4][0]
+    o, u = (zero(), zero(), number_if(w, s, v + 2)), (number_if(w, s, v), number_if(w, s, v + 1), zero())
+    o_rate = zero(), zero(), number_if(alpha, s, a + 2)
+    return free(state, o, u, o_rate, (number_if(alpha, s, a), number_if(alpha, s, a + 1), zero()))
+
+
+@compiled
+def _floating(state, s, q, v, a):
+    """Slides along and turns about all three axes."""
+    state = carried(state, (number(s, q), number(s, q + 1), number(s, q + 2)))
+    x, y, z, w = number(s, q + 3), number(s, q + 4), number(s, q + 5), number(s, q + 6)
+    state = turned(state, eq.rotation_of_quaternion(x, y, z, w))
+    w, alpha = state[2], state[4]
+    u, o = _vector_if(w, s, v), _vector_if(w, s, v + 3)
+    return free(state, o, u, _vector_if(alpha, s, a + 3), _vector_if(alpha, s, a))
+
+
+# -- constants -----------------------------------------------------------------------------------------
+
+
+@compiled
+def _vector(g, i):
+    return constant(g, i), constant(g, i + 1), constant(g, i + 2)
+
+
+@compiled
+def _rotation(g, i):
+    return _vector(g, i), _vector(g, i + 3), _vector(g, i + 6)
+
+
+# -- states in scratch ---------------------------------------------------------------------------------
+
+
+@compiled
+def put_vector(s, row, x):
+    """Write a vector to three rows."""
+    put(s, row, x[0])
+    put(s, row + 1, x[1])
+    put(s, row + 2, x[2])
+
+
+@compiled
+def vector(s, row):
+    """The vector in three rows."""
+    return number(s, row), number(s, row + 1), number(s, row + 2)
+
+
+@compiled
+def _save(s, row, state):
+    R, p, w, vel, alpha, acc = state
+    put_vector(s, row, R[0])
+    put_vector(s, row + 3, R[1])
+    put_vector(s, row + 6, R[2])
+    put_vector(s, row + 9, p)
+    put_vector(s, row + 12, w)
+    put_vector(s, row + 15, vel)
+    put_vector(s, row + 18, alpha)
+    put_vector(s, row + 21, acc)
+
+
+@compiled
+def _resumed(s, row, state):
+    """The state that was saved, as far as this walk follows it."""
+    R, p, w, vel, alpha, acc = state
+    return (
+        (_vector_if(R[0], s, row), _vector_if(R[1], s, row + 3), _vector_if(R[2], s, row + 6)),
+        _vector_if(p, s, row + 9),
+        _vector_if(w, s, row + 12),
+        _vector_if(vel, s, row + 15),
+        _vector_if(alpha, s, row + 18),
+        _vector_if(acc, s, row + 21),
+    )
+
+
+# -- inputs --------------------------------------------------------------------------------------------
+
+
+@compiled
+def _read(m, x, b, width, blocks, begin, end, s, row):
+    """The blocks of eight numbers that the walk needs of rows `b` to `b + m` of x."""
+    for i in range(begin, end):
+        at = blocks[i]
         wide = width - at
         read_rows(m, x, b * width + at, width, 8 if wide > 8 else wide, s, row + at)
-    fetch_inputs(m, x, (b + m) * width, m * width)
+    fetch(x, (b + m) * width, m * width)
 
 
-@lane_function
-def read_inputs(m, s, plan, b, q, v, a, order):
-    """Coordinates, and the rates that motion of this order takes."""
-    read_input(m, s, q, b, plan.nq, plan.blocks_q, plan.block_count_q, plan.q)
-    if order >= 1:
-        read_input(m, s, v, b, plan.nv, plan.blocks_v, plan.block_count_v, plan.v)
-    if order >= 2:
-        read_input(m, s, a, b, plan.nv, plan.blocks_v, plan.block_count_v, plan.a)
+@compiled
+def _start(m, s, task, row, b):
+    """The initial conditions: the state of the base (the text's frame -1 to frame 0)."""
+    nil, unit = same(0.0), same(1.0)
+    R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
+    p = w = vel = alpha = acc = nil, nil, nil
+    if task[_BASE] != 0:
+        base, stride = numbers_at(task[_BASE]), task[_STRIDE]
+        read_rows(m if stride else 1, base, b * stride, stride, STATE_ROWS, s, row)
+        R, p = (vector(s, row), vector(s, row + 3), vector(s, row + 6)), vector(s, row + 9)
+        back = eq.transposed(R)
+        w, vel = eq.rotate(back, vector(s, row + 12)), eq.rotate(back, vector(s, row + 15))
+        alpha, acc = eq.rotate(back, vector(s, row + 18)), eq.rotate(back, vector(s, row + 21))
+    return R, p, w, vel, alpha, acc
 
 
-@lane_function
-def rows_of(order):
-    """How much of the state motion of this order has."""
-    return 12 if order == 0 else (18 if order == 1 else 24)
+@compiled
+def _sines_and_cosines(s, program, g):
+    """Of every angle that the walk turns by, before it begins: the walk's state fills the registers."""
+    for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
+        angle = _coordinate(s, program[i], g, program[i + 2], program[i + 3])
+        sine, cosine = sine_cosine(s, ANGLE_ROW, angle)
+        put(s, program[i + 1], sine)
+        put(s, program[i + 1] + 1, cosine)
 
 
-@lane_function
-def start(m, s, plan, b, base, stride, order):
-    """The initial conditions: the state of the base (the text's frame -1 to frame 0), rows `stride` apart."""
-    rows = rows_of(order)
-    for r in range(rows):
-        if stride == 0:  # one number for all lanes
-            number = base[r]
-            for k in range(m):
-                s[r * LANES + k] = number
-        else:
-            for k in range(m):
-                s[r * LANES + k] = base[(b + k) * stride + r]
-    for k in range(m):
-        s[ZERO * LANES + k] = 0.0
-        s[ONE * LANES + k] = 1.0
-    copy_rows(m, s, 0, plan.slots, rows)
+# -- the walk ------------------------------------------------------------------------------------------
 
 
-@lane_function
-def scratch_of(packed):
-    """The scratch array of a kernel for one configuration."""
-    return numbers_at(packed[_SCRATCH])
+@compiled
+def _along_link(op, state, g, c):
+    """Carried or turned by what is constant."""
+    if op == _CARRY_X:
+        state = carried(state, (constant(g, c), zero(), zero()))
+    elif op == _CARRY_Y:
+        state = carried(state, (zero(), constant(g, c + 1), zero()))
+    elif op == _CARRY_Z:
+        state = carried(state, (zero(), zero(), constant(g, c + 2)))
+    elif op == _CARRY:
+        state = carried(state, _vector(g, c))
+    elif op == _TURN_X:
+        state = turned(state, eq.about_x(constant(g, c + 7), constant(g, c + 4), zero(), one()))
+    elif op == _TURN_Y:
+        state = turned(state, eq.about_y(constant(g, c + 2), constant(g, c), zero(), one()))
+    elif op == _TURN_Z:
+        state = turned(state, eq.about_z(constant(g, c + 3), constant(g, c), zero(), one()))
+    else:
+        state = turned(state, _rotation(g, c))
+    return state
 
 
-@lane_function
-def counted(packed, which, good):
-    """What a kernel for one configuration answers; it counts what it has computed."""
-    packed[_COUNTS + which] += good
+@compiled
+def _over_joint(op, state, s, x, v, a, z, g, c):
+    """Over a joint; x, z and c are its operands, v and a the rows of its rates."""
+    if op == _REVOLUTE:
+        rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
+        state = revolute(state, s, x, rate, rate_2)
+    elif op == _PRISMATIC:
+        rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
+        state = prismatic(state, _coordinate(s, x, g, c, z), rate, rate_2)
+    elif op == _PLANAR:
+        state = _planar(state, s, x, z, v, a)
+    else:
+        state = _floating(state, s, x, v, a)
+    return state
+
+
+@compiled
+def _read_inputs(m, task, program, s, b, orders):
+    """Coordinates, and as many of their rates as are wanted."""
+    nq, nv, edge = program[_NQ], program[_NV], program[_BLOCKS_V]
+    _read(m, numbers_at(task[_Q]), b, nq, program, program[_BLOCKS_Q], edge, s, program[_ROW_Q])
+    if orders > 1:
+        _read(m, numbers_at(task[_V]), b, nv, program, edge, program[_BLOCKS_END], s, program[_ROW_V])
+    if orders > 2:
+        _read(m, numbers_at(task[_A]), b, nv, program, edge, program[_BLOCKS_END], s, program[_ROW_A])
+
+
+@compiled
+def _ordinary(m, task, program, b, orders):
+    """Whether all inputs of a block are, those that the walk does not need as well."""
+    nq, nv = program[_NQ], program[_NV]
+    good = ordinary(numbers_at(task[_Q]), b * nq, m * nq)
+    if orders > 1:
+        good = good and ordinary(numbers_at(task[_V]), b * nv, m * nv)
+    if orders > 2:
+        good = good and ordinary(numbers_at(task[_A]), b * nv, m * nv)
     return good
 
 
-@lane_function
-def still_base():
-    """The state of a base that stands still at the world's origin."""
-    return pointer_to(_STILL)
+@compiled
+def _block(m, task, program, g, s, b, reference, orders, follow, keep, column, emit):
+    """The walk for `m` configurations from `b` on."""
+    _read_inputs(m, task, program, s, b, orders)
+    _sines_and_cosines(s, program, g)
+    state = follow(_start(m, s, task, program[_ROW_BASE], b))
+    at, to = program[_CODE], numbers_at(task[_OUT])
+    while program[at] != _END:
+        op, x, y, z, c = program[at], program[at + 1], program[at + 2], program[at + 3], program[at + 4]
+        at += WIDTH
+        if op <= _TURN:
+            state = _along_link(op, state, g, c)
+        elif op <= _FLOATING:
+            state = _over_joint(op, state, s, x, program[_ROW_V] + y, program[_ROW_A] + y, z, g, c)
+        elif op == _SAVE:
+            _save(s, x, state)
+        elif op == _RESUME:
+            state = _resumed(s, x, state)
+        elif op == _KEEP:
+            keep(s, x, y, state)
+        elif op == _COLUMN:
+            column(s, x, y, z, g, c, reference, state)
+        else:
+            emit(m, s, program, x, y, b, reference, state, to)
 
 
-@lane_function
-def stride_of(base):
-    """From the base's state in one configuration to that in the next; 0 where it is the same for all."""
-    return 0 if base.shape[0] == 1 else base.shape[1]
+@compiled
+def walk(address, orders, follow, keep, column, emit):
+    """Carry out a program for every block of configurations; 0, or 1 where an input is not ordinary.
 
-
-@lane_function
-def resume(m, s, plan, i, rows):
-    """Go on from saved state where the plan says so."""
-    if plan.steps[STEP_WIDTH * i + _RESUME] >= 0:
-        copy_rows(m, s, plan.slots + STATE_ROWS * plan.steps[STEP_WIDTH * i + _RESUME], 0, rows)
-
-
-@lane_function
-def save(m, s, plan, i, rows):
-    """Save the state where a later step goes on from it."""
-    if plan.steps[STEP_WIDTH * i + _SAVE] >= 0:
-        copy_rows(m, s, 0, plan.slots + STATE_ROWS * plan.steps[STEP_WIDTH * i + _SAVE], rows)
-
-
-@lane_function
-def frame_state(m, s, plan, f, order, turned):
-    """The state of a frame that is fixed to the present link; its rotation only where it is `turned`."""
-    copy_rows(m, s, 0, FRAME, rows_of(order))
-    at = OFFSET_WIDTH * f
-    interorigin(m, s, plan.offsets, at)
-    carry(m, s, FRAME, order)
-    if turned:
-        turn_by_constant(m, s, FRAME, plan.offsets, at)
-
-
-@jitted(forceinline=True, fastmath={"reassoc"})
-def ordinary(x, at, count):
-    """Whether `count` numbers are: none that is no number or infinite, and their sizes no more than `LARGE`.
-
-    The order of this sum is left to the compiler.
+    Args:
+        address: Of a task.
+        orders: How many of q, v, a are read.
+        follow: Makes nothing of what the output does not need of a state.
+        keep: Keeps what a column needs of its joint.
+        column: Computes a column.
+        emit: Hands out a frame's result.
     """
-    total = 0.0
-    for i in range(count):
-        total += abs(x[at + i])
-    return total < LARGE
+    task = whole_numbers_at(address)
+    program, g, s = whole_numbers_at(task[_PROGRAM]), numbers_at(task[_CONSTANTS]), numbers_at(task[_SCRATCH])
+    put(s, ZERO_ROW, zero())
+    put(s, ONE_ROW, one())
+    n = task[_N]
+    m = LANES if n >= LANES else 1
+    good = True
+    for first in range(0, n, m):
+        b = min(first, n - m)  # the last block reaches back into the one before
+        _block(m, task, program, g, s, b, task[_REFERENCE], orders, follow, keep, column, emit)
+        good &= _ordinary(m, task, program, b, orders)
+    return 0 if good else 1

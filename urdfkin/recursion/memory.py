@@ -1,6 +1,6 @@
-"""From memory to lanes and back: eight configurations at a time, eight numbers at a time.
+"""From memory to rows of scratch and back: eight configurations at a time, eight numbers at a time.
 
-In memory the numbers of one configuration lie together; in lanes those of one row do, one for each
+In memory the numbers of one configuration lie together; in scratch those of one row do, one for each
 configuration. Going from one to the other is a transposition. Number by number it took a third of the time
 of a Jacobian; in blocks of eight by eight it is a few shuffles. What is left of a width that eight does not
 divide goes in blocks of four, two and one.
@@ -15,10 +15,10 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from urdfkin.recursion.lanes import LANES, lane_function
+from urdfkin.recursion.compiling import compiled, helper
+from urdfkin.recursion.plan import LARGE
+from urdfkin.recursion.registers import LANES, put, same
 
-#: Lanes and numbers of a full block.
-_EIGHT = 8
 #: Numbers in half of a first-level cache.
 _MOST_FETCHED = 3072
 _NUMBERS = types.CPointer(types.float64)
@@ -48,9 +48,9 @@ def _transposed(builder: Any, vectors: Sequence[Any]) -> list[Any]:
     while w < len(x):
         for i in range(len(x)):
             if not i & w:
-                first = [_EIGHT + j - w if j & w else j for j in range(_EIGHT)]
-                second = [_EIGHT + j if j & w else j + w for j in range(_EIGHT)]
-                masks = (ir.Constant(ir.VectorType(ir.IntType(32), _EIGHT), m) for m in (first, second))
+                first = [LANES + j - w if j & w else j for j in range(LANES)]
+                second = [LANES + j if j & w else j + w for j in range(LANES)]
+                masks = (ir.Constant(ir.VectorType(ir.IntType(32), LANES), m) for m in (first, second))
                 x[i], x[i + w] = (builder.shuffle_vector(x[i], x[i + w], mask) for mask in masks)
         w *= 2
     return x
@@ -69,21 +69,21 @@ def _reading(width: int) -> Any:
     """A block of eight configurations, `width` numbers of each, into rows."""
 
     @intrinsic
-    def read(context: Any, x: Any, at: Any, stride: Any, s: Any, row: Any, half: Any) -> Any:
+    def read(context: Any, x: Any, at: Any, stride: Any, s: Any, row: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            x, at, stride, s, row, half = arguments
+            x, at, stride, s, row = arguments
             pieces = []
-            for _ in range(_EIGHT):
+            for _ in range(LANES):
                 pieces.append(builder.load(_vector_at(builder, x, at, width), align=8))
                 at = builder.add(at, stride)
             rows = _transposed(builder, [_joined(builder, pieces[i::width]) for i in range(width)])
-            to = builder.add(builder.mul(row, ir.Constant(row.type, LANES)), half)
+            to = builder.mul(row, ir.Constant(row.type, LANES))
             for i, vector in enumerate(rows):
-                place = _vector_at(builder, s, _plus(builder, to, LANES * i), _EIGHT)
-                builder.store(vector, place, align=8)
+                place = _vector_at(builder, s, _plus(builder, to, LANES * i), LANES)
+                builder.store(vector, place, align=64)
             return context.get_dummy_value()
 
-        return types.void(_NUMBERS, *[types.intp] * 2, _NUMBERS, *[types.intp] * 2), generate
+        return types.void(_NUMBERS, *[types.intp] * 2, _NUMBERS, types.intp), generate
 
     return read
 
@@ -92,23 +92,23 @@ def _writing(width: int) -> Any:
     """`width` rows, wherever they are, into the memory of eight configurations."""
 
     @intrinsic
-    def write(context: Any, s: Any, rows: Any, first: Any, half: Any, to: Any, at: Any, stride: Any) -> Any:
+    def write(context: Any, s: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            s, rows, first, half, to, at, stride = arguments
+            s, rows, first, to, at, stride = arguments
             vectors = []
             for i in range(width):
                 row = builder.load(builder.gep(rows, [_plus(builder, first, i)]))
-                begin = builder.add(builder.mul(row, ir.Constant(row.type, LANES)), half)
-                vectors.append(builder.load(_vector_at(builder, s, begin, _EIGHT), align=8))
+                begin = builder.mul(row, ir.Constant(row.type, LANES))
+                vectors.append(builder.load(_vector_at(builder, s, begin, LANES), align=64))
             blocks = _transposed(builder, vectors)
-            for k in range(_EIGHT):
+            for k in range(LANES):
                 numbers = _piece(builder, blocks[k % width], k // width * width, width)
                 builder.store(numbers, _vector_at(builder, to, at, width), align=8)
                 at = builder.add(at, stride)
             return context.get_dummy_value()
 
         whole = types.CPointer(types.int64)
-        return types.void(_NUMBERS, whole, *[types.intp] * 2, _NUMBERS, *[types.intp] * 2), generate
+        return types.void(_NUMBERS, whole, types.intp, _NUMBERS, *[types.intp] * 2), generate
 
     return write
 
@@ -117,48 +117,61 @@ _read_8, _read_4, _read_2, _read_1 = map(_reading, (8, 4, 2, 1))
 _write_8, _write_4, _write_2, _write_1 = map(_writing, (8, 4, 2, 1))
 
 
-@lane_function
+@compiled
 def read_rows(m, x, at, stride, count, s, row):
-    """`count` numbers, from `x[at]` on, of each of `m` configurations `stride` apart, into rows."""
+    """`count` numbers, from `x[at]` on, of each of eight configurations `stride` apart, into rows.
+
+    Where `m` is 1, those of one configuration, which then stands in all lanes.
+    """
+    i = 0
     if m == 1:
         for i in range(count):
-            s[(row + i) * LANES] = x[at + i]
-        return
-    for half in range(0, LANES, _EIGHT):
-        here, i = at + half * stride, 0
+            put(s, row + i, same(x[at + i]))
+    else:
         while i + 8 <= count:
-            _read_8(x, here + i, stride, s, row + i, half)
+            _read_8(x, at + i, stride, s, row + i)
             i += 8
         if count & 4:
-            _read_4(x, here + i, stride, s, row + i, half)
+            _read_4(x, at + i, stride, s, row + i)
             i += 4
         if count & 2:
-            _read_2(x, here + i, stride, s, row + i, half)
+            _read_2(x, at + i, stride, s, row + i)
             i += 2
         if count & 1:
-            _read_1(x, here + i, stride, s, row + i, half)
+            _read_1(x, at + i, stride, s, row + i)
 
 
-@lane_function
+@compiled
 def write_rows(m, s, rows, first, count, to, at, stride):
-    """Rows `rows[first]`, ... as `count` numbers, from `to[at]` on, of each of `m` configurations."""
+    """Rows `rows[first]`, ... as `count` numbers, from `to[at]` on, of eight configurations, or of one."""
+    i = 0
     if m == 1:
         for i in range(count):
             to[at + i] = s[rows[first + i] * LANES]
-        return
-    for half in range(0, LANES, _EIGHT):
-        here, i = at + half * stride, 0
+    else:
         while i + 8 <= count:
-            _write_8(s, rows, first + i, half, to, here + i, stride)
+            _write_8(s, rows, first + i, to, at + i, stride)
             i += 8
         if count & 4:
-            _write_4(s, rows, first + i, half, to, here + i, stride)
+            _write_4(s, rows, first + i, to, at + i, stride)
             i += 4
         if count & 2:
-            _write_2(s, rows, first + i, half, to, here + i, stride)
+            _write_2(s, rows, first + i, to, at + i, stride)
             i += 2
         if count & 1:
-            _write_1(s, rows, first + i, half, to, here + i, stride)
+            _write_1(s, rows, first + i, to, at + i, stride)
+
+
+@helper(fastmath={"reassoc"})
+def ordinary(x, at, count):
+    """Whether `count` numbers are: none that is no number or infinite, and their sizes no more than `LARGE`.
+
+    The order of this sum is left to the compiler.
+    """
+    total = 0.0
+    for i in range(count):
+        total += abs(x[at + i])
+    return total < LARGE
 
 
 def _fetching(to_write: int) -> Any:
@@ -183,22 +196,20 @@ def _fetching(to_write: int) -> Any:
 _fetch_to_read, _fetch_to_write = map(_fetching, (0, 1))
 
 
-@lane_function
-def fetch_inputs(m, x, at, count):
+@compiled
+def fetch(x, at, count):
     """Ask for the `count` numbers from `x[at]` on: the next block's inputs, while this one is computed."""
-    if m > 1 and count <= _MOST_FETCHED:
-        for number in range(at, at + count, _EIGHT):
+    if count <= _MOST_FETCHED:
+        for number in range(at, at + count, LANES):
             _fetch_to_read(x, number)
 
 
-@lane_function
-def fetch_output(m, i, of, to, at, count):
-    """Ask for share `i` of `of` of the `count` numbers from `to[at]` on, which a block will write.
+@compiled
+def fetch_to_write(x, at, count):
+    """Ask for what a block will write.
 
     A block's output is scattered over more cache lines than the processor fetches at a time. Asked for while
-    the walk goes on, they are there when it writes. What is too large for the cache is left alone.
+    the walk goes on, they are there when it writes.
     """
-    if m > 1 and count <= _MOST_FETCHED:
-        share = count // of + 1
-        for number in range(i * share, (i + 1) * share, _EIGHT):
-            _fetch_to_write(to, at + number)
+    for number in range(at, at + count, LANES):
+        _fetch_to_write(x, number)

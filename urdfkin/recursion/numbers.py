@@ -1,0 +1,317 @@
+"""Numbers for compiled code: one or several doubles that are computed with as if they were one.
+
+`Lanes(8)` is eight doubles in one vector register, `Lanes(1)` is one: each a Numba type over LLVM's vectors,
+so that a number lives in a register from one equation to the next. A product is kept as its two factors
+until it meets a sum: x y + z is then one fused multiply-add, rounded once. The fusing is said here and left
+to nobody, so that results are the same bits for one lane and for eight, whatever the machine.
+
+`zero()` and `one()` are numbers that are known before anything runs: what is multiplied by them, or added
+to zero, costs nothing. With z = (0, 0, 1) so written, the equations of any axis become those of the axis z,
+and a turn about x leaves x alone. `nothing()` is a number that nobody asks for: what is computed from it is
+nothing either, and costs as much.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.imputils import lower_cast
+from numba.core.typeconv.castgraph import Conversion
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
+
+_DOUBLE = ir.DoubleType()
+
+
+class Lanes(types.Type):
+    """Doubles side by side."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Lanes({width})")
+
+    def can_convert_from(self, context: Any, other: Any) -> Any:
+        """A product can stand wherever a number can."""
+        return Conversion.safe if isinstance(other, Product) and other.width == self.width else None
+
+    def unify(self, context: Any, other: Any) -> Any:
+        """A number and a product are a number."""
+        return self if isinstance(other, Product) and other.width == self.width else None
+
+
+class Product(types.Type):
+    """Two numbers that are yet to be multiplied."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Product({width})")
+
+    def unify(self, context: Any, other: Any) -> Any:
+        """A number and a product are a number."""
+        return other if isinstance(other, Lanes) and other.width == self.width else None
+
+
+class Known(types.Type):
+    """0 or 1, known when a kernel is compiled; None for what nobody asks for."""
+
+    def __init__(self, value: int | None) -> None:
+        self.value = value
+        super().__init__(name=f"Known({value})")
+
+
+ZERO, ONE, NOTHING = Known(0), Known(1), Known(None)
+
+
+@register_model(Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, dmm: Any, fe_type: Any) -> None:
+        super().__init__(dmm, fe_type, ir.VectorType(_DOUBLE, fe_type.width))
+
+
+@register_model(Product)
+class _ProductModel(models.StructModel):
+    def __init__(self, dmm: Any, fe_type: Any) -> None:
+        number = Lanes(fe_type.width)
+        super().__init__(dmm, fe_type, [("x", number), ("y", number)])
+
+
+@register_model(Known)
+class _KnownModel(models.OpaqueModel):
+    pass
+
+
+# -- arithmetic: what an operation gives, and how ---------------------------------------------------
+
+
+class _Value:
+    """A number on its way through the compiler: its type, and what LLVM knows it by."""
+
+    def __init__(self, context: Any, builder: Any, type_: Any, value: Any) -> None:
+        self.context, self.builder, self.type = context, builder, type_
+        self.value = value
+
+    @property
+    def is_product(self) -> bool:
+        return isinstance(self.type, Product)
+
+    def factors(self) -> tuple[Any, Any]:
+        pair = cgutils.create_struct_proxy(self.type)(self.context, self.builder, value=self.value)
+        return pair.x, pair.y
+
+    def number(self, width: int) -> Any:
+        """The number itself as a vector; a product is multiplied and rounded."""
+        if self.is_product:
+            return self.builder.fmul(*self.factors())
+        if isinstance(self.type, Known):
+            return ir.Constant(ir.VectorType(_DOUBLE, width), [float(self.type.value or 0)] * width)
+        if isinstance(self.type, types.Integer):
+            return in_all_lanes(self.builder, self.builder.sitofp(self.value, _DOUBLE), width)
+        return self.value
+
+
+def in_all_lanes(builder: Any, double: Any, width: int) -> Any:
+    """One double in every lane."""
+    empty = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
+    first = builder.insert_element(empty, double, ir.Constant(ir.IntType(32), 0))
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
+    return builder.shuffle_vector(first, empty, mask)
+
+
+def fused(builder: Any, x: Any, y: Any, z: Any) -> Any:
+    """`x y + z`, rounded once."""
+    function = builder.module.globals.get(name := f"llvm.fma.v{x.type.count}f64")
+    if function is None:
+        function = ir.Function(builder.module, ir.FunctionType(x.type, [x.type] * 3), name)
+    return builder.call(function, (x, y, z))
+
+
+def _width(*kinds: Any) -> int | None:
+    return next((kind.width for kind in kinds if isinstance(kind, Lanes | Product)), None)
+
+
+def _known(kind: Any, value: int | None) -> bool:
+    return isinstance(kind, Known) and kind.value == value
+
+
+def _ours(*kinds: Any) -> bool:
+    """Numbers of ours, among which a whole number may stand, as in 2 w x u."""
+    ours = [isinstance(kind, Lanes | Product | Known) for kind in kinds]
+    return any(ours) and all(
+        mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)
+    )
+
+
+def _times(x: Any, y: Any) -> Any:
+    if _known(x, None) or _known(y, None):
+        return NOTHING
+    if _known(x, 0) or _known(y, 0):
+        return ZERO
+    if _known(x, 1):
+        return y
+    if _known(y, 1):
+        return x
+    return Product(_width(x, y) or 1)
+
+
+def _sum(x: Any, y: Any) -> Any:
+    if _known(x, None) or _known(y, None):
+        return NOTHING
+    if _known(y, 0):
+        return x
+    if _known(x, 0):
+        return y
+    width = _width(x, y)
+    return None if width is None else Lanes(width)
+
+
+def _difference(x: Any, y: Any) -> Any:
+    return _negative(y) if _known(x, 0) and not _known(y, None) else _sum(x, y)
+
+
+def _negative(x: Any) -> Any:
+    return None if _known(x, 1) else x
+
+
+_RESULTS: dict[Any, Callable[..., Any]] = {
+    operator.mul: _times,
+    operator.add: _sum,
+    operator.sub: _difference,
+    operator.neg: _negative,
+}
+
+
+def _register_types(operation: Any, result: Callable[..., Any]) -> None:
+    @infer_global(operation)
+    class _Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            if not args or not _ours(*args):
+                return None
+            kind = result(*args)
+            return None if kind is None else signature(kind, *args)
+
+
+for _operation, _result in _RESULTS.items():
+    _register_types(_operation, _result)
+
+
+def _values(context: Any, builder: Any, signature: Any, arguments: Any) -> list[_Value]:
+    return [_Value(context, builder, *pair) for pair in zip(signature.args, arguments, strict=True)]
+
+
+def _product(context: Any, builder: Any, kind: Product, x: Any, y: Any) -> Any:
+    pair = cgutils.create_struct_proxy(kind)(context, builder)
+    pair.x, pair.y = x, y
+    return pair._getvalue()
+
+
+def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    x, y = _values(context, builder, signature, arguments)
+    kind = signature.return_type
+    if isinstance(kind, Known):
+        return context.get_dummy_value()
+    if isinstance(x.type, Known):
+        return y.value
+    if isinstance(y.type, Known):
+        return x.value
+    return _product(context, builder, kind, x.number(kind.width), y.number(kind.width))
+
+
+def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> Any:
+    """Any number but nothing, as LLVM's vector."""
+    return _Value(context, builder, kind, value).number(width)
+
+
+def _lower_add(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    x, y = _values(context, builder, signature, arguments)
+    if _known(signature.return_type, None):
+        return context.get_dummy_value()
+    if _known(y.type, 0):
+        return x.value
+    if _known(x.type, 0):
+        return y.value
+    width = signature.return_type.width
+    if y.is_product:
+        return fused(builder, *y.factors(), x.number(width))
+    if x.is_product:
+        return fused(builder, *x.factors(), y.number(width))
+    return builder.fadd(x.number(width), y.number(width))
+
+
+def _negated(context: Any, builder: Any, x: _Value) -> Any:
+    if isinstance(x.type, Known):
+        return context.get_dummy_value()
+    if x.is_product:
+        first, second = x.factors()
+        return _product(context, builder, x.type, builder.fneg(first), second)
+    return builder.fneg(x.value)
+
+
+def _lower_sub(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    x, y = _values(context, builder, signature, arguments)
+    if _known(signature.return_type, None):
+        return context.get_dummy_value()
+    if _known(y.type, 0):
+        return x.value
+    if _known(x.type, 0):
+        return _negated(context, builder, y)
+    width = signature.return_type.width
+    if y.is_product:
+        first, second = y.factors()
+        return fused(builder, builder.fneg(first), second, x.number(width))
+    if x.is_product:
+        return fused(builder, *x.factors(), builder.fneg(y.number(width)))
+    return builder.fsub(x.number(width), y.number(width))
+
+
+def _lower_neg(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    (x,) = _values(context, builder, signature, arguments)
+    return _negated(context, builder, x)
+
+
+_KINDS = (Lanes, Product, Known, types.Integer)
+for _x in _KINDS:
+    for _y in _KINDS:
+        if _x is _y is types.Integer:
+            continue
+        lower_builtin(operator.mul, _x, _y)(_lower_mul)
+        lower_builtin(operator.add, _x, _y)(_lower_add)
+        lower_builtin(operator.sub, _x, _y)(_lower_sub)
+for _x in (Lanes, Product, Known):
+    lower_builtin(operator.neg, _x)(_lower_neg)
+
+
+def _multiplied(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
+    return _Value(context, builder, fromty, value).number(toty.width)
+
+
+lower_cast(Product, Lanes)(_multiplied)
+
+
+def _known_number(kind: Known) -> Any:
+    @intrinsic
+    def known(context: Any) -> Any:
+        return kind(), lambda context, builder, signature, arguments: context.get_dummy_value()
+
+    return known
+
+
+zero, one, nothing = map(_known_number, (ZERO, ONE, NOTHING))
+
+
+@intrinsic
+def rounded(context: Any, x: Any) -> Any:
+    """A product multiplied and rounded, any other number as it is: where two sides must round alike."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = signature.args[0]
+        return (
+            _Value(context, builder, kind, arguments[0]).number(kind.width) if kind != given else arguments[0]
+        )
+
+    given = Lanes(x.width) if isinstance(x, Product) else x
+    return given(x), generate
