@@ -56,7 +56,7 @@ urdfkin is the nearer in {nearer}. The ratio of typical errors, urdfkin's over P
 
 What the judge has changed: velocities and accelerations in LOCAL used to be computed in the world's axes and
 turned back. On the Allegro hand that was 2.4 times as far off as Pinocchio (0.30 against 0.12 eps*scale).
-They are now computed in the links' own axes (`urdfkin/recursion/local_kernel.py`)."""
+All motion is now computed in the links' own axes (`urdfkin/recursion/walk.py`), with fused multiply-adds."""
     ]
     for name, judgement in judgements.items():
         parts += [f"## {name}: {ROBOTS[name]}", _table(judgement.lines)]

@@ -5,6 +5,7 @@ Names and order come from the tree that was read; the text was checked before (`
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
@@ -12,6 +13,7 @@ from urdfkin.errors import InputError
 from urdfkin.judge.vectors import (
     IDENTITY,
     ZERO,
+    Context,
     Matrix,
     Number,
     Vector,
@@ -46,63 +48,72 @@ class ExactJoint:
     offset: Number
 
 
-def read_exact(text: str, tree: KinematicTree) -> tuple[ExactJoint, ...]:
+def read_exact(text: str, tree: KinematicTree, context: Context = mp) -> tuple[ExactJoint, ...]:
     """The joints of a tree, from the URDF text it was read from.
 
     Args:
         text: The URDF.
         tree: The same, read; a joint `root_joint` that it was hung from is not in the text.
+        context: The kind of number.
 
     Raises:
         InputError: the text and the tree are not of the same robot.
     """
-    root = plain_xml(text)
-    elements = {str(element.get("name")): element for element in root.findall("joint")}
-    quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _WITH_QUATERNIONS
-    joints = []
-    for joint in tree.joints:
-        element = elements.get(joint.name)
-        if element is None:
-            if joint.kind not in (JointKind.FLOATING, JointKind.PLANAR):
-                raise InputError("a joint is not in the URDF text", where=tree.name, found=joint.name)
-            joints.append(ExactJoint(IDENTITY, ZERO, IDENTITY[0], mp.mpf(1), mp.mpf(0)))
-            continue
-        multiplier, offset = _rule(elements, joint.name) if joint.mimic else (mp.mpf(1), mp.mpf(0))
-        axis = _vector(element.find("axis"), "xyz", "1 0 0")
-        joints.append(
-            ExactJoint(
-                R=_rotation(element.find("origin"), quaternions),
-                p=_vector(element.find("origin"), "xyz", "0 0 0"),
-                axis=unit(axis) if joint.kind.has_axis else axis,
-                multiplier=multiplier,
-                offset=offset,
-            )
+    return tuple(_Text(text, tree.name, context).joints(tree))
+
+
+class _Text:
+    """The joints of a text, their numbers of one kind."""
+
+    def __init__(self, text: str, name: str, context: Context) -> None:
+        root = plain_xml(text)
+        self.name, self.context = name, context
+        self.elements = {str(element.get("name")): element for element in root.findall("joint")}
+        self.quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _WITH_QUATERNIONS
+
+    def joints(self, tree: KinematicTree) -> Iterator[ExactJoint]:
+        for joint in tree.joints:
+            element = self.elements.get(joint.name)
+            if element is not None:
+                yield self.joint(
+                    element, turns_or_slides=joint.kind.has_axis, follows=joint.mimic is not None
+                )
+            elif joint.kind in (JointKind.FLOATING, JointKind.PLANAR):
+                yield ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)
+            else:
+                raise InputError("a joint is not in the URDF text", where=self.name, found=joint.name)
+
+    def joint(self, element: Element, *, turns_or_slides: bool, follows: bool) -> ExactJoint:
+        axis = self.vector(element.find("axis"), "xyz", "1 0 0")
+        multiplier, offset = self.rule(str(element.get("name"))) if follows else (1, 0)
+        return ExactJoint(
+            R=self.rotation(element.find("origin")),
+            p=self.vector(element.find("origin"), "xyz", "0 0 0"),
+            axis=unit(axis, self.context) if turns_or_slides else axis,
+            multiplier=multiplier,
+            offset=offset,
         )
-    return tuple(joints)
 
+    def numbers(self, element: Element | None, name: str, default: str) -> tuple[Number, ...]:
+        written = default if element is None else element.get(name, default)
+        return tuple(self.context.mpf(word) for word in written.split())
 
-def _numbers(element: Element | None, name: str, default: str) -> tuple[Number, ...]:
-    written = default if element is None else element.get(name, default)
-    return tuple(mp.mpf(word) for word in written.split())
+    def vector(self, element: Element | None, name: str, default: str) -> Vector:
+        x, y, z = self.numbers(element, name, default)
+        return x, y, z
 
+    def rotation(self, origin: Element | None) -> Matrix:
+        """From roll, pitch and yaw, or the quaternion, of any length, that URDF 1.1 has in their place."""
+        if self.quaternions and origin is not None and "quat_xyzw" in origin.attrib:
+            return from_quaternion(self.numbers(origin, "quat_xyzw", ""), self.context)
+        return from_rpy(self.vector(origin, "rpy", "0 0 0"), self.context)
 
-def _vector(element: Element | None, name: str, default: str) -> Vector:
-    x, y, z = _numbers(element, name, default)
-    return x, y, z
-
-
-def _rotation(origin: Element | None, quaternions: bool) -> Matrix:
-    """From roll, pitch and yaw, or the quaternion, of any length, that URDF 1.1 has in their place."""
-    if quaternions and origin is not None and "quat_xyzw" in origin.attrib:
-        return from_quaternion(*_numbers(origin, "quat_xyzw", ""))
-    return from_rpy(_vector(origin, "rpy", "0 0 0"))
-
-
-def _rule(elements: dict[str, Element], name: str) -> tuple[Number, Number]:
-    """Multiplier and offset of a follower, chains followed to the joint that moves."""
-    multiplier, offset = mp.mpf(1), mp.mpf(0)
-    while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
-        (factor,), (constant,) = _numbers(rule, "multiplier", "1"), _numbers(rule, "offset", "0")
-        multiplier, offset = multiplier * factor, offset + multiplier * constant
-        name = str(rule.get("joint"))
-    return multiplier, offset
+    def rule(self, name: str) -> tuple[Number, Number]:
+        """Multiplier and offset of a follower, chains followed to the joint that moves."""
+        multiplier, offset = self.context.mpf(1), self.context.mpf(0)
+        elements = self.elements
+        while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
+            (factor,), (constant,) = self.numbers(rule, "multiplier", "1"), self.numbers(rule, "offset", "0")
+            multiplier, offset = multiplier * factor, offset + multiplier * constant
+            name = str(rule.get("joint"))
+        return multiplier, offset
