@@ -64,7 +64,7 @@ class Plan:
     memory: int = 1_000_000
 
 
-QUICK = Plan(1_000, 3, (6, 12), 20_000, (1, 1000), 100, (100, 1_000), 20_000)
+QUICK = Plan(1_000, 3, (6, 12), 20_000, (1, 1000), 100, (100, 1_000), 200_000)
 
 
 def rows_of(section: str, plan: Plan, contenders: Sequence[Contender]) -> Iterator[Row]:
