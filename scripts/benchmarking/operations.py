@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from urdfkin.kinematics.arithmetic import bound
-from urdfkin.recursion import outputs, walk
+from urdfkin.recursion import axes, outputs, walk
 from urdfkin.recursion.plan import Plan
 from urdfkin.recursion.program import KEPT_ROWS, WIDTH, Head, Op, program_of
 
-#: Range reduction 6, two polynomials 27, the sine's and the cosine's last steps 8 (`recursion.sine`).
-_SINE_COSINE = 41
+#: Reduction 10, z and 1 - z/2 with what they lose 8, two polynomials 20, last steps 13 (`recursion.sine`).
+_SINE_COSINE = 51
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ class _Walk:
             "zero": lambda: zero,
             "one": lambda: one,
         }
-        for module in (walk, outputs):
+        for module in (axes, walk, outputs):
             for name, value in vars(module).items():
                 if hasattr(value, "py_func"):
                     self.names.setdefault(name, FunctionType(value.py_func.__code__, self.names, name))
@@ -127,10 +127,11 @@ def _cost(run: _Walk, instruction: list[int], quantity: str, follow: int) -> int
     nothing = 3 * (Number(nothing=True),)
     state = tuple(part if i < follow else nothing for i, part in enumerate(run.state))
     run.written.clear()
+    world = run.call.world_axes
     if op <= Op.TURN:
-        return count(run.call._along_link(op, state, None, c))
+        return count(run.call._along_link(world, op, state, None, c))
     if op <= Op.FLOATING:
-        return count(run.call._over_joint(op, state, None, row, 0, 0, how, None, c))
+        return count(run.call._over_joint(world, op, state, None, row, 0, 0, how, None, c))
     if op == Op.COLUMN:
         run.call.column_jacobian(None, row % KEPT_ROWS, 0, how, None, c, 2, state)
     elif op == Op.EMIT and quantity != "jacobian":

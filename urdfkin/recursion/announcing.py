@@ -39,7 +39,8 @@ def announced(tell: Callable[[], None]) -> Iterator[None]:
 
 
 #: The cores: half of the work each.
-_ONE_HALF, _OTHER_HALF = ("accelerations", "velocities"), ("jacobians", "jacobian_rates", "placements")
+_ONE_HALF = "accelerations", "local_accelerations", "velocities"
+_OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
 
 def load_kernels() -> None:

@@ -6,6 +6,7 @@ in all eight lanes: one result for a configuration, to the last bit, wherever it
 
 from __future__ import annotations
 
+from urdfkin.recursion.axes import link_axes, world_axes
 from urdfkin.recursion.compiling import core
 from urdfkin.recursion.outputs import (
     column_jacobian,
@@ -28,28 +29,40 @@ from urdfkin.recursion.walk import walk
 @core
 def placements(task):
     """Places of frames: 7.77 with the rotations alongside."""
-    return walk(task, 1, follow_place, keep_none, column_none, emit_place)
+    return walk(task, world_axes, 1, follow_place, keep_none, column_none, emit_place)
 
 
 @core
 def velocities(task):
-    """7.127, 7.128."""
-    return walk(task, 2, follow_velocity, keep_none, column_none, emit_velocity)
+    """7.127, 7.128 in the world's axes."""
+    return walk(task, world_axes, 2, follow_velocity, keep_none, column_none, emit_velocity)
+
+
+@core
+def local_velocities(task):
+    """7.127, 7.128 in each frame's own axes."""
+    return walk(task, link_axes, 2, follow_velocity, keep_none, column_none, emit_velocity)
 
 
 @core
 def accelerations(task):
-    """7.129, 7.130."""
-    return walk(task, 3, follow_everything, keep_none, column_none, emit_acceleration)
+    """7.129, 7.130 in the world's axes."""
+    return walk(task, world_axes, 3, follow_everything, keep_none, column_none, emit_acceleration)
+
+
+@core
+def local_accelerations(task):
+    """7.129, 7.130 in each frame's own axes."""
+    return walk(task, link_axes, 3, follow_everything, keep_none, column_none, emit_acceleration)
 
 
 @core
 def jacobians(task):
     """7.85."""
-    return walk(task, 1, follow_place, keep_axis, column_jacobian, emit_matrix)
+    return walk(task, world_axes, 1, follow_place, keep_axis, column_jacobian, emit_matrix)
 
 
 @core
 def jacobian_rates(task):
     """The J-dot of 7.126."""
-    return walk(task, 2, follow_velocity, keep_moving_axis, column_rate, emit_matrix)
+    return walk(task, world_axes, 2, follow_velocity, keep_moving_axis, column_rate, emit_matrix)

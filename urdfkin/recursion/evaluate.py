@@ -51,8 +51,9 @@ def velocities(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 6) [linear; angular]: 7.127, 7.128."""
-    from urdfkin.recursion.cores import velocities as core  # noqa: PLC0415
+    from urdfkin.recursion.cores import local_velocities, velocities  # noqa: PLC0415
 
+    core = local_velocities if reference is Reference.LOCAL else velocities
     out = np.empty((len(q), len(plan.frames), 6)) if out is None else out
     _run(
         core,
@@ -79,8 +80,9 @@ def accelerations(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 6) [linear; angular], classical: 7.129, 7.130."""
-    from urdfkin.recursion.cores import accelerations as core  # noqa: PLC0415
+    from urdfkin.recursion.cores import accelerations, local_accelerations  # noqa: PLC0415
 
+    core = local_accelerations if reference is Reference.LOCAL else accelerations
     out = np.empty((len(q), len(plan.frames), 6)) if out is None else out
     _run(
         core,

@@ -1,7 +1,8 @@
 """What a walk hands out: places, velocities, accelerations, Jacobians and their rates, in three references.
 
-Each output says what it follows of a state, and what it makes of the state of a frame. A frame's motion is
-known in its own axes (`walk`): LOCAL takes it as it is, the other references turn it to the world's.
+Each output says what it follows of a state, and what it makes of the state of a frame. Velocities and
+accelerations come in the axes that their reference asks for (`axes`); columns are made in the world's, and
+LOCAL turns them to the frame's own.
 """
 
 from __future__ import annotations
@@ -79,22 +80,18 @@ def _pose_row(s, row, x, last):
 @compiled
 def emit_velocity(m, s, program, place, sources, b, reference, state, to):
     """[linear; angular]: 7.127, 7.128 in a reference."""
-    R, p, w, vel = state[0], state[1], state[2], state[3]
-    if reference != _LOCAL:
-        w, vel = eq.rotate(R, w), eq.rotate(R, vel)
-        if reference == _WORLD:  # the point of the body that is at the world's origin now
-            vel = eq.point_velocity(vel, w, eq.minus(_no_vector(), p))
+    p, w, vel = state[1], state[2], state[3]
+    if reference == _WORLD:  # the point of the body that is at the world's origin now
+        vel = eq.point_velocity(vel, w, eq.minus(_no_vector(), p))
     _emit_six(m, s, program, place, b, vel, w, to)
 
 
 @compiled
 def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
     """[linear; angular]: 7.129, 7.130 in a reference."""
-    R, p, w, alpha, acc = state[0], state[1], state[2], state[4], state[5]
-    if reference != _LOCAL:
-        alpha, acc = eq.rotate(R, alpha), eq.rotate(R, acc)
-        if reference == _WORLD:
-            acc = eq.point_acceleration(acc, alpha, eq.rotate(R, w), eq.minus(_no_vector(), p))
+    p, w, alpha, acc = state[1], state[2], state[4], state[5]
+    if reference == _WORLD:
+        acc = eq.point_acceleration(acc, alpha, w, eq.minus(_no_vector(), p))
     _emit_six(m, s, program, place, b, acc, alpha, to)
 
 
@@ -143,8 +140,8 @@ def keep_axis(s, row, axis, state):
 def keep_moving_axis(s, row, axis, state):
     """And how they move: the w and vel of the link that the axis rides on."""
     keep_axis(s, row, axis, state)
-    put_vector(s, row + 6, eq.rotate(state[0], state[2]))
-    put_vector(s, row + 9, eq.rotate(state[0], state[3]))
+    put_vector(s, row + 6, state[2])
+    put_vector(s, row + 9, state[3])
 
 
 @compiled
@@ -162,8 +159,7 @@ def column_jacobian(s, row, to, how, g, c, reference, state):
 @compiled
 def column_rate(s, row, to, how, g, c, reference, state):
     """The rate of that column (7.126). In the frame's own axes it is the rate of the numbers there."""
-    R, p = state[0], state[1]
-    w, vel = eq.rotate(R, state[2]), eq.rotate(R, state[3])
+    R, p, w, vel = state[0], state[1], state[2], state[3]
     z = vector(s, row)
     z_rate = eq.axis_rate(vector(s, row + 6), z)
     if how & 1:

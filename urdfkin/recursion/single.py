@@ -114,23 +114,25 @@ class Single(NamedTuple):
     kept: tuple[object, ...]
 
 
-#: For each quantity: the core, the kernel that calls it, and whether it has columns.
-_HOW: dict[str, tuple[Core, Kernel, bool]] = {
-    "placement": (cores.placements, matrix, False),
-    "velocity": (cores.velocities, six, False),
-    "jacobian": (cores.jacobians, matrix, True),
-    "acceleration": (cores.accelerations, six, False),
+#: For each quantity: its core, that for LOCAL, the kernel that calls them, and whether it has columns.
+_HOW: dict[str, tuple[Core, Core, Kernel, bool]] = {
+    "placement": (cores.placements, cores.placements, matrix, False),
+    "velocity": (cores.velocities, cores.local_velocities, six, False),
+    "jacobian": (cores.jacobians, cores.jacobians, matrix, True),
+    "acceleration": (cores.accelerations, cores.local_accelerations, six, False),
 }
 
 
 def single(quantity: str, plan: Plan, reference: Reference) -> Single:
     """Compile, or read from disk, what computes a quantity of a plan's only frame; its base stands still."""
-    core, kernel, columns = _HOW[quantity]
-    turned = quantity == "placement" or reference is Reference.LOCAL
+    core, local_core, kernel, columns = _HOW[quantity]
+    local = reference is Reference.LOCAL
+    turned = quantity == "placement" or local
     program = program_of(plan, turned=turned, columns=columns)
     memory, task = scratch(program), np.zeros(len(Task), dtype=np.int64)
     task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
     task[Task.SCRATCH], task[Task.REFERENCE], task[Task.N] = memory.ctypes.data, reference, 1
-    task[Task.CORE], task[Task.NQ], task[Task.NV] = core.address, plan.nq, plan.nv
+    task[Task.CORE] = (local_core if local else core).address
+    task[Task.NQ], task[Task.NV] = plan.nq, plan.nv
     task[Task.ROWS], task[Task.COLUMNS] = (6, plan.nv) if columns else (4, 4)
     return Single(kernel.compiled, task, (program, memory))

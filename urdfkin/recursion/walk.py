@@ -1,9 +1,10 @@
 """The walk from the base outwards: section 7.7's recursion, link by link, for a block of configurations.
 
-The state of a link is the rotation R and the origin p of its frame in the world's axes, and, in the link's
-own axes, its angular velocity w, its origin's velocity vel, its angular acceleration alpha and its origin's
-acceleration acc. In its own axes z is (0, 0, 1) and the interorigin vector a constant: fewer operations
-than in the world's, and smaller errors. The equations are those of `urdfkin.kinematics.equations`.
+The state of a link is the rotation R and the origin p of its frame in the world's axes, its angular velocity
+w, its origin's velocity vel, its angular acceleration alpha and its origin's acceleration acc. These four are
+seen in the axes in which they are asked for, the world's or the link's own (`axes`): results that are turned
+at the end have the rounding of two rotations. The equations are those of `urdfkin.kinematics.equations`, and
+the same in either axes.
 
 What an output does not follow is nothing (`numbers.nothing`), and what is computed from it costs nothing.
 """
@@ -11,6 +12,7 @@ What an output does not follow is nothing (`numbers.nothing`), and what is compu
 from __future__ import annotations
 
 from urdfkin.recursion import compiled_equations as eq
+from urdfkin.recursion.axes import seen, seen_after
 from urdfkin.recursion.compiling import compiled
 from urdfkin.recursion.memory import fetch, ordinary, read_rows
 from urdfkin.recursion.numbers import one, rounded, zero
@@ -46,61 +48,62 @@ _SAVE, _RESUME, _KEEP, _COLUMN = map(int, (Op.SAVE, Op.RESUME, Op.KEEP, Op.COLUM
 
 
 @compiled
-def carried(state, d):
+def carried(axes, state, d):
     """Along the rigid link, by d in its axes: 7.58, 7.128, 7.130."""
     R, p, w, vel, alpha, acc = state
+    lever = seen(axes, R, d)
     return (
         R,
         eq.point_position(p, R, d),
         w,
-        eq.point_velocity(vel, w, d),
+        eq.point_velocity(vel, w, lever),
         alpha,
-        eq.point_acceleration(acc, alpha, w, d),
+        eq.point_acceleration(acc, alpha, w, lever),
     )
 
 
 @compiled
-def turned(state, S):
-    """Into the axes of a frame that is turned by S: the same motion, seen from there."""
+def turned(axes, state, S):
+    """To a frame that is turned by S: the same motion, seen from there."""
     R, p, w, vel, alpha, acc = state
-    back = eq.transposed(S)
     return (
         eq.product(R, S),
         p,
-        eq.rotate(back, w),
-        eq.rotate(back, vel),
-        eq.rotate(back, alpha),
-        eq.rotate(back, acc),
+        seen_after(axes, S, w),
+        seen_after(axes, S, vel),
+        seen_after(axes, S, alpha),
+        seen_after(axes, S, acc),
     )
 
 
 @compiled
-def _turned_about_z(state, s, row):
+def _turned_about_z(axes, state, s, row):
     """By a joint's angle (7.5), whose sine and cosine stand in a row and the one after it."""
-    return turned(state, eq.about_z(number(s, row), number(s, row + 1), zero(), one()))
+    return turned(axes, state, eq.about_z(number(s, row), number(s, row + 1), zero(), one()))
 
 
 @compiled
-def revolute(state, s, row, v, a):
+def revolute(axes, state, s, row, v, a):
     """7.129, then 7.127, then the turn itself."""
     R, p, w, vel, alpha, acc = state
-    z = (zero(), zero(), one())
+    z = seen(axes, R, (zero(), zero(), one()))
     alpha = eq.angular_acceleration(alpha, w, z, v, a)
-    return _turned_about_z((R, p, eq.angular_velocity(w, z, v), vel, alpha, acc), s, row)
+    return _turned_about_z(axes, (R, p, eq.angular_velocity(w, z, v), vel, alpha, acc), s, row)
 
 
 @compiled
-def prismatic(state, slide, v, a):
+def prismatic(axes, state, slide, v, a):
     """The slide is a part of the interorigin vector (7.64); then 7.130 and 7.128."""
-    R, p, w, vel, alpha, acc = carried(state, (zero(), zero(), slide))
-    z = (zero(), zero(), one())
+    R, p, w, vel, alpha, acc = carried(axes, state, (zero(), zero(), slide))
+    z = seen(axes, R, (zero(), zero(), one()))
     return R, p, w, eq.sliding_velocity(vel, z, v), alpha, eq.sliding_acceleration(acc, w, z, v, a)
 
 
 @compiled
-def free(state, o, u, o_rate, u_rate):
+def free(axes, state, o, u, o_rate, u_rate):
     """A planar or floating joint that has been carried and turned: its rates are in the moved axes."""
     R, p, w, vel, alpha, acc = state
+    o, u, o_rate, u_rate = seen(axes, R, o), seen(axes, R, u), seen(axes, R, o_rate), seen(axes, R, u_rate)
     return (
         R,
         p,
@@ -135,25 +138,25 @@ def _vector_if(wanted, s, row):
 
 
 @compiled
-def _planar(state, s, q, row, v, a):
+def _planar(axes, state, s, q, row, v, a):
     """Slides along x and y and turns about z."""
-    state = carried(state, (number(s, q), number(s, q + 1), zero()))
-    state = _turned_about_z(state, s, row)
+    state = carried(axes, state, (number(s, q), number(s, q + 1), zero()))
+    state = _turned_about_z(axes, state, s, row)
     w, alpha = state[2][0], state[4][0]
     o, u = (zero(), zero(), number_if(w, s, v + 2)), (number_if(w, s, v), number_if(w, s, v + 1), zero())
     o_rate = zero(), zero(), number_if(alpha, s, a + 2)
-    return free(state, o, u, o_rate, (number_if(alpha, s, a), number_if(alpha, s, a + 1), zero()))
+    return free(axes, state, o, u, o_rate, (number_if(alpha, s, a), number_if(alpha, s, a + 1), zero()))
 
 
 @compiled
-def _floating(state, s, q, v, a):
+def _floating(axes, state, s, q, v, a):
     """Slides along and turns about all three axes."""
-    state = carried(state, (number(s, q), number(s, q + 1), number(s, q + 2)))
+    state = carried(axes, state, (number(s, q), number(s, q + 1), number(s, q + 2)))
     x, y, z, w = number(s, q + 3), number(s, q + 4), number(s, q + 5), number(s, q + 6)
-    state = turned(state, eq.rotation_of_quaternion(x, y, z, w))
+    state = turned(axes, state, eq.rotation_of_quaternion(x, y, z, w))
     w, alpha = state[2], state[4]
     u, o = _vector_if(w, s, v), _vector_if(w, s, v + 3)
-    return free(state, o, u, _vector_if(alpha, s, a + 3), _vector_if(alpha, s, a))
+    return free(axes, state, o, u, _vector_if(alpha, s, a + 3), _vector_if(alpha, s, a))
 
 
 # -- constants -----------------------------------------------------------------------------------------
@@ -227,7 +230,7 @@ def _read(m, x, b, width, blocks, begin, end, s, row):
 
 
 @compiled
-def _start(m, s, task, row, b):
+def _start(axes, m, s, task, row, b):
     """The initial conditions: the state of the base (the text's frame -1 to frame 0)."""
     nil, unit = same(0.0), same(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
@@ -236,9 +239,8 @@ def _start(m, s, task, row, b):
         base, stride = numbers_at(task[_BASE]), task[_STRIDE]
         read_rows(m if stride else 1, base, b * stride, stride, STATE_ROWS, s, row)
         R, p = (vector(s, row), vector(s, row + 3), vector(s, row + 6)), vector(s, row + 9)
-        back = eq.transposed(R)
-        w, vel = eq.rotate(back, vector(s, row + 12)), eq.rotate(back, vector(s, row + 15))
-        alpha, acc = eq.rotate(back, vector(s, row + 18)), eq.rotate(back, vector(s, row + 21))
+        w, vel = seen_after(axes, R, vector(s, row + 12)), seen_after(axes, R, vector(s, row + 15))
+        alpha, acc = seen_after(axes, R, vector(s, row + 18)), seen_after(axes, R, vector(s, row + 21))
     return R, p, w, vel, alpha, acc
 
 
@@ -256,40 +258,40 @@ def _sines_and_cosines(s, program, g):
 
 
 @compiled
-def _along_link(op, state, g, c):
+def _along_link(axes, op, state, g, c):
     """Carried or turned by what is constant."""
     if op == _CARRY_X:
-        state = carried(state, (constant(g, c), zero(), zero()))
+        state = carried(axes, state, (constant(g, c), zero(), zero()))
     elif op == _CARRY_Y:
-        state = carried(state, (zero(), constant(g, c + 1), zero()))
+        state = carried(axes, state, (zero(), constant(g, c + 1), zero()))
     elif op == _CARRY_Z:
-        state = carried(state, (zero(), zero(), constant(g, c + 2)))
+        state = carried(axes, state, (zero(), zero(), constant(g, c + 2)))
     elif op == _CARRY:
-        state = carried(state, _vector(g, c))
+        state = carried(axes, state, _vector(g, c))
     elif op == _TURN_X:
-        state = turned(state, eq.about_x(constant(g, c + 7), constant(g, c + 4), zero(), one()))
+        state = turned(axes, state, eq.about_x(constant(g, c + 7), constant(g, c + 4), zero(), one()))
     elif op == _TURN_Y:
-        state = turned(state, eq.about_y(constant(g, c + 2), constant(g, c), zero(), one()))
+        state = turned(axes, state, eq.about_y(constant(g, c + 2), constant(g, c), zero(), one()))
     elif op == _TURN_Z:
-        state = turned(state, eq.about_z(constant(g, c + 3), constant(g, c), zero(), one()))
+        state = turned(axes, state, eq.about_z(constant(g, c + 3), constant(g, c), zero(), one()))
     else:
-        state = turned(state, _rotation(g, c))
+        state = turned(axes, state, _rotation(g, c))
     return state
 
 
 @compiled
-def _over_joint(op, state, s, x, v, a, z, g, c):
+def _over_joint(axes, op, state, s, x, v, a, z, g, c):
     """Over a joint; x, z and c are its operands, v and a the rows of its rates."""
     if op == _REVOLUTE:
         rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
-        state = revolute(state, s, x, rate, rate_2)
+        state = revolute(axes, state, s, x, rate, rate_2)
     elif op == _PRISMATIC:
         rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
-        state = prismatic(state, _coordinate(s, x, g, c, z), rate, rate_2)
+        state = prismatic(axes, state, _coordinate(s, x, g, c, z), rate, rate_2)
     elif op == _PLANAR:
-        state = _planar(state, s, x, z, v, a)
+        state = _planar(axes, state, s, x, z, v, a)
     else:
-        state = _floating(state, s, x, v, a)
+        state = _floating(axes, state, s, x, v, a)
     return state
 
 
@@ -317,19 +319,19 @@ def _ordinary(m, task, program, b, orders):
 
 
 @compiled
-def _block(m, task, program, g, s, b, reference, orders, follow, keep, column, emit):
+def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, column, emit):
     """The walk for `m` configurations from `b` on."""
     _read_inputs(m, task, program, s, b, orders)
     _sines_and_cosines(s, program, g)
-    state = follow(_start(m, s, task, program[_ROW_BASE], b))
+    state = follow(_start(axes, m, s, task, program[_ROW_BASE], b))
     at, to = program[_CODE], numbers_at(task[_OUT])
     while program[at] != _END:
         op, x, y, z, c = program[at], program[at + 1], program[at + 2], program[at + 3], program[at + 4]
         at += WIDTH
         if op <= _TURN:
-            state = _along_link(op, state, g, c)
+            state = _along_link(axes, op, state, g, c)
         elif op <= _FLOATING:
-            state = _over_joint(op, state, s, x, program[_ROW_V] + y, program[_ROW_A] + y, z, g, c)
+            state = _over_joint(axes, op, state, s, x, program[_ROW_V] + y, program[_ROW_A] + y, z, g, c)
         elif op == _SAVE:
             _save(s, x, state)
         elif op == _RESUME:
@@ -343,11 +345,12 @@ def _block(m, task, program, g, s, b, reference, orders, follow, keep, column, e
 
 
 @compiled
-def walk(address, orders, follow, keep, column, emit):
+def walk(address, axes, orders, follow, keep, column, emit):
     """Carry out a program for every block of configurations; 0, or 1 where an input is not ordinary.
 
     Args:
         address: Of a task.
+        axes: The motion's (`axes`).
         orders: How many of q, v, a are read.
         follow: Makes nothing of what the output does not need of a state.
         keep: Keeps what a column needs of its joint.
@@ -363,6 +366,6 @@ def walk(address, orders, follow, keep, column, emit):
     good = True
     for first in range(0, n, m):
         b = min(first, n - m)  # the last block reaches back into the one before
-        _block(m, task, program, g, s, b, task[_REFERENCE], orders, follow, keep, column, emit)
+        _block(axes, m, task, program, g, s, b, task[_REFERENCE], orders, follow, keep, column, emit)
         good &= _ordinary(m, task, program, b, orders)
     return 0 if good else 1
