@@ -1,9 +1,10 @@
-"""Sine and cosine of several angles at once, right to the last digit.
+"""Sine and cosine of several angles at once, to 0.65 units in the last place.
 
-Cody and Waite's reduction to [-pi/4, pi/4], then the polynomials of fdlibm (Sun Microsystems, k_sin.c and
-k_cos.c). With fused multiply-adds pi/2 in two doubles is enough while the number of quarter turns stays below
-2^20; a lane beyond that takes the library's functions. It alone: what stands beside a configuration must not
-change its result.
+Cody and Waite's reduction to [-pi/4, pi/4], with what it loses in rounding, then the polynomials of fdlibm
+(Sun Microsystems, k_sin.c and k_cos.c). With fused multiply-adds pi/2 in two doubles is enough while the
+number of quarter turns stays below 2^20, up to 1e-27 in the smaller of the two beside a multiple of pi/2; a
+lane beyond that takes the library's functions. It alone: what stands beside a configuration must not change
+its result.
 """
 
 from __future__ import annotations
@@ -80,12 +81,24 @@ def _of_small(context: Any, x: Any) -> Any:
         shifted = fused(builder, x, all_lanes(_2_PI), all_lanes(_NO_FRACTION))
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(_NO_FRACTION))
-        r = fused(builder, n, all_lanes(-_PI_2_REST), fused(builder, n, all_lanes(-_PI_2), x))
+        # Exact: both terms are multiples of 2^-53, and their difference is below 1. What rounding r takes
+        # from it is kept in `lost`, as what it takes from z is.
+        near = fused(builder, n, all_lanes(-_PI_2), x)
+        r = fused(builder, n, all_lanes(-_PI_2_REST), near)
+        lost = fused(builder, n, all_lanes(-_PI_2_REST), builder.fsub(near, r))
         z = builder.fmul(r, r)
-        sine = fused(builder, builder.fmul(r, z), polynomial(z, _SINE), r)
-        # 1 comes last: the rest is small, and so is what is lost in rounding it.
-        rest = fused(builder, builder.fmul(z, z), polynomial(z, _COSINE), builder.fmul(z, all_lanes(-0.5)))
-        cosine = builder.fadd(all_lanes(1.0), rest)
+        z_lost = fused(builder, r, r, builder.fneg(z))
+        # 1 - z/2, and what is lost in it.
+        most = fused(builder, z, all_lanes(-0.5), all_lanes(1.0))
+        most_lost = fused(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), most))
+        # sin(r + lost) = sin r + lost cos r, cos(r + lost) = cos r - lost sin r; the largest term comes last,
+        # the rest is small, and so is what is lost in rounding it.
+        sine = fused(builder, builder.fmul(r, z), polynomial(z, _SINE), builder.fmul(lost, most))
+        sine = builder.fadd(r, sine)
+        rest = fused(builder, builder.fmul(z, z), polynomial(z, _COSINE), most_lost)
+        rest = fused(builder, z_lost, all_lanes(-0.5), rest)
+        rest = fused(builder, builder.fneg(r), lost, rest)
+        cosine = builder.fadd(most, rest)
 
         def signed(value: Any, turns: Any) -> Any:
             sign = builder.shl(builder.and_(turns, bits(2)), bits(62))
