@@ -22,6 +22,7 @@ from urdfkin.forking import lock_over_forks
 from urdfkin.keeping import kept_folder
 from urdfkin.kinematics import equations
 from urdfkin.recursion.kept_kernels import KeptKernel
+from urdfkin.recursion.parts import PartCompiler
 
 #: What Numba raises of its own where a kernel does not take an argument.
 NoKernelError: type[Exception] = numba.core.errors.NumbaError
@@ -33,7 +34,12 @@ _config: Any = numba.config  # settings that numba sets at run time
 #: carries a branch that raises. Nothing is allocated, so that arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 #: Of a part that is only ever inlined, no form of its own is made that Python or C could call.
-_PART: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_PART: dict[str, Any] = {
+    "forceinline": True,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": PartCompiler,
+}
 
 
 @contextmanager
