@@ -18,6 +18,8 @@ from numba.core.compiler_machinery import PassManager, register_pass
 _Library: Any = JITCodeLibrary  # numba has no types
 _Lowering: Any = typed_passes.NativeLowering
 _Compiler: Any = CompilerBase
+_Passes: Any = PassManager
+_register: Any = register_pass
 
 
 class _Part(_Library):  # type: ignore[misc]
@@ -34,7 +36,7 @@ class _Part(_Library):  # type: ignore[misc]
         return [self, *dict.fromkeys(self._linking_libraries)]
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
+@_register(mutates_CFG=True, analysis_only=False)
 class _PartLowering(_Lowering):  # type: ignore[misc]
     _name = "part_lowering"
 
@@ -56,7 +58,7 @@ class PartCompiler(_Compiler):  # type: ignore[misc]
 
     def define_pipelines(self) -> list[Any]:
         """One pipeline."""
-        passes = PassManager("part")
+        passes = _Passes("part")
         for each in (
             untyped_passes.TranslateByteCode,
             untyped_passes.FixupArgs,
