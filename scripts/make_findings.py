@@ -11,10 +11,10 @@ from pathlib import Path
 
 from urdfkin.catalogue import catalogue
 from urdfkin.checking import check
-from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Severity
-from urdfkin.diagnostics.codes import REGISTRY
-from urdfkin.diagnostics.escape import shortened
-from urdfkin.diagnostics.reporter import WRITTEN_OUT
+from urdfkin.lint import DEFAULT_LIMITS, Finding, Severity
+from urdfkin.lint.codes import REGISTRY
+from urdfkin.lint.escape import shortened
+from urdfkin.lint.reporter import WRITTEN_OUT
 
 PAGE = Path(__file__).parents[1] / "docs" / "findings.md"
 

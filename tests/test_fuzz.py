@@ -15,7 +15,7 @@ from scripts.fuzzing import GOOD, Case, robots
 from scripts.fuzzing.judge import Outcome
 from scripts.fuzzing.judge import judge as judge_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
-from tests.diagnostics.cases.arm import arm, fixed
+from tests.lint.cases.arm import arm, fixed
 from urdfkin.errors import OracleError
 from urdfkin.oracle import Oracle
 from urdfkin.prepared import PreparedFrame

@@ -32,7 +32,7 @@ LAYERS = (
     ("tree", "reference"),
     ("coupling", "followers", "configuration", "chain"),
     ("recursion",),
-    ("diagnostics", "urdf"),
+    ("lint", "urdf"),
     ("dh",),
     ("catalogue", "sources", "origin", "deep_stack"),
     ("oracle_frames", "oracle_layout", "oracle_base", "oracle", "verification"),

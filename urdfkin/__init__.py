@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from urdfkin.chain import FrameChain
     from urdfkin.checking import check
     from urdfkin.dh import DHRow, DHTable, read_table, table_from_rows
-    from urdfkin.diagnostics import Finding, UrdfError, UrdfWarning
     from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
+    from urdfkin.lint import Finding, UrdfError, UrdfWarning
     from urdfkin.loading import load
     from urdfkin.recursion.base import BaseMotion
     from urdfkin.reference import Reference
@@ -33,7 +33,7 @@ _HOMES = {
     "Certificate": "urdfkin.verification.certificate",
     "DHRow": "urdfkin.dh",
     "DHTable": "urdfkin.dh",
-    "Finding": "urdfkin.diagnostics",
+    "Finding": "urdfkin.lint",
     "FrameChain": "urdfkin.chain",
     "InputError": "urdfkin.errors",
     "NotVerifiedWarning": "urdfkin.call",
@@ -42,8 +42,8 @@ _HOMES = {
     "SourceError": "urdfkin.errors",
     "TableError": "urdfkin.verification.tables",
     "UnknownNameError": "urdfkin.errors",
-    "UrdfError": "urdfkin.diagnostics",
-    "UrdfWarning": "urdfkin.diagnostics",
+    "UrdfError": "urdfkin.lint",
+    "UrdfWarning": "urdfkin.lint",
     "UrdfkinError": "urdfkin.errors",
     "VerificationError": "urdfkin.verification.certificate",
     "check": "urdfkin.checking",

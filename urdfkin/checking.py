@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from urdfkin.demands import switch, word
-from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Limits
-from urdfkin.diagnostics.check import check_robot, read_document
-from urdfkin.diagnostics.reporter import Reporter
+from urdfkin.lint import DEFAULT_LIMITS, Finding, Limits
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rules.meshes import check_meshes
+from urdfkin.lint.runner import check_robot, read_document
 from urdfkin.sources import Source, Text, read_source
-from urdfkin.urdf.meshes import check_meshes
 
 
 def check(

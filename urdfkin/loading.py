@@ -5,8 +5,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 
-from urdfkin.diagnostics import Finding, Oracle, Severity, UrdfError, UrdfWarning, check_text
-from urdfkin.diagnostics.codes.joints import NEARLY_COORDINATE_AXIS
+from urdfkin.lint import Finding, Oracle, Severity, UrdfError, UrdfWarning, check_text
+from urdfkin.lint.codes.joints import NEARLY_COORDINATE_AXIS
 from urdfkin.origin import Origin
 from urdfkin.robot import Robot
 from urdfkin.sources import Source, read_source

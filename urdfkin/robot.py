@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from urdfkin import configuration
 from urdfkin.call import Call
 from urdfkin.demands import switch, whole_number
-from urdfkin.diagnostics import Finding
 from urdfkin.errors import InputError, NotFiniteError
+from urdfkin.lint import Finding
 from urdfkin.manipulator import Manipulator
 from urdfkin.oracle import Oracle, OracleError, version
 from urdfkin.origin import Origin

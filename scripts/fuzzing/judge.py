@@ -12,8 +12,8 @@ import urdfkin
 from scripts.fuzzing import Case
 from scripts.fuzzing.asking import MismatchError, ask, ask_prepared
 from urdfkin.call import NotVerifiedWarning
-from urdfkin.diagnostics import Finding, Severity, UrdfError
 from urdfkin.errors import RangeError, UrdfkinError
+from urdfkin.lint import Finding, Severity, UrdfError
 from urdfkin.robot import Robot
 
 #: Findings about sizes that arithmetic cannot carry: a result that is no number is no surprise after them.

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from urdfkin.diagnostics import Finding, Oracle, Severity, check_text
+from urdfkin.lint import Finding, Oracle, Severity, check_text
 from urdfkin.tree import JointKind, KinematicTree
 from urdfkin.urdf.reader import read_tree
 

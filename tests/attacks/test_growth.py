@@ -12,12 +12,12 @@ import pytest
 
 import urdfkin
 from scripts.growing.kinds import KINDS
-from tests.diagnostics.cases.arm import arm
-from urdfkin.diagnostics import Finding, Severity, UrdfError, check_text
-from urdfkin.diagnostics.document import parse
-from urdfkin.diagnostics.formats import as_json
-from urdfkin.diagnostics.reporter import ERRORS_SHOWN, WRITTEN_OUT, Reporter
+from tests.lint.cases.arm import arm
 from urdfkin.followers import rules_of_text
+from urdfkin.lint import Finding, Severity, UrdfError, check_text
+from urdfkin.lint.formats import as_json
+from urdfkin.lint.reporter import ERRORS_SHOWN, WRITTEN_OUT, Reporter
+from urdfkin.lint.rules.document import parse
 from urdfkin.nearest import nearest
 from urdfkin.urdf.reader import read_tree
 

@@ -41,7 +41,7 @@ from urdfkin.report.junit import as_junit
 from urdfkin.report.markdown import as_markdown
 from urdfkin.validation.campaign import validate
 
-pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.diagnostics.finding.UrdfWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.lint.finding.UrdfWarning")
 
 Skeleton = list[tuple[str, tuple[str, ...]]]
 

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import urdfkin
-from tests.diagnostics.cases.arm import arm
-from urdfkin.diagnostics import Finding, Severity
+from tests.lint.cases.arm import arm
 from urdfkin.judge import judge
+from urdfkin.lint import Finding, Severity
 from urdfkin.robot import Robot
 from urdfkin.view.shapes import shapes
 

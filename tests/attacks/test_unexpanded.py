@@ -5,8 +5,8 @@ import warnings
 import pytest
 
 import urdfkin
-from tests.diagnostics.cases.arm import MESH, arm
-from urdfkin.diagnostics import Severity
+from tests.lint.cases.arm import MESH, arm
+from urdfkin.lint import Severity
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import pytest
 
 import urdfkin
 from urdfkin.checking import check
-from urdfkin.diagnostics import Severity
+from urdfkin.lint import Severity
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray, KinematicTree, freed, with_tilts
 from urdfkin.verification.bounds import EPS

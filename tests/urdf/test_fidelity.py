@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.diagnostics.cases.arm import LIMIT, arm, fixed
+from tests.lint.cases.arm import LIMIT, arm, fixed
 from urdfkin.call import NotVerifiedWarning
 from urdfkin.robot import Robot
 

@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 
 from tests.strategies import rotation, rotations, trees
 from urdfkin.call import NotVerifiedWarning
-from urdfkin.diagnostics import Severity, UrdfWarning, check_text
 from urdfkin.errors import InputError
+from urdfkin.lint import Severity, UrdfWarning, check_text
 from urdfkin.loading import load
 from urdfkin.rotation import rpy_of
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree

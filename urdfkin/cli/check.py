@@ -14,12 +14,12 @@ from urdfkin.checking import check
 from urdfkin.cli.arguments import xacro_args, xacro_option
 from urdfkin.cli.door import command_lines, say, say_styled
 from urdfkin.cli.numbers import Whole
-from urdfkin.diagnostics import DEFAULT_LIMITS, Finding, Limits, Severity
-from urdfkin.diagnostics.codes import REGISTRY
-from urdfkin.diagnostics.explain import find_code
-from urdfkin.diagnostics.formats import as_github, as_json, summary
-from urdfkin.diagnostics.sarif import as_sarif
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
+from urdfkin.lint import DEFAULT_LIMITS, Finding, Limits, Severity
+from urdfkin.lint.codes import REGISTRY
+from urdfkin.lint.explain import find_code
+from urdfkin.lint.formats import as_github, as_json, summary
+from urdfkin.lint.sarif import as_sarif
 from urdfkin.urdf.xacro import XacroError
 
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}

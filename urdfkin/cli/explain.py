@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import click
 
-from urdfkin.diagnostics.codes import REGISTRY
-from urdfkin.diagnostics.explain import find_code, page
 from urdfkin.equations import explain
+from urdfkin.lint.codes import REGISTRY
+from urdfkin.lint.explain import find_code, page
 
 
 @click.command("explain")

@@ -40,8 +40,8 @@ def judge_all(
 
 
 def _judged(source: Robot | str, samples: int, seed: int, how: dict[str, Any]) -> Judgement | None:
-    from urdfkin.diagnostics import UrdfWarning  # noqa: PLC0415  keeps --help fast
     from urdfkin.judge import judge  # noqa: PLC0415
+    from urdfkin.lint import UrdfWarning  # noqa: PLC0415  keeps --help fast
     from urdfkin.loading import load  # noqa: PLC0415
 
     try:

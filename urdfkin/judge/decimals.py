@@ -1,6 +1,6 @@
 """The numbers of a URDF as they are written: decimals, not the doubles nearest to them.
 
-Names and order come from the tree that was read; the text was checked before (`urdfkin.diagnostics`).
+Names and order come from the tree that was read; the text was checked before (`urdfkin.lint`).
 """
 
 from __future__ import annotations

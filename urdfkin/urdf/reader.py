@@ -36,7 +36,7 @@ def read_tree(data: bytes, *, mimic: bool = True, root_joint: str | None = None)
     """The kinematic tree of a URDF.
 
     Args:
-        data: The file's bytes, already found free of errors by `urdfkin.diagnostics`.
+        data: The file's bytes, already found free of errors by `urdfkin.lint`.
         mimic: Whether mimic joints follow their leaders (the URDF's meaning) or move freely.
         root_joint: `"floating"` or `"planar"` hangs the root link from a moving joint `root_joint`.
 

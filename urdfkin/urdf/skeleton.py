@@ -11,14 +11,14 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from urdfkin.diagnostics import joints
-from urdfkin.diagnostics.dialect import check_dialect
-from urdfkin.diagnostics.document import Element, parse
-from urdfkin.diagnostics.encoding import utf8_bytes
-from urdfkin.diagnostics.finding import UrdfError
-from urdfkin.diagnostics.limits import DEFAULT_LIMITS, Limits
-from urdfkin.diagnostics.records import JointRecord, LimitRecord, RobotRecord, read_robot
-from urdfkin.diagnostics.reporter import Reporter
+from urdfkin.lint.finding import UrdfError
+from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rules import axes as joints
+from urdfkin.lint.rules.dialect import check_dialect
+from urdfkin.lint.rules.document import Element, parse
+from urdfkin.lint.rules.encoding import utf8_bytes
+from urdfkin.lint.rules.joints import JointRecord, LimitRecord, RobotRecord, read_robot
 from urdfkin.rotation.arrays import FloatArray
 from urdfkin.rotation.euler import rpy_of
 from urdfkin.rotation.quaternion import rotation_of
@@ -29,7 +29,7 @@ def skeleton(data: bytes, limits: Limits = DEFAULT_LIMITS) -> bytes:
     """The links and joints of a URDF as a plain document.
 
     Args:
-        data: The file's bytes, already found free of errors by `urdfkin.diagnostics`.
+        data: The file's bytes, already found free of errors by `urdfkin.lint`.
         limits: The limits it was checked with.
 
     Raises:

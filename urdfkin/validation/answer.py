@@ -8,8 +8,8 @@ from __future__ import annotations
 import traceback
 from dataclasses import dataclass
 
-from urdfkin.diagnostics import UrdfError
 from urdfkin.errors import UrdfkinError
+from urdfkin.lint import UrdfError
 from urdfkin.oracle import OracleError
 from urdfkin.validation.chunk import Chunk, ChunkResult, Subject, run_chunk
 from urdfkin.validation.outcome import Verdict

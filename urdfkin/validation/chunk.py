@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from urdfkin.catalogue import catalogue
-from urdfkin.diagnostics import UrdfWarning
+from urdfkin.lint import UrdfWarning
 from urdfkin.loading import load
 from urdfkin.oracle import Oracle, OracleError
 from urdfkin.origin import Origin

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from urdfkin.description import describe
-from urdfkin.diagnostics import Finding
+from urdfkin.lint import Finding
 from urdfkin.oracle import Oracle
 from urdfkin.robot import Robot
 from urdfkin.validation.chains import chains_of

@@ -1,0 +1,40 @@
+"""Whatever the bytes are, the check ends with findings and never with a traceback."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.lint.cases import CASES
+from urdfkin.lint import check_text
+
+DOCUMENTS = [case.data for case in CASES if len(case.data) < 5_000]
+
+#: Pieces that mean something to one of the checks.
+TOKENS = [
+    *(b"<joint ", b"</joint>", b"<link name='", b"/>", b">", b"'", b'"', b"&", b"&#9;", b"<!--", b"-->"),
+    *(b"<![CDATA[", b"]]>", b"<!DOCTYPE robot [", b"nan", b"1e400", b"${x}", b"\xff", b"\0", b"\xef\xbb\xbf"),
+    *(b"mimic", b"xyz", b"xmlns='a'", b"version='1.1'", b"quat_xyzw='0 0 0 1'", b"type='planar'", b"base"),
+    *(b"l1", b"\t", b"\r\n"),
+]
+
+
+@given(st.binary(max_size=400))
+def test_random_bytes(data: bytes) -> None:
+    check_text(data)
+
+
+@given(st.lists(st.sampled_from(TOKENS), max_size=40))
+def test_random_tokens(tokens: list[bytes]) -> None:
+    check_text(b"<robot name='r'>" + b" ".join(tokens))
+
+
+@given(st.sampled_from(DOCUMENTS), st.data())
+def test_documents_with_a_piece_replaced(document: bytes, data: st.DataObject) -> None:
+    start = data.draw(st.integers(0, len(document)))
+    length = data.draw(st.integers(0, 40))
+    piece = data.draw(st.sampled_from([*TOKENS, b""]))
+    mutant = document[:start] + piece + document[start + length :]
+    findings = check_text(mutant)
+    assert list(findings) == sorted(findings, key=lambda finding: (finding.line, finding.column))
+    assert findings == check_text(mutant)

@@ -1,0 +1,88 @@
+"""Size is no danger: long chains, long loops, deep nesting and big files take linear time and no stack."""
+
+import time
+
+import pytest
+
+from urdfkin.lint import Finding, Limits, check_text
+
+pytestmark = pytest.mark.slow
+
+MANY = 50_000
+
+
+def chain(length: int, back: str = "", mimic: bool = False) -> bytes:
+    links = "".join(f'<link name="l{i}"/>\n' for i in range(length + 1))
+    follow = '<mimic joint="j{}"/>' if mimic else "{}"
+    joints = "".join(
+        f'<joint name="j{i}" type="continuous"><parent link="l{i}"/><child link="l{i + 1}"/>'
+        f"{follow.format(i - 1 if mimic else '') if i else ''}</joint>\n"
+        for i in range(length)
+    )
+    return f'<robot name="r">\n{links}{joints}{back}</robot>'.encode()
+
+
+def timed(data: bytes, seconds: float = 20.0) -> tuple[Finding, ...]:
+    start = time.perf_counter()
+    findings = check_text(data)
+    assert time.perf_counter() - start < seconds
+    return findings
+
+
+@pytest.mark.slow
+def test_a_chain_of_50000_links_has_no_finding() -> None:
+    assert timed(chain(MANY)) == ()
+
+
+def test_a_loop_of_50000_links_is_one_error_on_its_line() -> None:
+    back = '<joint name="back" type="fixed"><parent link="l50000"/><child link="l0"/></joint>'
+    (finding,) = timed(chain(MANY, back))
+    assert (finding.code, finding.line) == ("URDF412", 2 * MANY + 3)
+
+
+@pytest.mark.slow
+def test_a_chain_of_50000_mimics_is_resolved_in_linear_time() -> None:
+    codes = {finding.code for finding in timed(chain(MANY, mimic=True))}
+    assert codes == {"URDF524", "URDF525"}
+
+
+def test_50000_unknown_links_do_not_search_for_suggestions_forever() -> None:
+    joints = "".join(
+        f'<joint name="j{i}" type="fixed"><parent link="x{i}"/><child link="l{i}"/></joint>'
+        for i in range(5_000)
+    )
+    links = "".join(f'<link name="l{i}"/>' for i in range(5_000))
+    findings = timed(f'<robot name="r">{links}{joints}</robot>'.encode())
+    assert sum(finding.count for finding in findings) == 5_000
+
+
+@pytest.mark.parametrize(
+    ("limits", "code"),
+    [
+        (Limits(bytes=10), "URDF108"),
+        (Limits(elements=1), "URDF114"),
+        (Limits(depth=1), "URDF115"),
+        (Limits(attributes=0), "URDF116"),
+        (Limits(name=2), "URDF117"),
+    ],
+)
+def test_each_limit_refuses_and_says_how_to_raise_it(limits: Limits, code: str) -> None:
+    (finding,) = check_text(b'<robot name="r"><link name="a"/></robot>', limits=limits)
+    assert finding.code == code
+    assert finding.remedy is not None
+    assert "--max-" in finding.remedy
+
+
+def test_a_number_has_a_limit_and_what_it_counts_for_no_robot_is_a_warning() -> None:
+    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/><origin xyz="0 0 {}"/></joint>'
+    mass = '<inertial><mass value="{}"/></inertial>'
+    text = '<robot name="r"><link name="a">{}</link><link name="b"/>' + joint + "</robot>"
+    for inside, origin, severity in (("", "1" * 9, "error"), (mass.format("1" * 9), "1", "warning")):
+        findings = check_text(text.format(inside, origin).encode(), limits=Limits(number=8))
+        assert ("URDF305", severity) in [(f.code, f.severity.value) for f in findings]
+
+
+def test_lines_beyond_65535_are_right() -> None:
+    data = b'<robot name="r">' + b"\n" * 100_000 + b'<link name="a"/><link name="a"/></robot>'
+    (finding,) = check_text(data)
+    assert finding.line == 100_001

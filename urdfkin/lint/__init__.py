@@ -1,0 +1,16 @@
+"""Strict, located, coded findings about a URDF, before anything else is asked to read it."""
+
+from urdfkin.lint.finding import Finding, Oracle, Severity, UrdfError, UrdfWarning
+from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
+from urdfkin.lint.runner import check_text
+
+__all__ = [
+    "DEFAULT_LIMITS",
+    "Finding",
+    "Limits",
+    "Oracle",
+    "Severity",
+    "UrdfError",
+    "UrdfWarning",
+    "check_text",
+]

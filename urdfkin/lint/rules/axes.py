@@ -1,0 +1,182 @@
+"""Axes and limits of joints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from urdfkin.lint.codes import joints as codes
+from urdfkin.lint.escape import quoted
+from urdfkin.lint.finding import Severity
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rules.document import Element
+from urdfkin.lint.rules.joints import AXIAL, FURTHER_LIMITS, JointRecord, LimitRecord, RobotRecord
+
+#: Lengths whose square neither under- nor overflows.
+SHORTEST, LONGEST = 1e-150, 1e150
+
+#: A length that differs from one by less is rounding of the last digits and worth a note at most.
+ROUNDING = 2e-4
+
+#: What Pinocchio takes for a coordinate axis: Eigen's isApprox compares squares with the square of this.
+_SNAPPED = 1e-12
+
+#: A tilt that turns vectors by no more than the two roundings that `verification.bounds` grants Pinocchio for
+#: an axis, which it does not use for a coordinate axis.
+_TILT = 2.0**-52
+
+
+def check_joints(report: Reporter, robot: RobotRecord) -> None:
+    """Axes that have no direction, are no unit vectors or are not used; limits that contradict themselves."""
+    for joint in robot.joints:
+        if joint.kind in AXIAL:
+            _check_axis(report, joint)
+        elif joint.kind == "planar":
+            _check_planar(report, joint)
+        if joint.limit is not None:
+            _check_limit(report, joint, joint.limit, robot.version)
+
+
+def _written(joint: JointRecord) -> str:
+    axis = joint.axis_element
+    return f"xyz={quoted(axis.attributes.get('xyz', ''))}" if axis is not None else 'the default "1 0 0"'
+
+
+def _check_axis(report: Reporter, joint: JointRecord) -> None:
+    if joint.axis is None or joint.axis_element is None:
+        return
+    length = math.hypot(*joint.axis)
+    if not SHORTEST < length < LONGEST:
+        what = "is zero" if length == 0.0 else f"has no usable length ({length:.3g})"
+        report.add(
+            codes.NO_DIRECTION,
+            f"the axis {what}",
+            joint.axis_element,
+            attribute="xyz",
+            found=_written(joint),
+            remedy='write a unit vector, such as xyz="0 0 1"',
+        )
+    elif abs(length - 1.0) > 1e-12:
+        unit = " ".join(repr(x / length) for x in joint.axis)
+        report.add(
+            codes.AXIS_LENGTH,
+            f"the axis has length {length:.9g} and is normalised",
+            joint.axis_element,
+            attribute="xyz",
+            found=_written(joint),
+            remedy=f'write xyz="{unit}"',
+            severity=Severity.NOTE if abs(length - 1.0) < ROUNDING else None,
+            weight=abs(length - 1.0),
+        )
+    _check_snapped(report, joint, joint.axis, joint.axis_element)
+
+
+def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
+    if snapped := _snapped(axis):
+        unit, tilt = snapped
+        written = " ".join(f"{x:g}" for x in unit)
+        report.add(
+            codes.NEARLY_COORDINATE_AXIS,
+            f"the axis is {tilt:.2g} rad off {written}, and Pinocchio takes {written}",
+            element,
+            attribute="xyz",
+            found=_written(joint),
+            remedy=f'write xyz="{written}"; if the tilt is meant, write the vector twice as long',
+            weight=tilt,
+        )
+
+
+def tilts(robot: RobotRecord) -> dict[str, float]:
+    """By how much (rad) Pinocchio's axis is off the file's, for the joints where that is a finding."""
+    snapped = ((joint.name, _snapped(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
+    return {name: taken[1] for name, taken in snapped if taken is not None}
+
+
+def _snapped(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
+    """The coordinate axis that Pinocchio takes for another one, and how far off it is; mostly None."""
+    if axis is None:
+        return None
+    for i in range(3):
+        unit = tuple(float(i == k) for k in range(3))
+        tilt = math.hypot(*(x for k, x in enumerate(axis) if k != i))
+        if tilt > _TILT and _is_approx(axis, unit):
+            return unit, tilt
+    return None
+
+
+def _is_approx(axis: Sequence[float], unit: Sequence[float]) -> bool:
+    """Eigen's `axis.isApprox(unit)`, square by square in its order."""
+    difference = sum((x - e) * (x - e) for x, e in zip(axis, unit, strict=True))
+    return difference <= _SNAPPED * _SNAPPED * min(sum(x * x for x in axis), 1.0)
+
+
+def _check_planar(report: Reporter, joint: JointRecord) -> None:
+    x, y, z = joint.axis or (0.0, 0.0, 0.0)
+    if z > 0.0 and math.hypot(x, y) <= 1e-9 * z:
+        return
+    at = joint.axis_element or joint.element
+    report.add(
+        codes.PLANAR_AXIS,
+        "a planar joint moves in the XY plane of its frame, whatever its axis says",
+        at,
+        attribute="xyz",
+        found=_written(joint),
+        remedy='turn the origin so that the normal is z, and write <axis xyz="0 0 1"/>',
+    )
+
+
+def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
+    strict = version >= (1, 2)  # from then on urdfdom asks the same of every joint, whatever its type
+    for attribute in ("effort", "velocity", *FURTHER_LIMITS):
+        value = getattr(limit, attribute)
+        if value is not None and value < 0.0:
+            refused = strict or joint.kind in AXIAL
+            report.add(
+                codes.NEGATIVE_LIMIT if refused else codes.IGNORED,
+                f"the limit of {attribute} is negative; Pinocchio {'refuses' if refused else 'ignores'} it",
+                limit.element,
+                attribute=attribute,
+                found=quoted(limit.element.attributes[attribute]),
+                remedy="write its magnitude",
+            )
+    if joint.kind == "continuous":
+        _check_continuous(report, limit)
+    bounded = joint.kind in ("revolute", "prismatic")
+    written = {"lower", "upper"} & limit.element.attributes.keys()
+    if not bounded and not (strict and len(written) == 2):
+        return
+    if any(getattr(limit, name) is None for name in written):
+        return
+    lower, upper = limit.lower or 0.0, limit.upper or 0.0
+    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "neither lower nor upper, so both are 0"
+    if lower > upper:
+        report.add(
+            codes.INVERTED_LIMIT,
+            "the lower limit is above the upper limit",
+            limit.element,
+            attribute="lower",
+            found=found if len(written) == 2 else f"{found} (what is not written is 0)",
+            remedy="swap the two" if len(written) == 2 else "write both limits",
+        )
+    elif lower == upper and bounded:
+        report.add(
+            codes.EMPTY_RANGE,
+            "the joint cannot move: its limits are equal",
+            limit.element,
+            attribute="lower",
+            found=found,
+            remedy="write the range, or make the joint fixed",
+        )
+
+
+def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
+    written = [name for name in ("lower", "upper") if name in limit.element.attributes]
+    if any(getattr(limit, name) for name in written):
+        report.add(
+            codes.IGNORED,
+            "a continuous joint has no position limits; they are ignored",
+            limit.element,
+            attribute=written[0],
+            found=" ".join(f"{name}={quoted(limit.element.attributes[name])}" for name in written),
+            remedy='remove them, or write type="revolute"',
+        )

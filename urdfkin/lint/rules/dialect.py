@@ -1,0 +1,225 @@
+"""Whether the document is a URDF: its root element, its version, and no xacro left in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TypeVar
+
+from urdfkin.lint.codes import dialect as codes
+from urdfkin.lint.codes import structure, text
+from urdfkin.lint.escape import quoted, shortened
+from urdfkin.lint.finding import Severity
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rules.document import Element
+from urdfkin.lint.rules.vocabulary import OPAQUE
+
+_T = TypeVar("_T")
+
+#: What another root element is the sign of.
+_FORMATS = {
+    "sdf": "this is an SDF file; convert it to a URDF first",
+    "mujoco": "this is an MJCF file; convert it to a URDF first",
+    "mujocoinclude": "this is an MJCF file; convert it to a URDF first",
+    "model": "this is a part of an SDF file; convert it to a URDF first",
+    "world": "this is a part of an SDF file; convert it to a URDF first",
+    "collada": "this is a COLLADA file",
+    "html": "this is a web page, not the file it shows",
+    "launch": "this is a launch file; the URDF is what it loads",
+    "package": "this is a package manifest; the URDF is another file",
+    "drake": "this is a Drake file; convert it to a URDF first",
+}
+
+#: Elements of an SRDF, which accompanies a URDF.
+_SRDF = {"group", "group_state", "end_effector", "virtual_joint", "disable_collisions", "passive_joint"}
+
+_VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
+_XACRO_NAMESPACE = re.compile(r"https?://(www\.)?(ros|wiki\.ros)\.org/(wiki/)?xacro")
+_COMMAND = re.compile(r"\$\((find|arg|env|optenv|eval|anon|dirname)\b")
+_XINCLUDE = "http://www.w3.org/2001/XInclude"
+
+#: Newest version urdfdom 6 knows.
+NEWEST = (1, 2)
+
+
+def check_dialect(report: Reporter, root: Element) -> tuple[int, int] | None:
+    """The version of a URDF, or None when the document is none."""
+    if root.tag != "robot":
+        _other_format(report, root)
+        return None
+    prefixes = _prefixes(root)
+    _check_namespaces(report, root, prefixes)
+    _check_name(report, root)
+    if not root.all("link"):
+        srdf = any(child.tag in _SRDF for child in root.children)
+        remedy = "this is an SRDF; pass the URDF it goes with" if srdf else "a robot is at least one <link>"
+        report.add(codes.NO_LINKS, "the robot has no link", root, remedy=remedy)
+    return _version(report, root)
+
+
+def _other_format(report: Reporter, root: Element) -> None:
+    prefix, _, local = root.tag.rpartition(":")
+    if local == "robot" and prefix:
+        remedy = f"write <robot> without the prefix {prefix!r}"
+    elif local.lower() == "robot":
+        remedy = "write it in lower case"
+    else:
+        remedy = _FORMATS.get(local.lower(), "a URDF begins with <robot name=...>")
+    report.add(codes.NOT_URDF, "the root element is not <robot>", root, found=f"<{root.tag}>", remedy=remedy)
+
+
+def _prefixes(root: Element) -> dict[str, str]:
+    """Prefix -> namespace, as declared anywhere in the document."""
+    return {
+        key.removeprefix("xmlns:"): value
+        for element in root.walk()
+        for key, value in element.attributes.items()
+        if key.startswith("xmlns:")
+    }
+
+
+def _check_namespaces(report: Reporter, root: Element, prefixes: dict[str, str]) -> None:
+    """Nothing that should have been expanded or included before."""
+    if "xmlns" in root.attributes:
+        report.add(
+            codes.NAMESPACE,
+            "the elements are put into a namespace, where most readers do not find them",
+            root,
+            attribute="xmlns",
+            found=quoted(root.attributes["xmlns"]),
+            remedy="remove xmlns",
+        )
+    xacro = {prefix for prefix, uri in prefixes.items() if _XACRO_NAMESPACE.match(uri)} | {"xacro"}
+    macros = []
+    for element in root.walk():
+        prefix, _, local = element.tag.rpartition(":")
+        if prefix in xacro:
+            macros.append(element)
+        elif (local == "include" and prefixes.get(prefix) == _XINCLUDE) or element.tag == "xi:include":
+            report.add(
+                text.INCLUDE,
+                "another file is to be included",
+                element,
+                found=quoted(element.attributes.get("href", f"<{element.tag}>")),
+                remedy="write its content here; nothing was opened",
+            )
+    if not _check_macros(report, root, macros):
+        _check_expressions(report, root)
+
+
+_EXPAND = "expand it first: xacro FILE > robot.urdf, or install urdfkin[xacro] and pass the .xacro file"
+_HARMLESS = "; kinematics does not use it"
+
+
+def _check_macros(report: Reporter, root: Element, macros: list[Element]) -> bool:
+    """Report macros; whether one is missing where it may have held a part of the motion."""
+    missed, harmless = _parted(macros, lambda m: m.parent in (None, root) or m.holder.tag == "joint")
+    for group, severity in ((missed, None), (harmless, Severity.WARNING)):
+        if group:
+            report.add(
+                codes.XACRO,
+                f"xacro that was not expanded{_HARMLESS if severity else ''}",
+                group[0],
+                found=f"<{shortened(group[0].tag)}>{_more(group)}",
+                remedy=_EXPAND,
+                severity=severity,
+            )
+    return bool(missed)
+
+
+def _check_expressions(report: Reporter, root: Element) -> None:
+    """Expressions in the place of names and numbers: an error where motion depends on them."""
+    written = [
+        (element, key)
+        for element in _outside_extensions(root)
+        for key, value in element.attributes.items()
+        if "$" in value and is_expression(value) and not key.startswith("xmlns")
+    ]
+    used, harmless = _parted(written, lambda place: _moves(place[0]))
+    for group, severity in ((used, None), (harmless, Severity.WARNING)):
+        if group:
+            element, key = group[0]
+            report.add(
+                codes.XACRO,
+                f"a xacro expression that was not expanded{_HARMLESS if severity else ''}",
+                element,
+                attribute=key,
+                found=f"{shortened(key)}={quoted(element.attributes[key])}{_more(group)}",
+                remedy=_EXPAND,
+                severity=severity,
+            )
+
+
+def _moves(element: Element) -> bool:
+    """Whether motion depends on an element's attributes: those of a link's own tag, and all of a joint's."""
+    holder = element.holder
+    return holder.tag == "joint" or (holder is element and element.tag == "link")
+
+
+def _parted(these: Iterable[_T], chosen: Callable[[_T], bool]) -> tuple[list[_T], list[_T]]:
+    """Those that are chosen and the others, each in their order."""
+    parts: tuple[list[_T], list[_T]] = ([], [])
+    for one in these:
+        parts[not chosen(one)].append(one)
+    return parts
+
+
+def _more(group: Sequence[object]) -> str:
+    return f" and {len(group) - 1} more" if len(group) > 1 else ""
+
+
+def is_expression(value: str) -> bool:
+    """Whether a value holds something that xacro would have replaced.
+
+    >>> is_expression("${h} 0 0"), is_expression("$(arg side)/hand.stl"), is_expression("5 $")
+    (True, True, False)
+    """
+    start = value.find("${")
+    return (start >= 0 and "}" in value[start:]) or _COMMAND.search(value) is not None
+
+
+def _outside_extensions(root: Element) -> Iterator[Element]:
+    stack = [root]
+    while stack:
+        element = stack.pop()
+        yield element
+        stack += [child for child in reversed(element.children) if child.tag not in OPAQUE]
+
+
+def _check_name(report: Reporter, root: Element) -> None:
+    name = root.attributes.get("name")
+    if name is None:
+        report.add(structure.MISSING_NAME, "the robot has no name", root, remedy='write <robot name="...">')
+    elif not name.strip():
+        report.add(
+            structure.ODD_NAME, "the robot's name is empty", root, attribute="name", remedy="give it a name"
+        )
+
+
+def _version(report: Reporter, root: Element) -> tuple[int, int]:
+    written = root.attributes.get("version")
+    if written is None:
+        return (1, 0)
+    match = _VERSION.fullmatch(written)
+    version = (int(match[1]), int(match[2])) if match and len(written) < 20 else None
+    known = version is not None and (1, 0) <= version <= NEWEST
+    if version is None or not known:
+        report.add(
+            codes.VERSION,
+            "there is no such URDF version" if version else "a URDF version is two numbers and a point",
+            root,
+            attribute="version",
+            found=quoted(written),
+            remedy='write version="1.0" if the file follows it, or leave it out',
+        )
+        return (1, 0)
+    if version != (1, 0):
+        report.add(
+            codes.NEWER_VERSION,
+            "most readers know only URDF 1.0",
+            root,
+            attribute="version",
+            found=quoted(written),
+            remedy="leave it out unless the file uses what is new in it",
+        )
+    return version

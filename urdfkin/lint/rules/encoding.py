@@ -1,0 +1,122 @@
+"""Bytes to UTF-8 text, or a finding that names the encoding: nothing is guessed and nothing is repaired."""
+
+from __future__ import annotations
+
+import codecs
+import re
+
+from urdfkin.lint.codes import text as codes
+from urdfkin.lint.escape import quoted
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rules.document import line_and_column
+
+#: Byte order marks of encodings that are not UTF-8; the longer ones first.
+_MARKS = (
+    (codecs.BOM_UTF32_LE, "UTF-32"),
+    (codecs.BOM_UTF32_BE, "UTF-32"),
+    (codecs.BOM_UTF16_LE, "UTF-16"),
+    (codecs.BOM_UTF16_BE, "UTF-16"),
+)
+
+#: How '<?' or '<r' begin in encodings of more than one byte without a mark.
+_WIDE = ((b"<\0\0\0", "UTF-32"), (b"\0\0\0<", "UTF-32"), (b"<\0", "UTF-16"), (b"\0<", "UTF-16"))
+
+_DECLARATION = re.compile(rb"""<\?xml(?=\s)[^>]*?\?>""")
+_ENCODING = re.compile(rb"""\sencoding\s*=\s*["']([^"']*)["']""")
+_VERSION = re.compile(rb"""\sversion\s*=\s*["']([^"']*)["']""")
+
+#: Names whose ASCII half is ASCII, so that a text of ASCII characters means the same in each.
+_ASCII_SUPERSETS = re.compile(r"(iso8859|windows125|cp125|latin|koi8|mac)")
+
+
+def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
+    """The bytes without a byte order mark, once they are known to be UTF-8; None after an error.
+
+    Args:
+        report: Where findings go.
+        data: The file.
+    """
+    if not data.strip():
+        what = "the file is empty" if not data else "the file holds only blanks"
+        report.add(codes.EMPTY, what, remedy="look at what should have written it")
+        return None
+    wide = next((name for mark, name in (*_MARKS, *_WIDE) if data.startswith(mark)), None)
+    if wide is not None:
+        report.add(codes.ENCODING, "a URDF is UTF-8 text", found=wide, remedy="save the file as UTF-8")
+        return None
+    marked = data.startswith(codecs.BOM_UTF8)
+    text = data.removeprefix(codecs.BOM_UTF8)
+    declared = _declared(text)
+    if not (_is_utf8(report, text, declared) and _agrees(report, text, declared)):
+        return None
+    if marked:
+        report.add(
+            codes.BYTE_ORDER_MARK, "a byte order mark stands before the text", remedy="remove it if you can"
+        )
+    return text
+
+
+def _declared(text: bytes) -> str | None:
+    """The encoding the XML declaration names, as written."""
+    declaration = _DECLARATION.match(text.lstrip())
+    match = _ENCODING.search(declaration[0]) if declaration else None
+    return match[1].decode("ascii", "replace") if match else None
+
+
+def _is_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
+    zero = text.find(b"\0")
+    if zero >= 0:
+        report.add(
+            codes.ENCODING,
+            "a zero byte stands in the text: some readers would stop there, others go on",
+            remedy="this is not a text file, or it was damaged",
+            position=line_and_column(text, zero),
+        )
+        return False
+    try:
+        text.decode("utf-8")
+    except UnicodeDecodeError as error:
+        claim = f", although the file declares {declared}" if declared else ""
+        report.add(
+            codes.ENCODING,
+            f"a byte that is not UTF-8{claim}",
+            found=f"0x{text[error.start]:02x}",
+            remedy="save the file as UTF-8",
+            position=line_and_column(text, error.start),
+        )
+        return False
+    return True
+
+
+def _agrees(report: Reporter, text: bytes, declared: str | None) -> bool:
+    """Whether the declaration allows the text to be read as UTF-8."""
+    declaration = _DECLARATION.match(text)
+    version = _VERSION.search(declaration[0]) if declaration else None
+    if version is not None and version[1] != b"1.0":
+        found = quoted(version[1].decode())
+        report.add(codes.XML_VERSION, "a URDF is XML 1.0", found=found, remedy='write version="1.0"')
+    if declared is None or _codec(declared) in ("utf-8", "ascii"):
+        return True
+    if text.isascii() and _ASCII_SUPERSETS.match(_codec(declared) or ""):
+        report.add(
+            codes.DECLARED_ASCII,
+            "the declared encoding is not UTF-8, though every character is ASCII",
+            found=quoted(declared),
+            remedy='write encoding="UTF-8"',
+        )
+        return True
+    report.add(
+        codes.DECLARED,
+        "the declared encoding is not UTF-8",
+        found=quoted(declared),
+        remedy='save the file as UTF-8 and write encoding="UTF-8"',
+    )
+    return False
+
+
+def _codec(name: str) -> str | None:
+    """Python's name of an encoding, in lower case; None when there is none of that name."""
+    try:
+        return codecs.lookup(name).name.lower().replace("-", "").replace("utf8", "utf-8")
+    except LookupError:
+        return None

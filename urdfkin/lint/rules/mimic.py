@@ -1,0 +1,134 @@
+"""Joints that follow others: leaders must exist, have one coordinate, and not follow in a circle."""
+
+from __future__ import annotations
+
+from urdfkin.lint.codes import joints as codes
+from urdfkin.lint.escape import quoted
+from urdfkin.lint.finding import Severity
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rule import Code
+from urdfkin.lint.rules.joints import AXIAL, JointRecord, MimicRecord, RobotRecord
+
+#: Largest multiplier, and offset in rad or m, that is taken for real.
+LARGEST = 1e6
+
+
+def check_mimic(report: Reporter, robot: RobotRecord, *, obeyed: bool) -> None:
+    """What is wrong with mimic joints.
+
+    Args:
+        report: Where findings go.
+        robot: What was read.
+        obeyed: Whether mimic is on. When it is off, nothing follows, and every finding is a note.
+    """
+    joints = robot.by_name
+    judge = _Judge(report, joints, obeyed)
+    for joint in robot.joints:
+        if joint.mimic is not None:
+            judge.check(joint, joint.mimic)
+
+
+class _Judge:
+    """Checks one follower after another."""
+
+    def __init__(self, report: Reporter, joints: dict[str, JointRecord], obeyed: bool) -> None:
+        self.report, self.joints, self.obeyed = report, joints, obeyed
+        self.looped = _looped(joints)
+
+    def add(self, code: Code, message: str, mimic: MimicRecord, attribute: str, remedy: str) -> None:
+        """Report a finding at an attribute of a `<mimic>`."""
+        written = mimic.element.attributes.get(attribute)
+        self.report.add(
+            code,
+            message,
+            mimic.element,
+            attribute=attribute,
+            found=None if written is None else f"{attribute}={quoted(written)}",
+            remedy=remedy,
+            severity=None if self.obeyed else Severity.NOTE,
+        )
+
+    def check(self, joint: JointRecord, mimic: MimicRecord) -> None:
+        """Everything about one follower."""
+        if joint.kind == "fixed":
+            self.add(
+                codes.IGNORED,
+                "a fixed joint follows nobody; its mimic is ignored",
+                mimic,
+                "joint",
+                "remove it",
+            )
+            return
+        if joint.kind in ("planar", "floating"):
+            message = f"a {joint.kind} joint cannot follow another: it has several coordinates"
+            self.add(codes.MIMIC_LEADER, message, mimic, "joint", "remove it")
+            return
+        leader = self.joints.get(mimic.leader)
+        if leader is None:
+            self.unknown(mimic)
+        elif joint.name in self.looped:
+            itself = leader is joint
+            message = "the joint mimics itself" if itself else "the joints mimic each other in a circle"
+            self.add(codes.MIMIC_LOOP, message, mimic, "joint", "name a joint that moves by itself")
+        elif leader.kind is not None and leader.kind not in AXIAL:
+            count = "no coordinate" if leader.kind == "fixed" else "several coordinates"
+            message = f"the joint to follow is {leader.kind} and has {count}"
+            self.add(codes.MIMIC_LEADER, message, mimic, "joint", "name a joint with one coordinate")
+        else:
+            self.check_sound(joint, mimic, leader)
+
+    def unknown(self, mimic: MimicRecord) -> None:
+        """The leader does not exist."""
+        nearest = self.report.nearest(mimic.leader, self.joints)
+        remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
+        if self.obeyed:
+            remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
+        self.add(codes.MIMIC_UNKNOWN, "the joint to follow does not exist", mimic, "joint", remedy)
+
+    def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
+        """A follower that can follow: is it what was meant?"""
+        if mimic.multiplier == 0.0:
+            self.add(
+                codes.MIMIC_CONSTANT,
+                f"the multiplier is zero: the joint stays at {mimic.offset:g}",
+                mimic,
+                "multiplier",
+                "write the ratio, or make the joint fixed",
+            )
+        for attribute, value in (("multiplier", mimic.multiplier), ("offset", mimic.offset)):
+            if abs(value) > LARGEST:
+                message = f"the {attribute} is out of all proportion"
+                self.add(codes.MIMIC_SCALE, message, mimic, attribute, "check the exponent")
+        if joint.kind == "continuous":
+            self.add(
+                codes.MIMIC_CONTINUOUS,
+                "a continuous joint follows another; Pinocchio by itself would let it turn freely",
+                mimic,
+                "joint",
+                'write type="revolute" for it',
+            )
+        if leader.mimic is not None:
+            self.add(
+                codes.MIMIC_CHAIN,
+                f"the joint to follow follows {leader.mimic.leader!r} itself",
+                mimic,
+                "joint",
+                "name the joint that moves, for readers that resolve one step only",
+            )
+
+
+def _looped(joints: dict[str, JointRecord]) -> set[str]:
+    """Names of the joints that stand in a circle of mimics; each joint is walked over once."""
+    looped: set[str] = set()
+    walked: set[str] = set()
+    for start in joints:
+        path: dict[str, int] = {}
+        name: str | None = start
+        while name is not None and name in joints and name not in walked:
+            walked.add(name)
+            path[name] = len(path)
+            rule = joints[name].mimic
+            name = None if rule is None else rule.leader
+        if name is not None and name in path:
+            looped |= {member for member, place in path.items() if place >= path[name]}
+    return looped

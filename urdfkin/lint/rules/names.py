@@ -1,0 +1,110 @@
+"""Names of links and joints: those Pinocchio keeps for itself, and those other programs stumble over."""
+
+from __future__ import annotations
+
+import unicodedata
+
+from urdfkin.lint.codes import structure as codes
+from urdfkin.lint.escape import quoted
+from urdfkin.lint.finding import Severity
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rules.document import Element
+from urdfkin.lint.rules.joints import RobotRecord
+
+#: Longer names break tables, and paths made of them.
+LONGEST = 200
+
+
+def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) -> None:
+    """Odd, reserved and confusable names.
+
+    Args:
+        report: Where findings go.
+        robot: What was read.
+        root_joint: Set when the robot will hang from a joint `root_joint` in a link `universe`.
+    """
+    links = list(robot.links.items())
+    joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
+    for name, element in (*links, *joints):
+        _check_odd(report, name, element)
+        _check_blanks(report, element)
+        _check_reserved(report, name, element, root_joint)
+    for kind in (links, joints):
+        _check_lookalikes(report, kind)
+
+
+def _check_odd(report: Reporter, name: str, element: Element) -> None:
+    reason = None
+    if not name.isprintable():
+        reason = "the name holds characters that cannot be printed"
+    elif name != name.strip():
+        reason = "the name begins or ends with a blank"
+    elif "/" in name or "\\" in name:
+        reason = "the name holds a slash, as a path does"
+    elif name[0] in "=+-@":
+        reason = "the name begins like a spreadsheet formula"
+    elif len(name) > LONGEST:
+        reason = f"the name has {len(name)} characters"
+    elif any(c in "\"'<>&|;`$" for c in name):
+        reason = "the name holds a character that shells or XML treat specially"
+    if reason:
+        report.add(
+            codes.ODD_NAME,
+            reason,
+            element,
+            attribute="name",
+            found=quoted(name),
+            remedy="use letters, digits, - and _",
+        )
+
+
+def _check_blanks(report: Reporter, element: Element) -> None:
+    raw = report.raw(element, "name") if report.has_raw_blanks else None
+    if raw is not None and any(c in raw for c in "\t\r\n"):
+        report.add(
+            codes.NAME_BLANKS,
+            "a tab or line end stands inside the name",
+            element,
+            attribute="name",
+            found=quoted(raw),
+            remedy="write the name on one line, without tabs",
+        )
+
+
+def _check_reserved(report: Reporter, name: str, element: Element, root_joint: str | None) -> None:
+    if name == "universe" and element.tag == "joint":
+        report.add(
+            codes.UNIVERSE,
+            "Pinocchio calls the world by this name and does not find the joint",
+            element,
+            attribute="name",
+            remedy="rename it",
+        )
+    elif (element.tag, name) in (("link", "universe"), ("joint", "root_joint")):
+        what = "the world" if name == "universe" else "the joint of a free or planar base"
+        report.add(
+            codes.RESERVED_NAME,
+            f"{what} is called by this name",
+            element,
+            attribute="name",
+            remedy="rename it" if root_joint else "rename it, or load without root_joint",
+            severity=Severity.ERROR if root_joint else None,
+        )
+
+
+def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> None:
+    seen: dict[str, str] = {}
+    for name, element in named:
+        if name.isascii() or len(name) > LONGEST:
+            continue  # a longer one is odd anyway, and sorting its marks takes the square of their number
+        key = unicodedata.normalize("NFKC", name)
+        first = seen.setdefault(key, name)
+        if first != name:
+            report.add(
+                codes.LOOKALIKE,
+                "another name looks the same and is written with other characters",
+                element,
+                attribute="name",
+                found=ascii(name) + " and " + ascii(first),
+                remedy="use one of the two",
+            )

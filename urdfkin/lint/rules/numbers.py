@@ -1,0 +1,177 @@
+"""Numbers as URDF writes them: ASCII, finite, and exactly as many as the vector has.
+
+The grammar is that of `xs:double` without its special values, which is what urdfdom accepts. Python's own
+`float` is far more generous (`1_0`, Arabic digits, `nan`) and is only asked once the grammar has agreed.
+"""
+
+from __future__ import annotations
+
+import html
+import math
+import re
+from dataclasses import dataclass
+
+from urdfkin.lint.codes import numbers as codes
+from urdfkin.lint.escape import quoted
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rule import Code
+from urdfkin.lint.rules.document import Element
+from urdfkin.numerals import DECIMAL
+
+#: No text can be split in two ways by this: one that is no number takes linear time too.
+_BLANKS = re.compile(r"[ \t\r\n]+")
+
+
+@dataclass(slots=True)
+class NumberReader:
+    """Reads numbers out of attributes and reports what is wrong with them.
+
+    Attributes:
+        report: Where findings go.
+        bad_number: Code for what is no number; another one where nothing depends on it.
+        bad_vector: Code for the wrong count.
+    """
+
+    report: Reporter
+    bad_number: Code = codes.BAD_NUMBER
+    bad_vector: Code = codes.BAD_VECTOR
+
+    def scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
+        """One number; `default` when the attribute is missing, None when it cannot be read."""
+        written = element.attributes.get(attribute)
+        if written is None:
+            return default
+        if self._is_too_long(element, attribute, written, self.report.limits.number):
+            return None
+        value = self._number(element, attribute, _BLANKS.sub(" ", written).strip(" "))
+        if value is not None and written != written.rstrip():
+            self._refused(element, attribute, "a blank after the number")
+        elif value is not None and self.report.has_raw_blanks:
+            self._check_raw(element, attribute, 1)
+        return value
+
+    def vector(self, element: Element, attribute: str, count: int = 3) -> tuple[float, ...] | None:
+        """`count` numbers, or None when the attribute is missing or cannot be read."""
+        written = element.attributes.get(attribute)
+        if written is None:
+            return None
+        longest = self.report.limits.number
+        if self._is_too_long(element, attribute, written, count * longest):
+            return None
+        pieces = [piece for piece in _BLANKS.split(written) if piece]
+        if any(self._is_too_long(element, attribute, piece, longest) for piece in pieces):
+            return None
+        values: list[float] = []
+        for piece in pieces:
+            value = self._number(element, attribute, piece)
+            if value is None:
+                return None
+            values.append(value)
+        if len(values) != count:
+            self.report.add(
+                self.bad_vector,
+                f"{attribute} needs {count} numbers and has {len(values)}",
+                element,
+                attribute=attribute,
+                found=f"{attribute}={quoted(written)}",
+                remedy=f"write {count} numbers with a space between them",
+            )
+            return None
+        if self.report.has_raw_blanks:
+            self._check_raw(element, attribute, count)
+        return tuple(values)
+
+    def _number(self, element: Element, attribute: str, piece: str) -> float | None:
+        value = float(piece) if DECIMAL.fullmatch(piece) else None
+        if value is not None and math.isfinite(value):
+            if value == 0.0 and any(digit in _NOT_ZERO for digit in re.split("[eE]", piece)[0]):
+                self.report.add(
+                    codes.UNDERFLOW,
+                    f"{attribute} holds a number too small for a double; it is zero",
+                    element,
+                    attribute=attribute,
+                    found=quoted(piece),
+                    remedy="check the exponent",
+                )
+            return value
+        what = attribute if element.tag in _PLAIN else f"{attribute} of <{element.tag}>"
+        if value is not None:
+            message, remedy = "is too large for a double", "check the exponent"
+        else:
+            message, remedy = "is not a number", _remedy(piece)
+        self.report.add(
+            self.bad_number,
+            f"{what} {message}" if piece == element.attributes[attribute] else f"a part of {what} {message}",
+            element,
+            attribute=attribute,
+            found=quoted(piece),
+            remedy=remedy,
+        )
+        return None
+
+    def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
+        """Whether a text is longer than numbers are; what converts them takes time quadratic in theirs."""
+        if len(written) <= most:
+            return False
+        self.report.add(
+            codes.NUMBER_TOO_LONG,
+            f"{attribute} has more characters than numbers need",
+            element,
+            attribute=attribute,
+            found=f"{quoted(written, 30)} of {len(written)} characters, more than {most}",
+            remedy="write 17 digits, which tell every double; or raise the limit with --max-number",
+            severity=self.bad_number.severity,
+        )
+        return True
+
+    def _check_raw(self, element: Element, attribute: str, count: int) -> None:
+        """Whether urdfdom, which sees tabs and line ends that XML turns into spaces, reads the value."""
+        raw = self.report.raw(element, attribute)
+        if raw is None or self._is_too_long(element, attribute, raw, count * self.report.limits.number):
+            return
+        seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw))
+        pieces = [seen] if count == 1 else [piece for piece in seen.split(" ") if piece]
+        if not all(DECIMAL.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
+            self._refused(element, attribute, "a tab or line end between or after the numbers")
+
+    def _refused(self, element: Element, attribute: str, what: str) -> None:
+        needed = self.bad_number is codes.BAD_NUMBER
+        self.report.add(
+            # Where no robot depends on the number, urdfdom drops what it cannot read and reads the file.
+            codes.WHITESPACE if needed else self.bad_number,
+            f"{attribute} has {what}, which urdfdom {'refuses' if needed else 'does not read'}",
+            element,
+            attribute=attribute,
+            found=quoted(self.report.raw(element, attribute) or element.attributes[attribute]),
+            remedy="write single spaces between numbers and none around them",
+        )
+
+
+_NOT_ZERO = "123456789"
+
+#: Elements whose attributes need no further words.
+_PLAIN = ("origin", "axis", "limit")
+
+#: Zeros that begin the number of a reference; Python's conversion refuses thousands of them.
+_LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
+
+#: What a piece of text looks like -> what to do about it; the first that matches.
+_REMEDIES = (
+    (r"[+-]?(nan|inf|infinity)", "only finite numbers have a meaning here"),
+    (r".*\$[({].*", "expand the xacro first"),
+    (r".*,.*", "separate numbers by spaces and write decimals with a point"),
+    (r"[+-]?0x.*", "write it in decimal digits"),
+    (r"[+-]?[0-9.]+d[+-]?[0-9]+", "write the exponent with e"),
+    (r".*[^\x00-\x7f].*", "write ASCII digits"),
+    (r".*_.*", "write the digits without underscores"),
+    (r"[\[({].*|.*[\])}]", "write the numbers without brackets"),
+    (r"[+-]?[0-9.]+e[+-]?", "write digits after the e"),
+    (r"[+-]?[0-9.]+[a-z]+", "write the number without a unit"),
+    (r"", "it is empty; write a number, or leave the attribute out"),
+)
+
+
+def _remedy(piece: str) -> str:
+    """What to do about a piece of text that is not a number."""
+    found = (text for pattern, text in _REMEDIES if re.fullmatch(pattern, piece, re.IGNORECASE | re.DOTALL))
+    return next(found, "write a number such as -1.5 or 2e-3")

@@ -1,0 +1,130 @@
+"""How joints connect links: one tree, one root, every link once.
+
+Everything here is iterative: a chain of 50,000 links must not meet a stack.
+"""
+
+from __future__ import annotations
+
+from urdfkin.lint.codes import structure as codes
+from urdfkin.lint.escape import quoted
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rules.joints import JointRecord, RobotRecord
+
+
+def check_structure(report: Reporter, robot: RobotRecord) -> bool:
+    """Report what keeps the joints from being a tree; whether they are one."""
+    edges = [joint for joint in robot.joints if _ends_exist(report, robot, joint)]
+    sound = len(edges) == len(robot.joints) and _no_loops_or_diamonds(report, robot, edges)
+    return _one_root(report, robot) and sound and bool(robot.links)
+
+
+def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
+    """Whether a joint has two links that exist and differ."""
+    for tag, link in (("parent", joint.parent), ("child", joint.child)):
+        if link is not None and link not in robot.links:
+            nearest = report.nearest(link, robot.links)
+            report.add(
+                codes.UNKNOWN_LINK,
+                f"the {tag} link does not exist",
+                joint.element.first(tag),
+                attribute="link",
+                found=quoted(link),
+                remedy=f"did you mean {', '.join(nearest)}?"
+                if nearest
+                else f"add <link name={quoted(link)}/>",
+            )
+    if joint.parent is not None and joint.parent == joint.child:
+        report.add(
+            codes.SELF_PARENT,
+            "the joint connects a link with itself",
+            joint.element.first("child"),
+            attribute="link",
+            found=quoted(joint.parent),
+            remedy="name another parent or child",
+        )
+        return False
+    return joint.parent in robot.links and joint.child in robot.links
+
+
+def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
+    """Walk depth first: a joint back to a link above closes a loop, one to another link met, a diamond."""
+    below: dict[str, list[JointRecord]] = {}
+    children = set()
+    for joint in edges:
+        below.setdefault(joint.parent or "", []).append(joint)
+        children.add(joint.child)
+    first: dict[str, JointRecord] = {}
+    repeated: list[tuple[JointRecord, bool]] = []
+    done: set[str] = set()
+    for start in [link for link in robot.links if link not in children] + list(robot.links):
+        if start in done:
+            continue
+        path: set[str] = {start}
+        stack: list[tuple[str, list[JointRecord]]] = [(start, list(reversed(below.get(start, []))))]
+        done.add(start)
+        while stack:
+            link, waiting = stack[-1]
+            if not waiting:
+                stack.pop()
+                path.discard(link)
+                continue
+            joint = waiting.pop()
+            child = joint.child or ""
+            if child in done:
+                repeated.append((joint, child in path))
+                continue
+            done.add(child)
+            first[child] = joint
+            path.add(child)
+            stack.append((child, list(reversed(below.get(child, [])))))
+    for joint, loop in repeated:
+        _report_repeat(report, joint, first.get(joint.child or ""), loop=loop)
+    return not repeated
+
+
+def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | None, *, loop: bool) -> None:
+    at = joint.element.first("child")
+    if loop:
+        report.add(
+            codes.CYCLE,
+            f"the joint closes a loop: its child stands above its parent {quoted(joint.parent or '')}",
+            at,
+            attribute="link",
+            found=quoted(joint.child or ""),
+            remedy="remove a joint of the loop; a URDF is a tree",
+        )
+        return
+    other = f"joint {quoted(first.name)} on line {first.element.line}" if first else "another joint"
+    report.add(
+        codes.SEVERAL_PARENTS,
+        f"the child link already is the child of {other}",
+        at,
+        attribute="link",
+        found=quoted(joint.child or ""),
+        remedy="a link has one parent; remove one of the joints",
+    )
+
+
+def _one_root(report: Reporter, robot: RobotRecord) -> bool:
+    """Exactly one link is nobody's child; a link that a broken joint names is not blamed again."""
+    children = {joint.child for joint in robot.joints}
+    roots = [link for link in robot.links if link not in children]
+    if not roots and robot.links and not report.failed:
+        report.add(codes.CYCLE, "no link is a root: every one is the child of a joint", robot.element)
+    if len(roots) < 2:
+        return len(roots) == 1
+    if not children <= robot.links.keys():
+        return False  # a joint that names no child, or a wrong one, has lost one of these: reported already
+    parents = {joint.parent for joint in robot.joints}
+    # The first root that carries something is the robot; the others are what fell off.
+    main = next((root for root in roots if root in parents), roots[0])
+    for root in roots:
+        if root != main:
+            report.add(
+                codes.SEVERAL_ROOTS,
+                f"the link has no parent, and neither has {quoted(main)}",
+                robot.links[root],
+                attribute="name",
+                remedy="connect it with a joint or remove it",
+            )
+    return False

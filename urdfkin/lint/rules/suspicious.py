@@ -1,0 +1,218 @@
+"""Legal, and probably not what was meant: rounded pi, degrees, millimetres, joints in the same place."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+from urdfkin.lint.codes import suspicious as codes
+from urdfkin.lint.escape import quoted
+from urdfkin.lint.finding import Severity
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rules.joints import AXIAL, JointRecord, RobotRecord
+
+#: A joint further than this from its parent, in m, is probably given in millimetres.
+FAR = 100.0
+
+#: A robot whose lengths together are less than this, in m, was probably scaled twice.
+TINY = 1e-4
+
+#: A limit of this many radians and more, in whole degrees, is probably meant in degrees; from `ENDLESS` on
+#: it is the way some exporters write "none".
+DEGREES, ENDLESS = 30.0, 1000.0
+
+#: By how much a tip may be off, in m, before a rounded pi is a warning.
+NOTICEABLE = 1e-3
+
+#: An angle, in rad, that is off by less was written with all the digits one could want.
+ROUNDING = 1e-10
+
+#: Multiples of pi that people write, and with how many decimals at least they are recognised.
+_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
+    (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
+]
+
+
+def check_suspicious(report: Reporter, robot: RobotRecord, *, sound: bool) -> None:
+    """Everything that is legal and odd.
+
+    Args:
+        report: Where findings go.
+        robot: What was read.
+        sound: Whether the joints make a tree, so that lengths along chains mean something.
+    """
+    reach = _reach(robot) if sound else {}
+    for joint in robot.joints:
+        _check_angles(report, joint, reach)
+        _check_lengths(report, joint)
+    _check_places(report, robot)
+    if sound:
+        _check_sums(report, robot, reach)
+
+
+def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float]) -> None:
+    origin = joint.origin_element
+    if origin is not None and joint.quaternion is None:
+        written = origin.attributes.get("rpy", "").split(maxsplit=3)
+        if any(abs(angle) >= 10.0 for angle in joint.rpy):
+            _degrees(report, joint, "rpy", quoted(" ".join(written)))
+        elif len(written) == 3:
+            _check_rounded(report, joint, written, reach.get(joint.child or "", 0.0))
+    limit = joint.limit
+    if limit is not None and joint.kind == "revolute":
+        bounds = [bound for bound in (limit.lower, limit.upper) if bound is not None]
+        if any(DEGREES <= abs(bound) < ENDLESS and bound == round(bound) for bound in bounds):
+            at = " ".join(
+                f"{name}={quoted(limit.element.attributes[name])}"
+                for name in ("lower", "upper")
+                if name in limit.element.attributes
+            )
+            _degrees(report, joint, "limit", at)
+
+
+def _degrees(report: Reporter, joint: JointRecord, what: str, found: str) -> None:
+    rpy = what == "rpy"
+    report.add(
+        codes.DEGREES,
+        "the angles of the origin look like degrees" if rpy else "the limits look like degrees",
+        joint.origin_element if rpy else joint.limit.element if joint.limit else joint.element,
+        attribute="rpy" if rpy else "lower",
+        found=found,
+        remedy="write radians",
+    )
+
+
+def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], reach: float) -> None:
+    """The angle of an origin that is furthest off a multiple of pi it was probably meant to be."""
+    off, text, multiple, meant = 0.0, "", Fraction(0), 0.0
+    for word, angle in zip(written, joint.rpy, strict=True):
+        found = rounded_pi(word, angle)
+        if found is not None and abs(angle - found[1]) > off:
+            off, text, (multiple, meant) = abs(angle - found[1]), word, found
+    if not off:
+        return
+    moves = f", which moves what it carries by up to {_metres(off * reach)}" if reach > 0.0 else ""
+    report.add(
+        codes.ROUNDED_PI,
+        f"rpy holds a rounded {_as_pi(multiple)}, off by {off:.1e} rad{moves}",
+        joint.origin_element,
+        attribute="rpy",
+        found=quoted(text),
+        remedy=f"write {meant!r} if {_as_pi(multiple)} is meant; it is used as written",
+        severity=Severity.WARNING if off * reach > NOTICEABLE else None,
+        weight=off * reach,
+    )
+
+
+def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
+    """The multiple of pi a decimal was probably rounded or cut from, and its value; None for none.
+
+    >>> rounded_pi("1.5708", 1.5708)
+    (Fraction(1, 2), 1.5707963267948966)
+    >>> rounded_pi("1.5707963267948966", 1.5707963267948966) is None
+    True
+    """
+    mantissa, _, exponent = text.lower().partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    if exponent or not 2 <= decimals <= 14:
+        return None
+    for multiple, least in _MULTIPLES:
+        value = math.copysign(float(multiple) * math.pi, angle)
+        if decimals >= least and ROUNDING < abs(angle - value) < 10.0**-decimals:
+            return multiple, value
+    return None
+
+
+def _as_pi(multiple: Fraction) -> str:
+    top = "pi" if multiple.numerator == 1 else f"{multiple.numerator} pi"
+    return top if multiple.denominator == 1 else f"{top}/{multiple.denominator}"
+
+
+def _metres(length: float) -> str:
+    units = ((1.0, "m"), (1e3, "mm"), (1e6, "um"))
+    factor, unit = next((pair for pair in units if length * pair[0] >= 1.0), (1e9, "nm"))
+    # Two digits, and never an exponent.
+    return f"{float(f'{length * factor:.1e}'):g} {unit}"
+
+
+def _check_lengths(report: Reporter, joint: JointRecord) -> None:
+    if joint.origin_element is not None and max(abs(x) for x in joint.xyz) >= FAR:
+        report.add(
+            codes.MILLIMETRES,
+            "the joint sits very far from its parent link",
+            joint.origin_element,
+            attribute="xyz",
+            found=f"xyz={quoted(joint.origin_element.attributes.get('xyz', ''))}",
+            remedy="write metres",
+            weight=max(abs(x) for x in joint.xyz),
+        )
+    limit = joint.limit
+    if limit is not None and joint.kind == "prismatic":
+        far = [bound for bound in (limit.lower, limit.upper) if bound and FAR <= abs(bound) < ENDLESS]
+        if far:
+            report.add(
+                codes.MILLIMETRES,
+                "a prismatic joint moves very far",
+                limit.element,
+                attribute="lower" if far[0] == limit.lower else "upper",
+                found=f"{far[0]:g}",
+                remedy="write metres",
+                weight=abs(far[0]),
+            )
+
+
+def _check_places(report: Reporter, robot: RobotRecord) -> None:
+    """Joints of one parent that turn about, or slide along, one and the same axis."""
+    places: dict[tuple[object, ...], JointRecord] = {}
+    for joint in robot.joints:
+        if joint.kind not in AXIAL:
+            continue
+        place = (joint.parent, joint.kind, joint.xyz, joint.rpy, joint.quaternion, joint.axis)
+        first = places.setdefault(place, joint)
+        if first is not joint:
+            report.add(
+                codes.SAME_PLACE,
+                f"the joint has the same origin and axis as joint {quoted(first.name)}",
+                joint.element,
+                remedy="fine if that is meant",
+            )
+
+
+def _reach(robot: RobotRecord) -> dict[str, float]:
+    """For each link, a bound on how far anything it carries is from it: lengths summed along chains."""
+    below: dict[str, list[JointRecord]] = {}
+    for joint in robot.joints:
+        below.setdefault(joint.parent or "", []).append(joint)
+    roots = set(robot.links) - {joint.child for joint in robot.joints}
+    order, stack = [], list(roots)
+    while stack:
+        link = stack.pop()
+        order.append(link)
+        stack += [joint.child or "" for joint in below.get(link, [])]
+    reach = dict.fromkeys(order, 0.0)
+    for link in reversed(order):
+        for joint in below.get(link, []):
+            reach[link] = max(reach[link], math.hypot(*joint.xyz) + reach[joint.child or ""])
+    return reach
+
+
+def _check_sums(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -> None:
+    whole = max(reach.values(), default=0.0)
+    if math.isinf(whole):
+        far = max(robot.joints, key=lambda joint: max(abs(x) for x in joint.xyz))
+        report.add(
+            codes.OVERFLOW,
+            "lengths along the chain add up to more than a double can hold",
+            far.origin_element or far.element,
+            attribute="xyz",
+            found=quoted((far.origin_element or far.element).attributes.get("xyz", "")),
+            remedy="check the exponent",
+        )
+    elif 0.0 < whole < TINY:
+        report.add(
+            codes.TINY_ROBOT,
+            f"all lengths of the robot together are {_metres(whole)}",
+            robot.element,
+            found=None,
+            remedy="write metres",
+        )

@@ -1,0 +1,277 @@
+"""The elements and attributes of URDF, and findings about those it does not have."""
+
+from __future__ import annotations
+
+import difflib
+from functools import lru_cache
+
+from urdfkin.lint.codes import dialect as codes
+from urdfkin.lint.escape import quoted
+from urdfkin.lint.finding import Severity
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rules.document import Element
+
+#: Extensions that may hold anything, `<joint>` and `<link>` included.
+OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
+
+#: Elements and attributes that simulators and vendors add, seen in robots that many people use.
+EXTENSIONS = frozenset(
+    {
+        *(
+            "contact",
+            "collision_checking",
+            "self_filter",
+            "surface",
+            "gravity",
+            "kinematic",
+            "drake",
+            "group",
+        ),
+        *(
+            "dont_collapse",
+            "D",
+            "K",
+            "mu_coulomb",
+            "mu_viscous",
+            "current",
+            "command_effort",
+            "gear_velocity",
+        ),
+    }
+)
+
+#: Element -> the elements it may hold. An element that is not a key is not looked into.
+CHILDREN: dict[str, frozenset[str]] = {
+    "robot": frozenset({"link", "joint", "material"}),
+    "link": frozenset({"inertial", "visual", "collision"}),
+    "joint": frozenset(
+        {
+            "origin",
+            "parent",
+            "child",
+            "axis",
+            "limit",
+            "mimic",
+            "dynamics",
+            "safety_controller",
+            "calibration",
+        }
+    ),
+    "inertial": frozenset({"origin", "mass", "inertia"}),
+    "visual": frozenset({"origin", "geometry", "material"}),
+    "collision": frozenset({"origin", "geometry", "material"}),
+    "geometry": frozenset({"box", "cylinder", "sphere", "mesh", "capsule"}),
+    "material": frozenset({"color", "texture"}),
+    **dict.fromkeys(
+        ("origin", "parent", "child", "axis", "limit", "mimic", "dynamics", "safety_controller"), frozenset()
+    ),
+}
+
+#: Element -> its attributes.
+ATTRIBUTES: dict[str, frozenset[str]] = {
+    "robot": frozenset({"name", "version"}),
+    "link": frozenset({"name", "type"}),
+    "joint": frozenset({"name", "type"}),
+    "origin": frozenset({"xyz", "rpy", "quat_xyzw"}),
+    "parent": frozenset({"link"}),
+    "child": frozenset({"link"}),
+    "axis": frozenset({"xyz"}),
+    "limit": frozenset({"lower", "upper", "effort", "velocity", "acceleration", "deceleration", "jerk"}),
+    "mimic": frozenset({"joint", "multiplier", "offset"}),
+    "dynamics": frozenset({"damping", "friction"}),
+    "safety_controller": frozenset({"k_velocity", "k_position", "soft_lower_limit", "soft_upper_limit"}),
+    "calibration": frozenset({"rising", "falling", "reference_position"}),
+    "mass": frozenset({"value"}),
+    "inertia": frozenset({"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}),
+    "box": frozenset({"size"}),
+    "cylinder": frozenset({"radius", "length"}),
+    "sphere": frozenset({"radius"}),
+    "mesh": frozenset({"filename", "scale"}),
+    "color": frozenset({"rgba"}),
+    "texture": frozenset({"filename"}),
+}
+
+#: Elements and attributes of other formats that say where something is, and are skipped here.
+_FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
+
+#: Children that may stand once only.
+_ONCE = {
+    "joint": CHILDREN["joint"],
+    "inertial": CHILDREN["inertial"],
+    "visual": CHILDREN["visual"],
+    "collision": CHILDREN["collision"],
+    "link": frozenset({"inertial"}),
+    "geometry": CHILDREN["geometry"],
+}
+
+#: Elements whose value would be lost if it stood between the tags.
+_VALUES = {"origin", "axis", "limit", "mimic", "parent", "child"}
+
+#: Elements whose text can only be their value, put in the wrong place.
+_VECTORS = ("origin", "axis")
+
+
+def check_vocabulary(report: Reporter, root: Element) -> None:
+    """Unknown, misplaced and repeated elements, unknown attributes, and text where URDF has none."""
+    stack = [root]
+    while stack:
+        element = stack.pop()
+        known = CHILDREN.get(element.tag)
+        if known is None:
+            continue
+        _check_attributes(report, element)
+        _check_text(report, element)
+        _check_repeats(report, element)
+        for child in element.children:
+            if child.tag not in known and child.tag not in OPAQUE and ":" not in child.tag:
+                _check_unknown(report, child, known)
+        stack += [child for child in reversed(element.children) if child.tag in known]
+
+
+def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) -> None:
+    parts = [part for part in _outside_extensions(element) if _is_part(part)]
+    for part in parts:
+        inside = part.parent.tag if part.parent else ""
+        meant = nearest(part.tag, _PARTS)
+        what = f"a {meant} inside <{inside}>" if part.tag == meant else f"<{part.tag}>"
+        report.add(
+            codes.MISPLACED,
+            f"{what} is not read, so it is missing from the robot",
+            part,
+            remedy=f"write <{meant}> as a child of <robot>",
+            owner=part.tag,
+        )
+    if parts:
+        return
+    close = None if report.is_full(codes.UNKNOWN_ELEMENT) else nearest(element.tag, known)
+    parent = element.parent
+    if parent is not None and parent.tag in _VECTORS and element.text and not parent.attributes:
+        report.add(
+            codes.STRAY_TEXT,
+            f"the value inside <{element.tag}> is skipped",
+            element,
+            found=quoted(element.text),
+            remedy=f"write it as an attribute, as in {_EXAMPLES[parent.tag]}",
+            severity=Severity.ERROR,
+        )
+        return
+    foreign = element.tag in _FOREIGN
+    remedy = (
+        f"write {_EXAMPLES['origin']}" if foreign else f"did you mean <{close}>?" if close else "remove it"
+    )
+    report.add(
+        codes.UNKNOWN_ELEMENT,
+        f"<{element.tag}> means nothing in <{parent.tag if parent else ''}> and is skipped",
+        element,
+        remedy=remedy,
+        severity=Severity.NOTE if element.tag in EXTENSIONS else None,
+    )
+
+
+def _outside_extensions(element: Element) -> list[Element]:
+    found, stack = [], [element]
+    while stack:
+        current = stack.pop()
+        found.append(current)
+        stack += [child for child in reversed(current.children) if child.tag not in OPAQUE]
+    return found
+
+
+def _is_part(element: Element) -> bool:
+    """Whether an element is a link or joint of a robot, by more than its name."""
+    tag = nearest(element.tag, _PARTS) if len(element.tag) < _LONGEST_PART else None
+    if tag == "link":
+        return "name" in element.attributes
+    return tag == "joint" and (
+        element.attributes.get("type", "").lower() in JOINT_TYPES or element.first("parent") is not None
+    )
+
+
+_PARTS = frozenset({"link", "joint"})
+
+#: Longer words are like neither: difflib calls five of eight letters, and fewer, no match.
+_LONGEST_PART = 8
+
+#: The joint types of the specification.
+JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
+
+
+def _check_attributes(report: Reporter, element: Element) -> None:
+    known = ATTRIBUTES.get(element.tag)
+    if known is None:
+        return
+    for attribute in element.attributes:
+        if attribute in known or ":" in attribute or attribute == "xmlns":
+            continue
+        close = None if report.is_full(codes.UNKNOWN_ATTRIBUTE) else nearest(attribute, known)
+        report.add(
+            codes.UNKNOWN_ATTRIBUTE,
+            f"<{element.tag}> has no attribute of this name; it is skipped",
+            element,
+            attribute=attribute,
+            found=f"{attribute}={quoted(element.attributes[attribute])}",
+            remedy=f"did you mean {close}?" if close else f"known are {', '.join(sorted(known))}",
+            severity=Severity.NOTE if attribute in EXTENSIONS else None,
+        )
+
+
+def _check_text(report: Reporter, element: Element) -> None:
+    if not element.text or element.tag not in _VALUES | {"robot", "joint", "link"}:
+        return
+    if element.tag in ("parent", "child") and "link" not in element.attributes:
+        return  # reported as a missing attribute, with this text
+    lost = element.tag in _VECTORS and not element.attributes
+    example = _EXAMPLES.get(element.tag)
+    report.add(
+        codes.STRAY_TEXT,
+        f"text inside <{element.tag}> is skipped",
+        element,
+        found=quoted(element.text),
+        remedy=f"write it as an attribute, as in {example}" if example else "remove it",
+        severity=Severity.ERROR if lost else None,
+    )
+
+
+_EXAMPLES = {
+    "origin": '<origin xyz="0 0 1" rpy="0 0 0"/>',
+    "axis": '<axis xyz="0 0 1"/>',
+    "limit": '<limit lower="-1" upper="1" effort="10" velocity="1"/>',
+    "mimic": '<mimic joint="leader" multiplier="1" offset="0"/>',
+    "parent": '<parent link="base"/>',
+    "child": '<child link="arm"/>',
+}
+
+
+def _check_repeats(report: Reporter, element: Element) -> None:
+    once = _ONCE.get(element.tag)
+    if once is None:
+        return
+    seen: dict[str, Element] = {}
+    for child in element.children:
+        if child.tag in seen and child.tag in once:
+            report.add(
+                codes.DUPLICATE_ELEMENT,
+                f"a second <{child.tag}> is skipped: the first, on line {seen[child.tag].line}, counts",
+                child,
+                remedy="remove one of the two",
+            )
+        seen.setdefault(child.tag, child)
+
+
+def nearest(word: str, known: frozenset[str]) -> str | None:
+    """The known word that `word` was probably meant to be; none for what is much longer than each."""
+    return _nearest(word, known) if len(word) <= _LONGEST else None
+
+
+#: Longer words are like none of URDF's.
+_LONGEST = 32
+
+
+@lru_cache(1024)
+def _nearest(word: str, known: frozenset[str]) -> str | None:
+    folded = {name.lower(): name for name in known}
+    close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.8)
+    if close:
+        return folded[close[0]]
+    letters = sorted(word.lower())
+    return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)

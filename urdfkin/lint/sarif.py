@@ -1,0 +1,83 @@
+"""Findings as SARIF 2.1.0, which code-scanning services and editors read.
+
+The format is OASIS "Static Analysis Results Interchange Format (SARIF) Version 2.1.0".
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from urdfkin.lint.codes import REGISTRY
+from urdfkin.lint.finding import Finding
+from urdfkin.lint.rule import Code
+
+SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+
+
+def as_sarif(findings: Sequence[Finding], version: str) -> str:
+    """One SARIF run with every code as a rule and every finding as a result."""
+    rules = list(REGISTRY.values())
+    index = {code.id: number for number, code in enumerate(rules)}
+    run = {
+        "tool": {
+            "driver": {
+                "name": "urdfkin",
+                "version": version,
+                "rules": [_rule(code) for code in rules],
+            }
+        },
+        "columnKind": "unicodeCodePoints",
+        "results": [_result(finding, index[finding.code]) for finding in findings],
+    }
+    return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
+
+
+def _rule(code: Code) -> dict[str, Any]:
+    return {
+        "id": code.id,
+        "name": "".join(word.capitalize() for word in code.slug.split("-")),
+        "shortDescription": {"text": code.title},
+        "fullDescription": {"text": code.why},
+        "help": {"text": f"{code.why}\n\n{code.others}"},
+        "defaultConfiguration": {"level": code.severity.value},
+    }
+
+
+def _result(finding: Finding, rule: int) -> dict[str, Any]:
+    result: dict[str, Any] = {
+        "ruleId": finding.code,
+        "ruleIndex": rule,
+        "level": finding.severity.value,
+        "message": {"text": finding.sentence},
+        "locations": [_location(finding)],
+    }
+    if finding.oracle is not None:
+        result["properties"] = {"pinocchio": finding.oracle.value}
+    return result
+
+
+def _location(finding: Finding) -> dict[str, Any]:
+    location: dict[str, Any] = {
+        "physicalLocation": {
+            "artifactLocation": {"uri": _uri(finding.file)},
+            "region": {"startLine": finding.line, "startColumn": finding.column},
+        }
+    }
+    if finding.element and finding.name:
+        location["logicalLocations"] = [{"name": finding.name, "kind": finding.element}]
+    return location
+
+
+def _uri(file: str) -> str:
+    """A file's name as a URI reference: relative where it was given so, `stdin` for standard input.
+
+    A name is bytes, of whatever encoding; those that a URI cannot hold are written as %XX.
+    """
+    if file.startswith("<"):
+        return file.strip("<>")
+    return Path(file).as_uri() if Path(file).is_absolute() else quote(os.fsencode(Path(file).as_posix()))
