@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from urdfkin.catalogue import catalogue
-from urdfkin.checking import check
-from urdfkin.lint import DEFAULT_LIMITS, Finding, Severity
-from urdfkin.lint.codes import REGISTRY
+from urdfkin.lint import DEFAULT_LIMITS, Finding, Severity, check
 from urdfkin.lint.escape import shortened
+from urdfkin.lint.pages import RULES
+from urdfkin.lint.pages import page as page_of
 from urdfkin.lint.reporter import WRITTEN_OUT
 
 PAGE = Path(__file__).parents[1] / "docs" / "findings.md"
@@ -92,11 +92,11 @@ def page() -> str:
 def _tables() -> Iterator[str]:
     for digit, family in FAMILIES.items():
         yield f"\n### {family}\n\n| code | name | severity | finding | Pinocchio |\n|---|---|---|---|---|\n"
-        for code in REGISTRY.values():
-            if code.id[4] == digit:
-                mark = f"*{code.oracle.value}*" if code.oracle else ""
-                title = _cell(code.title)
-                yield f"| {code.id} | {code.slug} | {code.severity.value} | {title} | {mark} |\n"
+        for rule in RULES.values():
+            if rule.id[4] == digit:
+                mark = f"*{rule.oracle.value}*" if rule.oracle else ""
+                title = _cell(page_of(rule.id).title)
+                yield f"| {rule.id} | {rule.slug} | {rule.severity.value} | {title} | {mark} |\n"
 
 
 def _robots() -> Iterator[str]:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.reading import tree_of
 from urdfkin.call import NotVerifiedWarning
 from urdfkin.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
-from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.writer import to_urdf
 
 pytestmark = pytest.mark.slow
@@ -68,7 +68,7 @@ def test_a_file_whose_own_root_is_called_universe_is_verified(kind: JointKind) -
         robot = urdfkin.load(text)
     robot.placement(robot.sample(2, seed=0), "l2")
     assert robot.certificate().verified
-    assert read_tree(text.encode()).links[0] == "universe"
+    assert tree_of(text.encode()).links[0] == "universe"
 
 
 def test_a_hung_robot_is_verified() -> None:

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from urdfkin.call import NotVerifiedWarning
     from urdfkin.chain import FrameChain
-    from urdfkin.checking import check
     from urdfkin.dh import DHRow, DHTable, read_table, table_from_rows
     from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
-    from urdfkin.lint import Finding, UrdfError, UrdfWarning
+    from urdfkin.lint import Finding, UrdfError, UrdfWarning, check
     from urdfkin.loading import load
     from urdfkin.recursion.base import BaseMotion
     from urdfkin.reference import Reference
@@ -46,7 +45,7 @@ _HOMES = {
     "UrdfWarning": "urdfkin.lint",
     "UrdfkinError": "urdfkin.errors",
     "VerificationError": "urdfkin.verification.certificate",
-    "check": "urdfkin.checking",
+    "check": "urdfkin.lint",
     "load": "urdfkin.loading",
     "read_table": "urdfkin.dh",
     "table_from_rows": "urdfkin.dh",

@@ -5,15 +5,16 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 
-from urdfkin.lint import Finding, Oracle, Severity, UrdfError, UrdfWarning, check_text
-from urdfkin.lint.codes.joints import NEARLY_COORDINATE_AXIS
+from urdfkin.lint.finding import Finding, Oracle, Severity, UrdfError, UrdfWarning
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.rules.axes import tilts
+from urdfkin.lint.runner import read_urdf
 from urdfkin.origin import Origin
 from urdfkin.robot import Robot
 from urdfkin.sources import Source, read_source
 from urdfkin.tree import with_tilts
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.remembering import remembered_tree
-from urdfkin.urdf.skeleton import tilts
 from urdfkin.verification.choosing import Verify
 
 
@@ -54,17 +55,19 @@ def load(
     origin = Origin(text.source, mimic, root_joint, text.xacro_args)
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
-    findings = check_text(text.data, file=text.label, mimic=mimic, root_joint=root_joint)
-    if any(finding.severity is Severity.ERROR for finding in findings):
+    report = Reporter(text.label, text.data)
+    urdf = read_urdf(report, mimic=mimic, root_joint=root_joint)
+    findings = report.findings()
+    if urdf is None or report.failed:
         raise UrdfError(findings)
     if text.entry is None:
         for finding in findings:
             if finding.severity is Severity.WARNING:
                 warnings.warn(str(finding), UrdfWarning, stacklevel=2)
     read = read_tree if text.entry is None else remembered_tree
-    tree = read(text.data, mimic=mimic, root_joint=root_joint)
-    if any(finding.code == NEARLY_COORDINATE_AXIS.id for finding in findings):
-        tree = with_tilts(tree, tilts(text.data))
+    tree = read(urdf, mimic=mimic, root_joint=root_joint)
+    if tilted := tilts(urdf):
+        tree = with_tilts(tree, tilted)
     return Robot(
         tree,
         text.data.decode("utf-8-sig"),

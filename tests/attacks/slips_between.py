@@ -38,6 +38,7 @@ import numpy as np
 
 import urdfkin
 from scripts.mutating.operators import mutated, slips
+from tests.reading import tree_of
 from urdfkin import BaseMotion
 from urdfkin.dh import table_from_rows
 from urdfkin.errors import OracleError
@@ -45,7 +46,6 @@ from urdfkin.origin import Origin
 from urdfkin.robot import Robot
 from urdfkin.rotation import exp_rotation
 from urdfkin.tree import FloatArray
-from urdfkin.urdf.reader import read_tree
 
 #: Where a user's numbers pass on their way to the result, and on their way to Pinocchio.
 MODULES = (
@@ -142,7 +142,7 @@ def _of_table(q: FloatArray) -> FloatArray:
 
 def misread() -> Robot:
     """The robot, each of its numbers off by a billionth in urdfkin's own reading, but not in Pinocchio's."""
-    tree = read_tree(
+    tree = tree_of(
         re.sub(r'(?<=[" ])-?[0-9.]+(?=[" ])', lambda x: repr(float(x[0]) * (1 + 1e-9)), URDF).encode()
     )
     return Robot(tree, URDF, origin=Origin("<text>"))

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.reading import tree_of
 from urdfkin.followers import rules_of_text
 from urdfkin.origin import Origin
 from urdfkin.recursion.evaluate import placements
 from urdfkin.recursion.plan import make_plan
 from urdfkin.robot import Robot
 from urdfkin.tree import freed
-from urdfkin.urdf.reader import read_tree
 from urdfkin.verification.bounds import EPS
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
@@ -33,7 +33,7 @@ def text(*rules: tuple[str, str]) -> str:
 
 def misread(document: str, wrong: str) -> Robot:
     """A robot whose own tree was read from `wrong` and which has Pinocchio check it against `document`."""
-    return Robot(read_tree(wrong.encode()), document, origin=Origin("<text>"))
+    return Robot(tree_of(wrong.encode()), document, origin=Origin("<text>"))
 
 
 def test_a_multiplier_that_is_one_bit_off_is_caught_when_the_joint_has_turned_far() -> None:
@@ -58,7 +58,7 @@ def test_rules_read_twice_and_multiplied_out_twice_are_the_same_doubles() -> Non
     for _ in range(200):
         rules = [tuple(map(repr, rng.normal(size=2).tolist())) for _ in range(4)]
         document = text(*((multiplier, offset) for multiplier, offset in rules))
-        tree = read_tree(document.encode())
+        tree = tree_of(document.encode())
         again = rules_of_text(document, [joint.name for joint in tree.joints])
         assert {joint.name: joint.mimic for joint in tree.joints if joint.mimic} == again
 

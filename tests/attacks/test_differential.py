@@ -11,9 +11,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.reading import tree_of
 from urdfkin.lint import Finding, Oracle, Severity, check_text
 from urdfkin.tree import JointKind, KinematicTree
-from urdfkin.urdf.reader import read_tree
 
 #: Slot -> what may stand there; the first is plain.
 SLOTS: dict[str, list[str]] = {
@@ -244,7 +244,7 @@ def judged(data: bytes) -> None:
         return
     assert model is not None, (data, said(findings))
     if not marks:
-        assert_same(read_tree(data), model, data)
+        assert_same(tree_of(data), model, data)
 
 
 def said(findings: tuple[Finding, ...]) -> list[str]:

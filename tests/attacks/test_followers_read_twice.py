@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
+from tests.reading import tree_of
 from urdfkin.followers import rules_of_text
 from urdfkin.origin import Origin
 from urdfkin.robot import Robot
-from urdfkin.urdf.reader import read_tree
 
 
 def chain_of_followers(rules: list[tuple[int, float, float]]) -> str:
@@ -41,7 +41,7 @@ def test_chains_of_followers_end_at_the_same_joint_with_the_same_rule(data: st.D
     rules = [(data.draw(st.integers(0, i)), data.draw(numbers), data.draw(numbers)) for i in range(n)]
     text = chain_of_followers(rules)
     theirs = rules_of_text(text, {f"j{i}" for i in range(n + 1)})
-    ours = {joint.name: joint.mimic for joint in read_tree(text.encode()).joints if joint.mimic}
+    ours = {joint.name: joint.mimic for joint in tree_of(text.encode()).joints if joint.mimic}
     assert theirs.keys() == ours.keys()
     angles = [0.7]  # by the rules themselves, one after the other
     for i, (leader, multiplier, offset) in enumerate(rules, start=1):
@@ -63,7 +63,7 @@ MISREAD: list[tuple[str, Callable[[str], str]]] = [
 
 @pytest.mark.parametrize(("what", "misread"), MISREAD)
 def test_a_rule_that_urdfkin_misreads_is_not_verified(what: str, misread: Callable[[str], str]) -> None:
-    robot = Robot(read_tree(misread(TEXT).encode()), TEXT, origin=Origin("<text>"))
+    robot = Robot(tree_of(misread(TEXT).encode()), TEXT, origin=Origin("<text>"))
     assert misread(TEXT) != TEXT, what
     refused_at_the_door(robot) if robot.nq > 1 else disagrees(robot)
 
@@ -83,7 +83,7 @@ def disagrees(robot: Robot) -> None:
 
 def test_a_reader_that_loses_every_rule_is_not_verified() -> None:
     # Only the user's own mimic=False frees the followers: a tree without any says nothing.
-    robot = Robot(read_tree(TEXT.encode(), mimic=False), TEXT, origin=Origin("<text>"))
+    robot = Robot(tree_of(TEXT.encode(), mimic=False), TEXT, origin=Origin("<text>"))
     with pytest.warns(urdfkin.NotVerifiedWarning, match="Pinocchio finds other coordinates"):
         robot.placement(robot.neutral(), "l4")
     free = urdfkin.load(TEXT, mimic=False)
@@ -99,7 +99,7 @@ def test_joints_in_another_order_are_not_verified() -> None:
         "</robot>"
     )
     swapped = text.replace('"x"', '"z"')  # read so, x stands after y
-    tree = read_tree(swapped.encode())
+    tree = tree_of(swapped.encode())
     for joint in tree.joints:
         if joint.name == "z":
             object.__setattr__(joint, "name", "x")

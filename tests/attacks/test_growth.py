@@ -13,13 +13,13 @@ import pytest
 import urdfkin
 from scripts.growing.kinds import KINDS
 from tests.lint.cases.arm import arm
+from tests.reading import tree_of
 from urdfkin.followers import rules_of_text
 from urdfkin.lint import Finding, Severity, UrdfError, check_text
 from urdfkin.lint.formats import as_json
 from urdfkin.lint.reporter import ERRORS_SHOWN, WRITTEN_OUT, Reporter
-from urdfkin.lint.rules.document import parse
+from urdfkin.lint.rules.document import read_document
 from urdfkin.nearest import nearest
-from urdfkin.urdf.reader import read_tree
 
 #: Four times the size takes four times the time; sixteen times would be the square. Between them, and in
 #: seconds, there is room for a busy machine.
@@ -82,7 +82,7 @@ def test_a_chain_of_followers_is_read_in_linear_time_both_times() -> None:
     documents = {size: KINDS["a chain of followers"](size) for size in (100_000, 400_000)}
 
     def read(size: int) -> None:
-        tree = read_tree(documents[size])
+        tree = tree_of(documents[size])
         names = {joint.name for joint in tree.joints}
         assert rules_of_text(documents[size].decode(), names)[tree.joints[-1].name] == tree.joints[-1].mimic
 
@@ -98,7 +98,7 @@ def test_a_chain_of_followers_is_multiplied_out() -> None:
     rows = [joint.format(i=i, c=i + 1, rule=rule) for i, rule in enumerate(["", *(r for r, _ in rules)])]
     links = "".join(f'<link name="l{i}"/>' for i in range(4))
     text = f'<robot name="r">{links}{"".join(reversed(rows))}</robot>'
-    tree = read_tree(text.encode())
+    tree = tree_of(text.encode())
     again = rules_of_text(text, [joint.name for joint in tree.joints])
     for mimic in (tree.joints[2].mimic, again[tree.joints[2].name]):
         assert mimic is not None
@@ -106,7 +106,7 @@ def test_a_chain_of_followers_is_multiplied_out() -> None:
 
 
 def test_of_a_text_only_the_beginning_is_kept() -> None:
-    root = parse(Reporter("f"), b"<robot>" + b"some &lt; words " * 10_000 + b"</robot>")
+    root = read_document(Reporter("f", b"<robot>" + b"some &lt; words " * 10_000 + b"</robot>"))
     assert root is not None
     assert root.text.startswith("some < words some")
     assert len(root.text) < 1_000

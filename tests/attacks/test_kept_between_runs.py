@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 from tests.cli.running import process
+from tests.reading import records
 from urdfkin import keeping
 from urdfkin.keeping import CacheWarning, kept_folder
 from urdfkin.recursion import compiling
@@ -112,12 +113,12 @@ def test_a_kernel_that_is_whole_but_of_another_time_is_compiled_again(folder: Pa
 @pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_tree_is_said_read_again_and_mended(damage: str, folder: Path) -> None:
     data = read_source("ur5").data
-    names = remembered_tree(data).links
+    names = remembered_tree(records(data)).links
     (file,) = folder.iterdir()
     file.write_bytes(DAMAGE[damage](file.read_bytes()))
     with pytest.warns(CacheWarning, match=f"{file.name} is damaged and is made anew"):
-        assert remembered_tree(data).links == names
-    assert remembered_tree(data).links == names  # and nothing is said
+        assert remembered_tree(records(data)).links == names
+    assert remembered_tree(records(data)).links == names  # and nothing is said
     assert list(folder.iterdir()) == [file]
 
 
@@ -143,7 +144,7 @@ def test_where_nothing_can_be_written_everything_goes_on_and_it_is_said_once(
         warnings.simplefilter("always")
         assert ask(fresh()) == 7
         assert ask(fresh()) == 7
-        assert remembered_tree(read_source("ur5").data).links
+        assert remembered_tree(records(read_source("ur5").data)).links
     (warning,) = said
     assert warning.category is CacheWarning
     assert f"nothing can be kept in {folder}: {os.strerror(no_room)}" in str(warning.message)
@@ -311,13 +312,13 @@ def test_a_planted_tree_of_another_user_is_not_unpickled(
         pytest.skip("only the superuser can give a folder away")
     monkeypatch.setattr(remembering, "_folder", lambda: kept_folder("trees", [], root=tmp_path))
     data = read_source("ur5").data
-    remembered_tree(data)
+    remembered_tree(records(data))
     (folder,) = tmp_path.iterdir()
     (file,) = (path for path in folder.iterdir() if path.name != ".used")
     keep(file, pickle.dumps(Planted()))
     os.chown(folder, 12345, 12345)
     with pytest.warns(CacheWarning, match="belongs to another user"):
-        assert remembered_tree(data).links
+        assert remembered_tree(records(data)).links
     assert not Planted.ran
 
 

@@ -11,6 +11,7 @@ import pytest
 
 import urdfkin
 from tests.laws.subjects import robot_of
+from tests.reading import tree_of
 from urdfkin.judge import judge, recursion
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import VECTORS
@@ -18,7 +19,6 @@ from urdfkin.oracle import Oracle
 from urdfkin.origin import Origin
 from urdfkin.recursion.plan import make_plan
 from urdfkin.robot import Robot
-from urdfkin.urdf.reader import read_tree
 
 #: The relative change of a term.
 FACTOR = "1.0000000001"
@@ -93,7 +93,7 @@ def test_a_term_of_an_equation_that_is_off_by_1e_10_is_caught(
 
 def robot_that_misreads(text: str, wrong: str) -> Robot:
     """A robot whose own tree was read from `wrong` and which has Pinocchio check it against `text`."""
-    return Robot(read_tree(wrong.encode()), text, origin=Origin("<text>"))
+    return Robot(tree_of(wrong.encode()), text, origin=Origin("<text>"))
 
 
 @pytest.mark.parametrize("place", ["0.333", "-1.5707963267948966", "0.0825", "0.384"])

@@ -7,8 +7,7 @@ import pytest
 
 from tests.lint.cases import CASES
 from tests.lint.cases.arm import Case
-from urdfkin.checking import check
-from urdfkin.lint import Finding, Severity
+from urdfkin.lint import Finding, Severity, check
 
 SNAPSHOT = Path(__file__).with_name("messages.txt")
 EVERY_CASE = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

@@ -7,8 +7,7 @@ from types import ModuleType
 import pytest
 
 from urdfkin.catalogue import catalogue
-from urdfkin.checking import check
-from urdfkin.lint import Severity
+from urdfkin.lint import Severity, check
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "make_findings.py"
 

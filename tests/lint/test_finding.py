@@ -5,9 +5,10 @@ import pickle
 
 import pytest
 
-from urdfkin.checking import check
 from urdfkin.errors import UrdfkinError
-from urdfkin.lint import Finding, Oracle, Severity, UrdfError, check_text
+from urdfkin.lint import Finding, Oracle, Severity, UrdfError, check, check_text
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.runner import read_urdf
 
 FINDING = Finding(
     "URDF502", Severity.ERROR, "the axis is zero", 'xyz="0 0 0"', "turn it", "a.urdf", 3, 7, "joint", "j"
@@ -39,7 +40,9 @@ def test_an_error_carries_all_findings_and_prints_the_first() -> None:
 @pytest.mark.parametrize("evil", ["\u202e", "\x9b31m", "\u2066", "\u200b"])
 def test_a_name_cannot_act_on_a_terminal(evil: str) -> None:
     text = f'<robot name="r"><link name="a{evil}b"/><joint name="{evil}" type="{evil}"/></robot>'
-    for finding in check_text(text.encode(), file=f"{evil}.urdf"):
+    report = Reporter(f"{evil}.urdf", text.encode())
+    assert read_urdf(report) is not None
+    for finding in report.findings():
         assert evil not in str(finding)
 
 

@@ -8,10 +8,9 @@ import jsonschema
 import pytest
 
 from tests.lint.cases import CASES
-from urdfkin.checking import check
-from urdfkin.lint import Finding, Severity
-from urdfkin.lint.codes import REGISTRY
+from urdfkin.lint import Finding, Severity, check
 from urdfkin.lint.formats import as_github, as_json, summary
+from urdfkin.lint.pages import RULES
 from urdfkin.lint.sarif import as_sarif
 
 
@@ -43,7 +42,7 @@ def test_the_schema_would_notice(findings: list[Finding], schema: Any) -> None:
 def test_each_sarif_result_points_at_its_rule(findings: list[Finding]) -> None:
     run = json.loads(as_sarif(findings, "1.2.3"))["runs"][0]
     rules = run["tool"]["driver"]["rules"]
-    assert [rule["id"] for rule in rules] == list(REGISTRY)
+    assert [rule["id"] for rule in rules] == list(RULES)
     for result in run["results"]:
         assert rules[result["ruleIndex"]]["id"] == result["ruleId"]
 

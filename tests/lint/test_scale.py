@@ -23,9 +23,9 @@ def chain(length: int, back: str = "", mimic: bool = False) -> bytes:
 
 
 def timed(data: bytes, seconds: float = 20.0) -> tuple[Finding, ...]:
-    start = time.perf_counter()
+    start = time.process_time()
     findings = check_text(data)
-    assert time.perf_counter() - start < seconds
+    assert time.process_time() - start < seconds
     return findings
 
 

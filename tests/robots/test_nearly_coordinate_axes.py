@@ -10,8 +10,7 @@ import pinocchio as pin
 import pytest
 
 import urdfkin
-from urdfkin.checking import check
-from urdfkin.lint import Severity
+from urdfkin.lint import Severity, check
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray, KinematicTree, freed, with_tilts
 from urdfkin.verification.bounds import EPS

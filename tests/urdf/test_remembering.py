@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.reading import records, tree_of
 from urdfkin.keeping import CacheWarning
 from urdfkin.sources import read_source
 from urdfkin.tree import KinematicTree
 from urdfkin.urdf import remembering
-from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.remembering import remembered_tree
 
 
@@ -43,11 +43,11 @@ def test_the_second_reading_needs_no_parser_and_gives_the_same_tree(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data = text(name)
-    first = remembered_tree(data)
+    first = remembered_tree(records(data))
     monkeypatch.setattr(remembering, "read_tree", None)
-    second = remembered_tree(data)
+    second = remembered_tree(records(data))
     assert same(first, second)
-    assert same(second, read_tree(data))
+    assert same(second, tree_of(data))
     with pytest.raises(ValueError, match="read-only"):
         second.joints[0].axis[0] = 2.0
 
@@ -55,10 +55,10 @@ def test_the_second_reading_needs_no_parser_and_gives_the_same_tree(
 def test_another_text_or_another_way_to_read_it_is_another_tree(folder: Path) -> None:
     data = text("panda")
     trees = [
-        remembered_tree(data),
-        remembered_tree(data, mimic=False),
-        remembered_tree(data, root_joint="floating"),
-        remembered_tree(data.replace(b"0.333", b"0.334")),
+        remembered_tree(records(data)),
+        remembered_tree(records(data), mimic=False),
+        remembered_tree(records(data), root_joint="floating"),
+        remembered_tree(records(data.replace(b"0.333", b"0.334"))),
     ]
     assert len(list(folder.iterdir())) == len(trees)
     assert [tree.nq for tree in trees] == [8, 9, 15, 8]
@@ -68,11 +68,11 @@ def test_another_text_or_another_way_to_read_it_is_another_tree(folder: Path) ->
 @pytest.mark.parametrize("damage", [b"", b"nothing of the kind", b"\x80\x04N."])
 def test_a_damaged_file_is_read_anew_and_mended(folder: Path, damage: bytes) -> None:
     data = text("ur5")
-    expected = remembered_tree(data)
+    expected = remembered_tree(records(data))
     (kept,) = folder.iterdir()
     kept.write_bytes(damage)
     with pytest.warns(CacheWarning, match="is damaged and is made anew"):
-        assert same(remembered_tree(data), expected)
+        assert same(remembered_tree(records(data)), expected)
     assert kept.read_bytes() != damage
 
 
@@ -81,9 +81,9 @@ def test_where_nothing_can_be_written_the_tree_is_read_each_time(
 ) -> None:
     folder.rmdir()
     with pytest.warns(CacheWarning, match="nothing can be kept"):
-        assert same(remembered_tree(text("ur5")), read_tree(text("ur5")))
+        assert same(remembered_tree(records(text("ur5"))), tree_of(text("ur5")))
     monkeypatch.setattr(remembering, "_folder", lambda: None)
-    assert same(remembered_tree(text("ur5")), read_tree(text("ur5")))
+    assert same(remembered_tree(records(text("ur5"))), tree_of(text("ur5")))
 
 
 def test_it_is_the_robots_of_the_catalogue_that_are_remembered(folder: Path) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
+from tests.reading import tree_of
 from tests.strategies import rotation, rotations, trees
 from urdfkin.call import NotVerifiedWarning
 from urdfkin.errors import InputError
@@ -14,7 +15,6 @@ from urdfkin.lint import Severity, UrdfWarning, check_text
 from urdfkin.loading import load
 from urdfkin.rotation import rpy_of
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
-from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.skeleton import rpy_of_quaternion
 from urdfkin.urdf.writer import to_urdf
 
@@ -39,14 +39,14 @@ def test_a_written_tree_reads_back_as_itself(tree: KinematicTree) -> None:
     text = to_urdf(tree).encode()
     errors = [str(f) for f in check_text(text) if f.severity is Severity.ERROR]
     assert errors == []
-    assert_same(read_tree(text), tree)
+    assert_same(tree_of(text), tree)
 
 
 @SLOW
 @given(trees())
 def test_writing_twice_changes_nothing_but_the_last_digits_of_angles(tree: KinematicTree) -> None:
-    once = read_tree(to_urdf(tree).encode())
-    assert_same(read_tree(to_urdf(once).encode()), once)
+    once = tree_of(to_urdf(tree).encode())
+    assert_same(tree_of(to_urdf(once).encode()), once)
 
 
 @pytest.mark.slow
@@ -70,7 +70,7 @@ def test_pinocchio_agrees_on_every_written_tree(tree: KinematicTree) -> None:
 
 def test_a_tree_of_nothing_but_a_link_reads_back() -> None:
     tree = build_tree("stone", "only", [])
-    assert_same(read_tree(to_urdf(tree).encode()), tree)
+    assert_same(tree_of(to_urdf(tree).encode()), tree)
 
 
 @given(rotations)
@@ -106,7 +106,7 @@ def test_an_infinite_effort_makes_the_file_version_1_2() -> None:
     text = to_urdf(build_tree("r", "a", [(joint, "a", "b")]))
     assert 'version="1.2"' in text
     assert [f.oracle for f in check_text(text.encode())] == [None]
-    assert_same(read_tree(text.encode()), build_tree("r", "a", [(joint, "a", "b")]))
+    assert_same(tree_of(text.encode()), build_tree("r", "a", [(joint, "a", "b")]))
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-140, 1e140, -3.0])

@@ -10,15 +10,13 @@ from dataclasses import replace
 
 import click
 
-from urdfkin.checking import check
 from urdfkin.cli.arguments import xacro_args, xacro_option
 from urdfkin.cli.door import command_lines, say, say_styled
 from urdfkin.cli.numbers import Whole
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
-from urdfkin.lint import DEFAULT_LIMITS, Finding, Limits, Severity
-from urdfkin.lint.codes import REGISTRY
-from urdfkin.lint.explain import find_code
+from urdfkin.lint import DEFAULT_LIMITS, Finding, Limits, Severity, check
 from urdfkin.lint.formats import as_github, as_json, summary
+from urdfkin.lint.pages import find_rule, page
 from urdfkin.lint.sarif import as_sarif
 from urdfkin.urdf.xacro import XacroError
 
@@ -113,7 +111,7 @@ def _as_path(file: str) -> str:
 
 def _codes(words: Sequence[str]) -> set[str]:
     try:
-        return {find_code(part).id for word in words for part in re.split(r"[,\s]+", word) if part}
+        return {find_rule(part).id for word in words for part in re.split(r"[,\s]+", word) if part}
     except UnknownNameError as error:
         raise click.UsageError(f"--ignore: {error}") from error
 
@@ -155,4 +153,4 @@ def _print_terminal(findings: list[Finding], files: int) -> None:
     click.echo(summary(findings, files))
     worst = next((f.code for f in findings if f.severity is Severity.ERROR), None)
     if worst is not None:
-        click.echo(f"'urdfkin explain {worst}' tells more: {REGISTRY[worst].title}")
+        click.echo(f"'urdfkin explain {worst}' tells more: {page(worst).title}")

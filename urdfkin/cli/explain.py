@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import click
 
-from urdfkin.equations import explain
-from urdfkin.lint.codes import REGISTRY
-from urdfkin.lint.explain import find_code, page
+from urdfkin.equations import explain as explain_equation
+from urdfkin.lint.explain import explain
+from urdfkin.lint.pages import RULES, find_rule, page
 
 
 @click.command("explain")
@@ -24,9 +24,9 @@ def command(topic: str | None) -> None:
       urdfkin explain 7.130
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
     if topic is None:
-        for code in REGISTRY.values():
-            click.echo(f"{code.id}  {code.severity.value:7}  {code.slug:26}  {code.title}")
-    elif (equation := explain(topic)) is not None:
+        for rule in RULES.values():
+            click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")
+    elif (equation := explain_equation(topic)) is not None:
         click.echo(equation)
     else:
-        click.echo(page(find_code(topic)))
+        click.echo(explain(find_rule(topic)))

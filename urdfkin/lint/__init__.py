@@ -2,7 +2,7 @@
 
 from urdfkin.lint.finding import Finding, Oracle, Severity, UrdfError, UrdfWarning
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
-from urdfkin.lint.runner import check_text
+from urdfkin.lint.runner import check, check_text
 
 __all__ = [
     "DEFAULT_LIMITS",
@@ -12,5 +12,6 @@ __all__ = [
     "Severity",
     "UrdfError",
     "UrdfWarning",
+    "check",
     "check_text",
 ]

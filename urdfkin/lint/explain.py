@@ -1,43 +1,29 @@
-"""The page of one code: why it matters, a bad and a good example, and what others do with it."""
+"""The page of a rule as `urdfkin explain` prints it."""
 
 from __future__ import annotations
 
 import textwrap
 
-from urdfkin.errors import UnknownNameError
-from urdfkin.lint.codes import REGISTRY
-from urdfkin.lint.rule import Code
+from urdfkin.lint.pages import page
+from urdfkin.lint.rule import Rule
 from urdfkin.printable import printable
 
 #: Longest line of an example that is shown whole.
 _WIDEST = 100
 
 
-def find_code(word: str) -> Code:
-    """A code by its id or its short name, in any case.
-
-    Raises:
-        UnknownNameError: there is none; the nearest are offered.
-    """
-    wanted = word.strip().lower()
-    wanted = f"urdf{wanted}" if wanted.isdigit() else wanted
-    for code in REGISTRY.values():
-        if wanted in (code.id.lower(), code.slug):
-            return code
-    raise UnknownNameError("code", word, [*REGISTRY, *(code.slug for code in REGISTRY.values())])
-
-
-def page(code: Code, width: int = 88) -> str:
+def explain(rule: Rule, width: int = 88) -> str:
     """The page as plain text."""
+    said = page(rule.id)
     paragraphs = [
-        f"{code.id} {code.slug} ({code.severity.value})",
-        textwrap.fill(code.title[0].upper() + code.title[1:] + ".", width),
-        textwrap.fill(code.why, width),
-        "Found in:\n\n" + _example(code.bad),
-        "Better:\n\n" + _example(code.good),
-        textwrap.fill(code.others, width),
+        f"{rule.id} {rule.slug} ({rule.severity.value})",
+        textwrap.fill(said.title[0].upper() + said.title[1:] + ".", width),
+        textwrap.fill(said.why, width),
+        "Found in:\n\n" + _example(said.example),
+        "Better:\n\n" + _example(said.cure),
+        textwrap.fill(said.others, width),
     ]
-    if code.oracle is not None:
+    if rule.oracle is not None:
         paragraphs.append(
             textwrap.fill(
                 "Because of this, urdfkin computes the robot and reports every result as not verified.", width

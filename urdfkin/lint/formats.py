@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from urdfkin.lint.codes import REGISTRY
 from urdfkin.lint.finding import Finding, Severity
+from urdfkin.lint.pages import page
 
 #: Version of the JSON below; it changes when a field changes its meaning or goes away.
 JSON_VERSION = 1
@@ -36,7 +36,7 @@ def as_json(findings: Sequence[Finding], files: Sequence[str], version: str) -> 
         "urdfkin": version,
         "files": list(files),
         "counts": {s.value: sum(f.count for f in findings if f.severity is s) for s in Severity},
-        "findings": [{**finding.as_dict(), "title": REGISTRY[finding.code].title} for finding in findings],
+        "findings": [{**finding.as_dict(), "title": page(finding.code).title} for finding in findings],
     }
     return json.dumps(document, indent=2)
 

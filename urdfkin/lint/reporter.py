@@ -7,15 +7,12 @@ from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import islice
-from typing import TYPE_CHECKING
 
 from urdfkin.lint.finding import Finding, Severity
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
+from urdfkin.lint.rule import Rule
 from urdfkin.nearest import nearest
-
-if TYPE_CHECKING:
-    from urdfkin.lint.rule import Code
-    from urdfkin.lint.rules.document import Element
+from urdfkin.urdf.element import Element
 
 #: How many misspelt names of a file get suggestions, from how many names and after how much comparing.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
@@ -61,7 +58,7 @@ class Reporter:
 
     def add(
         self,
-        code: Code,
+        rule: Rule,
         message: str,
         at: Element | None = None,
         *,
@@ -76,7 +73,7 @@ class Reporter:
         """Report one finding.
 
         Args:
-            code: Which kind.
+            rule: Which kind.
             message: The claim in one clause.
             at: The element it is about; without it `position` says where.
             attribute: The attribute of `at` to point to.
@@ -84,12 +81,12 @@ class Reporter:
             remedy: What to do.
             owner: The tag to name instead of that of the link or joint around the element, for an element
                 that is a link or joint itself but stands in the wrong place.
-            severity: Overrides the code's.
+            severity: Overrides the rule's.
             position: (line, column) when there is no element.
             weight: When findings of one kind are folded, the one of the greatest weight stays.
         """
-        severity = code.severity if severity is None else severity
-        kind = self._kinds.setdefault((code.id, severity), _Kind(severity))
+        severity = rule.severity if severity is None else severity
+        kind = self._kinds.setdefault((rule.id, severity), _Kind(severity))
         if len(kind.found) >= WRITTEN_OUT:
             kind.lines.append(position[0] if at is None else at.line)
             return
@@ -99,7 +96,7 @@ class Reporter:
             line, column = self._place(at, attribute)
             name = at.label if owner is None else at.attributes.get("name")
         finding = Finding(
-            code.id,
+            rule.id,
             severity,
             message,
             found,
@@ -109,7 +106,7 @@ class Reporter:
             column,
             owner if owner or at is None else at.owner,
             name,
-            code.oracle,
+            rule.oracle,
         )
         kind.found.append((finding, weight))
 
@@ -120,9 +117,9 @@ class Reporter:
             return []
         return nearest(word, islice(known, CANDIDATES), work=WORK)
 
-    def is_full(self, code: Code) -> bool:
+    def is_full(self, rule: Rule) -> bool:
         """Whether so many of a kind were reported that no more are written out."""
-        kind = self._kinds.get((code.id, code.severity))
+        kind = self._kinds.get((rule.id, rule.severity))
         return kind is not None and len(kind.found) >= WRITTEN_OUT
 
     @property

@@ -1,4 +1,4 @@
-"""What a code is: its severity, its page of explanation, and two examples that are run as tests."""
+"""What a rule is: the code that its findings carry, and how bad they are. Its page is in `lint.pages`."""
 
 from __future__ import annotations
 
@@ -11,36 +11,19 @@ REFUSES, DIFFERS = Oracle.REFUSES, Oracle.DIFFERS
 
 
 @dataclass(frozen=True, slots=True)
-class Code:
+class Rule:
     """One kind of finding.
 
     Attributes:
-        id: `URDF` and three digits; never used again for anything else.
+        id: `URDF` and three digits; never used again for anything else. The first digit tells the family:
+            1 text and XML, 2 dialect and elements, 3 numbers, 4 names and structure, 5 joints, 6 suspicious,
+            7 inertials, geometry and materials.
         slug: A short name in words.
         severity: How bad it is unless a finding says otherwise.
-        title: The claim in one line, for tables.
-        why: Why it matters to someone who wants numbers.
-        bad: A smallest example that has it. A whole document, or the inside of `<robot>`; when it begins
-            with a joint, the links `base` and `tip` are there already.
-        good: The same example, put right.
-        others: What Pinocchio (urdfdom) and yourdfpy do with the bad example.
         oracle: What Pinocchio does when it departs from the specification.
     """
 
     id: str
     slug: str
     severity: Severity
-    title: str
-    why: str
-    bad: str
-    good: str
-    others: str
     oracle: Oracle | None = None
-
-    def document(self, example: str) -> str:
-        """`bad` or `good` as a whole URDF document."""
-        text = example.strip("\n")
-        if not text.startswith(("<joint", "<link", "<material")):
-            return example
-        links = '<link name="base"/>\n<link name="tip"/>\n' if text.startswith("<joint") else ""
-        return f'<robot name="example">\n{links}{text}\n</robot>\n'

@@ -1,94 +1,135 @@
-"""The checks in their order: bytes, XML, dialect, numbers, names, structure, joints, and what looks odd."""
+"""The rules in their order, for a text or whatever holds one: bytes, XML, dialect, numbers, names, and so on.
+
+The text is read once: who loads a robot makes it of the same records that the rules were applied to.
+"""
 
 from __future__ import annotations
 
-from urdfkin.lint.codes import text as codes
+from collections.abc import Mapping
+from pathlib import Path
+
+from urdfkin.demands import switch, word
 from urdfkin.lint.finding import Finding
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.axes import check_joints
+from urdfkin.lint.rules.axes import check_axes
 from urdfkin.lint.rules.dialect import check_dialect
-from urdfkin.lint.rules.document import Element, parse
-from urdfkin.lint.rules.encoding import utf8_bytes
-from urdfkin.lint.rules.joints import RobotRecord, read_robot
+from urdfkin.lint.rules.document import read_document
+from urdfkin.lint.rules.inertials import check_inertials
+from urdfkin.lint.rules.joints import read_robot
+from urdfkin.lint.rules.materials import check_materials
+from urdfkin.lint.rules.meshes import check_meshes
 from urdfkin.lint.rules.mimic import check_mimic
 from urdfkin.lint.rules.names import check_names
 from urdfkin.lint.rules.prefixes import check_prefixes
-from urdfkin.lint.rules.shapes import check_extras
+from urdfkin.lint.rules.ranges import check_ranges
+from urdfkin.lint.rules.shapes import check_shapes
 from urdfkin.lint.rules.structure import check_structure
 from urdfkin.lint.rules.suspicious import check_suspicious
 from urdfkin.lint.rules.vocabulary import check_vocabulary
+from urdfkin.sources import Source, Text, read_source
+from urdfkin.urdf.records import RobotRecord
 
 
-def check_text(
-    data: bytes,
+def check(
+    source: Source,
     *,
-    file: str = "<text>",
     limits: Limits = DEFAULT_LIMITS,
-    mimic: bool = True,
+    mimic: bool | None = None,
     root_joint: str | None = None,
-    fold: bool = True,
-) -> tuple[Finding, ...]:
-    """Everything there is to say about a URDF, by line.
+    xacro_args: Mapping[str, object] | None = None,
+    fold: bool = False,
+) -> list[Finding]:
+    """Findings about a URDF, by line, without computing anything.
 
-    A pure function of the bytes: it opens no file and no connection, and asks neither yourdfpy nor Pinocchio.
+    Besides what the text itself tells, packages and files that meshes are said to lie in are looked for; no
+    mesh is opened.
 
     Args:
-        data: The file's bytes.
-        file: What to call it in the findings.
+        source: A path, a name of the catalogue, URDF text, bytes, an open file, or `-` for standard input.
         limits: How large the file may be.
-        mimic: Whether mimic joints are to follow their leaders; without, what is wrong with them is a note.
-        root_joint: `"floating"` or `"planar"` when the robot will hang from such a joint: then the names that
-            joint takes are errors.
+        mimic: Whether mimic joints are to follow; without, what is wrong with them is a note. None: True,
+            except for the robots whose catalogue entry says that theirs cannot work.
+        root_joint: `"floating"` or `"planar"` when the robot will hang from such a joint.
+        xacro_args: Arguments for a .xacro file, which is expanded first; lines are those of the result.
         fold: Whether many warnings of one kind are folded into one that lists the lines, and errors from the
             hundredth of a kind on into that one.
 
     Returns:
-        Findings, sorted by line; empty for a file nothing can be said against. Of each kind 10,000 are
-        written out; `also` of the last holds the lines of the others.
+        The findings; an empty list for a file nothing can be said against. Of each kind 10,000 are written
+        out; `also` of the last holds the lines of the others.
+
+    Raises:
+        SourceError: the file cannot be read.
+        UnknownNameError: neither a file nor a name of the catalogue; the nearest names are offered.
+        InputError: something else than a source.
+
+    >>> for finding in check('<robot name="r"><link name="base"/><link name="stray"/></robot>'):
+    ...     print(finding)  # doctest: +ELLIPSIS
+    <text>:1:42: URDF411 error: link 'stray': the link has no parent, and neither has "base"; ...
+    """
+    if mimic is not None:
+        switch(mimic, "mimic")
+    if root_joint is not None:
+        word(root_joint, "root_joint")
+    switch(fold, "fold")
+    text = read_source(source, limits.bytes, xacro_args)
+    if mimic is None:
+        mimic = text.entry is None or text.entry.mimic
+    report = Reporter(text.label, text.data, limits)
+    robot = read_urdf(report, mimic=mimic, root_joint=root_joint)
+    if robot is not None:
+        check_meshes(report, robot.element, _file(text))
+    return list(report.findings(fold=fold))
+
+
+def _file(text: Text) -> Path | None:
+    """The file a text was read from, which tells where its packages may lie."""
+    path = Path(text.source if text.entry is None else text.label)
+    return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path
+
+
+def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = True) -> tuple[Finding, ...]:
+    """Everything there is to say about a URDF, by line: a pure function of the bytes.
+
+    It opens no file and no connection, and asks neither yourdfpy nor Pinocchio.
+
+    Args:
+        data: The file's bytes.
+        limits: How large the file may be.
+        fold: As for `check`.
 
     >>> [finding.code for finding in check_text(b"<robot name='r'><link name='base'/></robot>")]
     []
     """
-    report = Reporter(file, data, limits)
-    root = read_document(report, data)
-    if root is not None:
-        check_robot(report, root, mimic=mimic, root_joint=root_joint)
+    report = Reporter("<text>", data, limits)
+    read_urdf(report)
     return report.findings(fold=fold)
 
 
-def read_document(report: Reporter, data: bytes) -> Element | None:
-    """The root element of a file, or None after the finding that says why there is none."""
-    most = report.limits.bytes
-    if len(data) > most:
-        report.add(
-            codes.TOO_LARGE,
-            "the file is too large",
-            found=f"{len(data)} bytes, more than {most}",
-            remedy="raise the limit with --max-bytes if the file is right",
-        )
-        return None
-    text = utf8_bytes(report, data)
-    if text is None:
-        return None
-    report.data = text
-    return parse(report, text)
+def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
+    """What the reporter's file says, with findings about it; None when it is no URDF.
 
-
-def check_robot(
-    report: Reporter, root: Element, *, mimic: bool = True, root_joint: str | None = None
-) -> RobotRecord | None:
-    """What the document says, with findings about it; None when it is no URDF."""
-    version = check_dialect(report, root)
-    if version is None:
+    Args:
+        report: The file's name, bytes and limits, and where findings go.
+        mimic: Whether mimic joints are to follow their leaders; without, what is wrong with them is a note.
+        root_joint: `"floating"` or `"planar"` when the robot will hang from such a joint: then the names that
+            joint takes are errors.
+    """
+    root = read_document(report)
+    version = None if root is None else check_dialect(report, root)
+    if root is None or version is None:
         return None
     check_prefixes(report, root)
     check_vocabulary(report, root)
     robot = read_robot(report, root, version)
     check_names(report, robot, root_joint)
     sound = check_structure(report, robot)
-    check_joints(report, robot)
+    check_axes(report, robot)
+    check_ranges(report, robot)
     check_mimic(report, robot, obeyed=mimic)
     check_suspicious(report, robot, sound=sound)
-    check_extras(report, robot)
+    check_inertials(report, robot)
+    check_shapes(report, robot)
+    check_materials(report, robot)
     return robot

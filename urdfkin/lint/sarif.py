@@ -12,23 +12,22 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from urdfkin.lint.codes import REGISTRY
 from urdfkin.lint.finding import Finding
-from urdfkin.lint.rule import Code
+from urdfkin.lint.pages import RULES, page
+from urdfkin.lint.rule import Rule
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 
 
 def as_sarif(findings: Sequence[Finding], version: str) -> str:
     """One SARIF run with every code as a rule and every finding as a result."""
-    rules = list(REGISTRY.values())
-    index = {code.id: number for number, code in enumerate(rules)}
+    index = {code: number for number, code in enumerate(RULES)}
     run = {
         "tool": {
             "driver": {
                 "name": "urdfkin",
                 "version": version,
-                "rules": [_rule(code) for code in rules],
+                "rules": [_rule(rule) for rule in RULES.values()],
             }
         },
         "columnKind": "unicodeCodePoints",
@@ -37,14 +36,15 @@ def as_sarif(findings: Sequence[Finding], version: str) -> str:
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
 
 
-def _rule(code: Code) -> dict[str, Any]:
+def _rule(rule: Rule) -> dict[str, Any]:
+    said = page(rule.id)
     return {
-        "id": code.id,
-        "name": "".join(word.capitalize() for word in code.slug.split("-")),
-        "shortDescription": {"text": code.title},
-        "fullDescription": {"text": code.why},
-        "help": {"text": f"{code.why}\n\n{code.others}"},
-        "defaultConfiguration": {"level": code.severity.value},
+        "id": rule.id,
+        "name": "".join(word.capitalize() for word in rule.slug.split("-")),
+        "shortDescription": {"text": said.title},
+        "fullDescription": {"text": said.why},
+        "help": {"text": f"{said.why}\n\n{said.others}"},
+        "defaultConfiguration": {"level": rule.severity.value},
     }
 
 

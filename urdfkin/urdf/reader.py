@@ -1,4 +1,4 @@
-"""URDF text to `KinematicTree`, through yourdfpy; the only module that imports it.
+"""What a URDF says to `KinematicTree`, through yourdfpy; the only module that imports it.
 
 yourdfpy is given the links and joints alone (`urdfkin.urdf.skeleton`): shapes, colours, odd encodings, loose
 ends that its parser would repair, and quaternions that it does not know never reach it. What the URDF
@@ -26,17 +26,18 @@ from urdfkin.tree import (
     build_tree,
     with_root_joint,
 )
+from urdfkin.urdf.records import RobotRecord
 from urdfkin.urdf.skeleton import skeleton
 
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
 
-def read_tree(data: bytes, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
+def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
     """The kinematic tree of a URDF.
 
     Args:
-        data: The file's bytes, already found free of errors by `urdfkin.lint`.
+        urdf: What was read of the text, found free of errors by `urdfkin.lint`.
         mimic: Whether mimic joints follow their leaders (the URDF's meaning) or move freely.
         root_joint: `"floating"` or `"planar"` hangs the root link from a moving joint `root_joint`.
 
@@ -44,7 +45,7 @@ def read_tree(data: bytes, *, mimic: bool = True, root_joint: str | None = None)
         InputError: the joints make no tree, a mimic joint cannot follow, or `root_joint` is no such kind.
         UnknownNameError: a mimic joint names a leader that does not exist.
     """
-    robot = _parse(data)
+    robot = _parse(urdf)
     links = {link.name for link in robot.links}
     roots = links - {joint.child for joint in robot.joints}
     if len(roots) != 1:
@@ -57,11 +58,11 @@ def read_tree(data: bytes, *, mimic: bool = True, root_joint: str | None = None)
     return tree if root_joint is None else with_root_joint(tree, _root_kind(root_joint))
 
 
-def _parse(data: bytes) -> yourdf.Robot:
+def _parse(urdf: RobotRecord) -> yourdf.Robot:
     # Imported on first use: the meshing library under yourdfpy takes half a second.
     from yourdfpy import URDF  # noqa: PLC0415
 
-    text = io.BytesIO(skeleton(data))
+    text = io.BytesIO(skeleton(urdf))
     return URDF.load(text, build_scene_graph=False, load_meshes=False).robot
 
 

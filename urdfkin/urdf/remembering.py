@@ -1,7 +1,8 @@
 """Trees that were read before, on disk: reading one takes a millisecond, importing the parser half a second.
 
-A tree is kept under a digest of everything it depends on: the URDF, how it is read, the sources that read it
-and the parser's version. What is damaged is read anew, what cannot be written is not kept; both are said.
+A tree is kept under a digest of everything it depends on: what the URDF says of links and joints, how it is
+read, the sources that read it and the parser's version. What is damaged is read anew, what cannot be written
+is not kept; both are said.
 """
 
 from __future__ import annotations
@@ -17,9 +18,11 @@ from urdfkin.keeping import kept_folder
 from urdfkin.sealed import damaged, keep, kept
 from urdfkin.tree import KinematicTree
 from urdfkin.urdf.reader import read_tree
+from urdfkin.urdf.records import RobotRecord
+from urdfkin.urdf.skeleton import skeleton
 
 
-def remembered_tree(data: bytes, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
+def remembered_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
     """As `read_tree`, from disk where it was read before; for robots that come again: nothing is deleted.
 
     Raises:
@@ -28,15 +31,15 @@ def remembered_tree(data: bytes, *, mimic: bool = True, root_joint: str | None =
     """
     folder = _folder()
     if folder is None:
-        return read_tree(data, mimic=mimic, root_joint=root_joint)
-    place = folder / hashlib.sha256(repr((data, mimic, root_joint)).encode()).hexdigest()[:32]
+        return read_tree(urdf, mimic=mimic, root_joint=root_joint)
+    place = folder / hashlib.sha256(repr((skeleton(urdf), mimic, root_joint)).encode()).hexdigest()[:32]
     if (content := kept(place)) is not None:
         try:
             if isinstance(found := pickle.loads(content), KinematicTree):
                 return found
         except Exception as error:  # whole, but of another time: it may fail in any way
             damaged(place, str(error))
-    read = read_tree(data, mimic=mimic, root_joint=root_joint)
+    read = read_tree(urdf, mimic=mimic, root_joint=root_joint)
     keep(place, pickle.dumps(read))
     return read
 

@@ -1,16 +1,21 @@
-"""Axes and limits of joints."""
+"""Axes of joints: those without a direction, of another length than one, and those that are not used."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
-from urdfkin.lint.codes import joints as codes
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.finding import Severity
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.document import Element
-from urdfkin.lint.rules.joints import AXIAL, FURTHER_LIMITS, JointRecord, LimitRecord, RobotRecord
+from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
+from urdfkin.urdf.element import Element
+from urdfkin.urdf.records import AXIAL, JointRecord, RobotRecord
+
+NO_DIRECTION = Rule("URDF502", "axis-without-direction", ERROR)
+AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
+PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
+NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
 #: Lengths whose square neither under- nor overflows.
 SHORTEST, LONGEST = 1e-150, 1e150
@@ -26,15 +31,13 @@ _SNAPPED = 1e-12
 _TILT = 2.0**-52
 
 
-def check_joints(report: Reporter, robot: RobotRecord) -> None:
-    """Axes that have no direction, are no unit vectors or are not used; limits that contradict themselves."""
+def check_axes(report: Reporter, robot: RobotRecord) -> None:
+    """Axes that have no direction, are no unit vectors or are not used."""
     for joint in robot.joints:
         if joint.kind in AXIAL:
             _check_axis(report, joint)
         elif joint.kind == "planar":
             _check_planar(report, joint)
-        if joint.limit is not None:
-            _check_limit(report, joint, joint.limit, robot.version)
 
 
 def _written(joint: JointRecord) -> str:
@@ -49,7 +52,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
     if not SHORTEST < length < LONGEST:
         what = "is zero" if length == 0.0 else f"has no usable length ({length:.3g})"
         report.add(
-            codes.NO_DIRECTION,
+            NO_DIRECTION,
             f"the axis {what}",
             joint.axis_element,
             attribute="xyz",
@@ -59,7 +62,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
     elif abs(length - 1.0) > 1e-12:
         unit = " ".join(repr(x / length) for x in joint.axis)
         report.add(
-            codes.AXIS_LENGTH,
+            AXIS_LENGTH,
             f"the axis has length {length:.9g} and is normalised",
             joint.axis_element,
             attribute="xyz",
@@ -76,7 +79,7 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
         unit, tilt = snapped
         written = " ".join(f"{x:g}" for x in unit)
         report.add(
-            codes.NEARLY_COORDINATE_AXIS,
+            NEARLY_COORDINATE_AXIS,
             f"the axis is {tilt:.2g} rad off {written}, and Pinocchio takes {written}",
             element,
             attribute="xyz",
@@ -116,67 +119,10 @@ def _check_planar(report: Reporter, joint: JointRecord) -> None:
         return
     at = joint.axis_element or joint.element
     report.add(
-        codes.PLANAR_AXIS,
+        PLANAR_AXIS,
         "a planar joint moves in the XY plane of its frame, whatever its axis says",
         at,
         attribute="xyz",
         found=_written(joint),
         remedy='turn the origin so that the normal is z, and write <axis xyz="0 0 1"/>',
     )
-
-
-def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # from then on urdfdom asks the same of every joint, whatever its type
-    for attribute in ("effort", "velocity", *FURTHER_LIMITS):
-        value = getattr(limit, attribute)
-        if value is not None and value < 0.0:
-            refused = strict or joint.kind in AXIAL
-            report.add(
-                codes.NEGATIVE_LIMIT if refused else codes.IGNORED,
-                f"the limit of {attribute} is negative; Pinocchio {'refuses' if refused else 'ignores'} it",
-                limit.element,
-                attribute=attribute,
-                found=quoted(limit.element.attributes[attribute]),
-                remedy="write its magnitude",
-            )
-    if joint.kind == "continuous":
-        _check_continuous(report, limit)
-    bounded = joint.kind in ("revolute", "prismatic")
-    written = {"lower", "upper"} & limit.element.attributes.keys()
-    if not bounded and not (strict and len(written) == 2):
-        return
-    if any(getattr(limit, name) is None for name in written):
-        return
-    lower, upper = limit.lower or 0.0, limit.upper or 0.0
-    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "neither lower nor upper, so both are 0"
-    if lower > upper:
-        report.add(
-            codes.INVERTED_LIMIT,
-            "the lower limit is above the upper limit",
-            limit.element,
-            attribute="lower",
-            found=found if len(written) == 2 else f"{found} (what is not written is 0)",
-            remedy="swap the two" if len(written) == 2 else "write both limits",
-        )
-    elif lower == upper and bounded:
-        report.add(
-            codes.EMPTY_RANGE,
-            "the joint cannot move: its limits are equal",
-            limit.element,
-            attribute="lower",
-            found=found,
-            remedy="write the range, or make the joint fixed",
-        )
-
-
-def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
-    written = [name for name in ("lower", "upper") if name in limit.element.attributes]
-    if any(getattr(limit, name) for name in written):
-        report.add(
-            codes.IGNORED,
-            "a continuous joint has no position limits; they are ignored",
-            limit.element,
-            attribute=written[0],
-            found=" ".join(f"{name}={quoted(limit.element.attributes[name])}" for name in written),
-            remedy='remove them, or write type="revolute"',
-        )

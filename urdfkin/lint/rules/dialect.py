@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
-from urdfkin.lint.codes import dialect as codes
-from urdfkin.lint.codes import structure, text
 from urdfkin.lint.escape import quoted, shortened
 from urdfkin.lint.finding import Severity
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.document import Element
-from urdfkin.lint.rules.vocabulary import OPAQUE
+from urdfkin.lint.rule import ERROR, WARNING, Rule
+from urdfkin.lint.rules import names
+from urdfkin.lint.rules.vocabulary import outside_extensions
+from urdfkin.urdf.element import Element
+
+INCLUDE = Rule("URDF112", "include", ERROR)
+NOT_URDF = Rule("URDF201", "not-a-urdf", ERROR)
+XACRO = Rule("URDF202", "unexpanded-xacro", ERROR)
+VERSION = Rule("URDF203", "urdf-version", ERROR)
+NEWER_VERSION = Rule("URDF204", "newer-urdf-version", WARNING)
+NO_LINKS = Rule("URDF205", "no-links", ERROR)
+NAMESPACE = Rule("URDF213", "default-namespace", WARNING)
 
 _T = TypeVar("_T")
 
@@ -53,7 +61,7 @@ def check_dialect(report: Reporter, root: Element) -> tuple[int, int] | None:
     if not root.all("link"):
         srdf = any(child.tag in _SRDF for child in root.children)
         remedy = "this is an SRDF; pass the URDF it goes with" if srdf else "a robot is at least one <link>"
-        report.add(codes.NO_LINKS, "the robot has no link", root, remedy=remedy)
+        report.add(NO_LINKS, "the robot has no link", root, remedy=remedy)
     return _version(report, root)
 
 
@@ -65,7 +73,7 @@ def _other_format(report: Reporter, root: Element) -> None:
         remedy = "write it in lower case"
     else:
         remedy = _FORMATS.get(local.lower(), "a URDF begins with <robot name=...>")
-    report.add(codes.NOT_URDF, "the root element is not <robot>", root, found=f"<{root.tag}>", remedy=remedy)
+    report.add(NOT_URDF, "the root element is not <robot>", root, found=f"<{root.tag}>", remedy=remedy)
 
 
 def _prefixes(root: Element) -> dict[str, str]:
@@ -82,7 +90,7 @@ def _check_namespaces(report: Reporter, root: Element, prefixes: dict[str, str])
     """Nothing that should have been expanded or included before."""
     if "xmlns" in root.attributes:
         report.add(
-            codes.NAMESPACE,
+            NAMESPACE,
             "the elements are put into a namespace, where most readers do not find them",
             root,
             attribute="xmlns",
@@ -97,7 +105,7 @@ def _check_namespaces(report: Reporter, root: Element, prefixes: dict[str, str])
             macros.append(element)
         elif (local == "include" and prefixes.get(prefix) == _XINCLUDE) or element.tag == "xi:include":
             report.add(
-                text.INCLUDE,
+                INCLUDE,
                 "another file is to be included",
                 element,
                 found=quoted(element.attributes.get("href", f"<{element.tag}>")),
@@ -117,7 +125,7 @@ def _check_macros(report: Reporter, root: Element, macros: list[Element]) -> boo
     for group, severity in ((missed, None), (harmless, Severity.WARNING)):
         if group:
             report.add(
-                codes.XACRO,
+                XACRO,
                 f"xacro that was not expanded{_HARMLESS if severity else ''}",
                 group[0],
                 found=f"<{shortened(group[0].tag)}>{_more(group)}",
@@ -131,7 +139,7 @@ def _check_expressions(report: Reporter, root: Element) -> None:
     """Expressions in the place of names and numbers: an error where motion depends on them."""
     written = [
         (element, key)
-        for element in _outside_extensions(root)
+        for element in outside_extensions(root)
         for key, value in element.attributes.items()
         if "$" in value and is_expression(value) and not key.startswith("xmlns")
     ]
@@ -140,7 +148,7 @@ def _check_expressions(report: Reporter, root: Element) -> None:
         if group:
             element, key = group[0]
             report.add(
-                codes.XACRO,
+                XACRO,
                 f"a xacro expression that was not expanded{_HARMLESS if severity else ''}",
                 element,
                 attribute=key,
@@ -178,21 +186,13 @@ def is_expression(value: str) -> bool:
     return (start >= 0 and "}" in value[start:]) or _COMMAND.search(value) is not None
 
 
-def _outside_extensions(root: Element) -> Iterator[Element]:
-    stack = [root]
-    while stack:
-        element = stack.pop()
-        yield element
-        stack += [child for child in reversed(element.children) if child.tag not in OPAQUE]
-
-
 def _check_name(report: Reporter, root: Element) -> None:
     name = root.attributes.get("name")
     if name is None:
-        report.add(structure.MISSING_NAME, "the robot has no name", root, remedy='write <robot name="...">')
+        report.add(names.MISSING_NAME, "the robot has no name", root, remedy='write <robot name="...">')
     elif not name.strip():
         report.add(
-            structure.ODD_NAME, "the robot's name is empty", root, attribute="name", remedy="give it a name"
+            names.ODD_NAME, "the robot's name is empty", root, attribute="name", remedy="give it a name"
         )
 
 
@@ -205,7 +205,7 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
     known = version is not None and (1, 0) <= version <= NEWEST
     if version is None or not known:
         report.add(
-            codes.VERSION,
+            VERSION,
             "there is no such URDF version" if version else "a URDF version is two numbers and a point",
             root,
             attribute="version",
@@ -215,7 +215,7 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
         return (1, 0)
     if version != (1, 0):
         report.add(
-            codes.NEWER_VERSION,
+            NEWER_VERSION,
             "most readers know only URDF 1.0",
             root,
             attribute="version",

@@ -8,76 +8,31 @@ with content stops it before the first entity could be expanded.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from xml.parsers import expat
 
-from urdfkin.lint.codes import text as codes
 from urdfkin.lint.escape import QUOTED, quoted, shortened
 from urdfkin.lint.limits import ORACLE_DEPTH
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rule import Code
+from urdfkin.lint.rule import ERROR, REFUSES, WARNING, Rule
+from urdfkin.lint.rules.encoding import line_and_column, utf8_bytes
+from urdfkin.urdf.element import Element
+
+SYNTAX = Rule("URDF105", "xml-syntax", ERROR)
+ENTITY = Rule("URDF106", "entity", ERROR)
+DOCTYPE = Rule("URDF107", "doctype", WARNING)
+TOO_LARGE = Rule("URDF108", "too-large", ERROR)
+DEEP_NESTING = Rule("URDF109", "deep-nesting", WARNING)
+TOO_DEEP_FOR_ORACLE = Rule("URDF110", "too-deep-for-pinocchio", WARNING, REFUSES)
+TOO_MANY_ELEMENTS = Rule("URDF114", "too-many-elements", ERROR)
+TOO_DEEP = Rule("URDF115", "too-deep", ERROR)
+TOO_MANY_ATTRIBUTES = Rule("URDF116", "too-many-attributes", ERROR)
+NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
+INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
+MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
 #: libxml2 refused deeper nesting for many years, and with it everything built on it.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
-
-
-@dataclass(slots=True, eq=False)
-class Element:
-    """One element: tag and attributes as written, children in order, the beginning of its text, its place.
-
-    Attributes:
-        above: The link, joint or other child of `<robot>` around it; None for those themselves.
-    """
-
-    tag: str
-    attributes: dict[str, str]
-    parent: Element | None
-    line: int
-    column: int
-    offset: int
-    above: Element | None = None
-    children: Sequence[Element] = ()
-    text: str = ""
-
-    def append(self, child: Element) -> None:
-        """Add a child; most elements have none, and a list for each would double their size."""
-        if isinstance(self.children, list):
-            self.children.append(child)
-        else:
-            self.children = [child]
-
-    def all(self, tag: str) -> list[Element]:
-        """Children of one tag."""
-        return [child for child in self.children if child.tag == tag]
-
-    def first(self, tag: str) -> Element | None:
-        """The first child of a tag, which is the one every reader takes."""
-        return next((child for child in self.children if child.tag == tag), None)
-
-    def walk(self) -> Iterator[Element]:
-        """This element and everything below it, in the order of the file, without recursion."""
-        stack = [self]
-        while stack:
-            element = stack.pop()
-            yield element
-            stack += reversed(element.children)
-
-    @property
-    def holder(self) -> Element:
-        """The link, joint or other child of `<robot>` this element belongs to; itself at the top."""
-        return self.above or self
-
-    @property
-    def owner(self) -> str:
-        """The tag a person would name: `joint` for everything inside a joint."""
-        return self.holder.tag
-
-    @property
-    def label(self) -> str | None:
-        """The name of the link or joint this element belongs to."""
-        return self.holder.attributes.get("name") if self.parent is not None else None
 
 
 #: Bytes that the parser is given at once.
@@ -94,16 +49,28 @@ class _Stop(Exception):  # noqa: N818 - not an error: the parser has been told e
     """Ends the parse after a finding that makes the rest meaningless."""
 
 
-def parse(report: Reporter, data: bytes) -> Element | None:
-    """The root element, or None after a finding that says why there is none.
+def read_document(report: Reporter) -> Element | None:
+    """The root element of the reporter's file, or None after the finding that says why there is none."""
+    data, most = report.data, report.limits.bytes
+    if len(data) > most:
+        report.add(
+            TOO_LARGE,
+            "the file is too large",
+            found=f"{len(data)} bytes, more than {most}",
+            remedy="raise the limit with --max-bytes if the file is right",
+        )
+        return None
+    text = utf8_bytes(report, data)
+    if text is None:
+        return None
+    report.data = text
+    return _parse(report)
 
-    Args:
-        report: Where findings go, and the limits.
-        data: UTF-8 bytes, already checked by `urdfkin.lint.rules.encoding`, without a byte order mark.
-    """
+
+def _parse(report: Reporter) -> Element | None:
     builder = _Builder(report)
     try:
-        builder.read(data)
+        builder.read(report.data)
     except _Stop:
         return None
     except expat.ExpatError as error:
@@ -113,7 +80,7 @@ def parse(report: Reporter, data: bytes) -> Element | None:
         refused = builder.deepest > ORACLE_DEPTH
         reader, most = ("urdfdom refuses", ORACLE_DEPTH) if refused else _COMMON
         report.add(
-            codes.TOO_DEEP_FOR_ORACLE if refused else codes.DEEP_NESTING,
+            TOO_DEEP_FOR_ORACLE if refused else DEEP_NESTING,
             f"elements are nested {builder.deepest} deep",
             builder.deepest_element,
             remedy=f"{reader} more than {most}",
@@ -149,9 +116,7 @@ class _Builder:
             self.parser.Parse(whole[start:fed], False)
             if fed - max(self.parser.CurrentByteIndex, 0) > self.limits.markup:
                 found = f"more than {self.limits.markup} bytes without an end"
-                self.refuse(
-                    codes.MARKUP_TOO_LONG, "markup", "a tag, comment or instruction is too long", found
-                )
+                self.refuse(MARKUP_TOO_LONG, "markup", "a tag, comment or instruction is too long", found)
         self.parser.Parse(b"", True)
 
     def here(self) -> tuple[int, int]:
@@ -177,16 +142,12 @@ class _Builder:
     def keep_limits(self, tag: str, attributes: dict[str, str]) -> None:
         most = self.limits
         if self.deepest > most.depth:
-            self.refuse(
-                codes.TOO_DEEP, "depth", "elements are nested too deep", f"more than {most.depth} levels"
-            )
+            self.refuse(TOO_DEEP, "depth", "elements are nested too deep", f"more than {most.depth} levels")
         if self.count > most.elements:
-            self.refuse(
-                codes.TOO_MANY_ELEMENTS, "elements", "too many elements", f"more than {most.elements}"
-            )
+            self.refuse(TOO_MANY_ELEMENTS, "elements", "too many elements", f"more than {most.elements}")
         if len(attributes) > most.attributes:
             found = f"{len(attributes)} in <{shortened(tag)}>, more than {most.attributes}"
-            self.refuse(codes.TOO_MANY_ATTRIBUTES, "attributes", "an element has too many attributes", found)
+            self.refuse(TOO_MANY_ATTRIBUTES, "attributes", "an element has too many attributes", found)
         if len(tag) > most.name:
             self.refuse_name("an element", tag)
         for key, value in attributes.items():
@@ -197,9 +158,9 @@ class _Builder:
 
     def refuse_name(self, owner: str, name: str) -> None:
         found = f"{quoted(name, 30)} of {len(name)} characters, more than {self.limits.name}"
-        self.refuse(codes.NAME_TOO_LONG, "name", f"the name of {owner} is too long", found)
+        self.refuse(NAME_TOO_LONG, "name", f"the name of {owner} is too long", found)
 
-    def refuse(self, code: Code, limit: str, message: str, found: str) -> None:
+    def refuse(self, code: Rule, limit: str, message: str, found: str) -> None:
         remedy = f"raise the limit with --max-{limit} if the file is right"
         self.report.add(code, message, found=found, remedy=remedy, position=self.here())
         raise _Stop
@@ -221,7 +182,7 @@ class _Builder:
         """Judge a processing instruction: urdfdom's parser allows them at the very beginning alone."""
         if self.begun:
             self.report.add(
-                codes.INSTRUCTION,
+                INSTRUCTION,
                 "a processing instruction stands after the beginning, where urdfdom refuses the file",
                 found=quoted(f"<?{target} {text}".strip() + "?>"),
                 remedy="remove it, or put it before everything but other instructions",
@@ -235,7 +196,7 @@ class _Builder:
         position = line_and_column(self.report.data, start)
         if system is None and public is None and not has_subset:
             self.report.add(
-                codes.DOCTYPE,
+                DOCTYPE,
                 "a document type declaration has no use in a URDF",
                 found=quoted(f"<!DOCTYPE {name}>"),
                 remedy="remove it; it is ignored",
@@ -245,7 +206,7 @@ class _Builder:
         what = "has content of its own" if has_subset else "refers to an external definition"
         found = quoted(f"<!DOCTYPE {name} [...") if system is None else quoted(system)
         self.report.add(
-            codes.ENTITY,
+            ENTITY,
             f"the document type declaration {what}",
             found=found,
             remedy="remove it and write values out; nothing was expanded or opened",
@@ -259,7 +220,7 @@ class _Builder:
 
     def undefined_entity(self, name: str | None) -> None:
         self.report.add(
-            codes.ENTITY,
+            ENTITY,
             "an entity is used that XML does not define",
             found=quoted(f"&{name};") if name else None,
             remedy="write the character itself, or one of &lt; &gt; &amp; &quot; &apos;",
@@ -282,7 +243,7 @@ class _Builder:
                 message, remedy = "the file ends too early", f"{opened} is never closed"
         ended = reason == expat.errors.XML_ERROR_NO_ELEMENTS
         self.report.add(
-            codes.SYNTAX,
+            SYNTAX,
             f"not well-formed XML: {message}",
             found=None if ended else self._around(),
             remedy=remedy,
@@ -322,9 +283,3 @@ _REASONS: dict[str, tuple[str, str | None]] = {
         "a file holds one robot",
     ),
 }
-
-
-def line_and_column(data: bytes, offset: int) -> tuple[int, int]:
-    """Line and column of a byte, both from 1."""
-    before = data[: max(offset, 0)].decode("utf-8", "replace")
-    return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1

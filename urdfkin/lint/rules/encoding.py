@@ -5,10 +5,16 @@ from __future__ import annotations
 import codecs
 import re
 
-from urdfkin.lint.codes import text as codes
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.document import line_and_column
+from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
+
+EMPTY = Rule("URDF101", "empty-file", ERROR)
+ENCODING = Rule("URDF102", "not-utf8", ERROR)
+DECLARED = Rule("URDF103", "declared-encoding", ERROR)
+DECLARED_ASCII = Rule("URDF104", "declared-encoding-unused", WARNING)
+XML_VERSION = Rule("URDF111", "xml-version", WARNING)
+BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
 #: Byte order marks of encodings that are not UTF-8; the longer ones first.
 _MARKS = (
@@ -38,11 +44,11 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
     """
     if not data.strip():
         what = "the file is empty" if not data else "the file holds only blanks"
-        report.add(codes.EMPTY, what, remedy="look at what should have written it")
+        report.add(EMPTY, what, remedy="look at what should have written it")
         return None
     wide = next((name for mark, name in (*_MARKS, *_WIDE) if data.startswith(mark)), None)
     if wide is not None:
-        report.add(codes.ENCODING, "a URDF is UTF-8 text", found=wide, remedy="save the file as UTF-8")
+        report.add(ENCODING, "a URDF is UTF-8 text", found=wide, remedy="save the file as UTF-8")
         return None
     marked = data.startswith(codecs.BOM_UTF8)
     text = data.removeprefix(codecs.BOM_UTF8)
@@ -50,9 +56,7 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
     if not (_is_utf8(report, text, declared) and _agrees(report, text, declared)):
         return None
     if marked:
-        report.add(
-            codes.BYTE_ORDER_MARK, "a byte order mark stands before the text", remedy="remove it if you can"
-        )
+        report.add(BYTE_ORDER_MARK, "a byte order mark stands before the text", remedy="remove it if you can")
     return text
 
 
@@ -67,7 +71,7 @@ def _is_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
     zero = text.find(b"\0")
     if zero >= 0:
         report.add(
-            codes.ENCODING,
+            ENCODING,
             "a zero byte stands in the text: some readers would stop there, others go on",
             remedy="this is not a text file, or it was damaged",
             position=line_and_column(text, zero),
@@ -78,7 +82,7 @@ def _is_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
     except UnicodeDecodeError as error:
         claim = f", although the file declares {declared}" if declared else ""
         report.add(
-            codes.ENCODING,
+            ENCODING,
             f"a byte that is not UTF-8{claim}",
             found=f"0x{text[error.start]:02x}",
             remedy="save the file as UTF-8",
@@ -94,19 +98,19 @@ def _agrees(report: Reporter, text: bytes, declared: str | None) -> bool:
     version = _VERSION.search(declaration[0]) if declaration else None
     if version is not None and version[1] != b"1.0":
         found = quoted(version[1].decode())
-        report.add(codes.XML_VERSION, "a URDF is XML 1.0", found=found, remedy='write version="1.0"')
+        report.add(XML_VERSION, "a URDF is XML 1.0", found=found, remedy='write version="1.0"')
     if declared is None or _codec(declared) in ("utf-8", "ascii"):
         return True
     if text.isascii() and _ASCII_SUPERSETS.match(_codec(declared) or ""):
         report.add(
-            codes.DECLARED_ASCII,
+            DECLARED_ASCII,
             "the declared encoding is not UTF-8, though every character is ASCII",
             found=quoted(declared),
             remedy='write encoding="UTF-8"',
         )
         return True
     report.add(
-        codes.DECLARED,
+        DECLARED,
         "the declared encoding is not UTF-8",
         found=quoted(declared),
         remedy='save the file as UTF-8 and write encoding="UTF-8"',
@@ -120,3 +124,9 @@ def _codec(name: str) -> str | None:
         return codecs.lookup(name).name.lower().replace("-", "").replace("utf8", "utf-8")
     except LookupError:
         return None
+
+
+def line_and_column(data: bytes, offset: int) -> tuple[int, int]:
+    """Line and column of a byte, both from 1."""
+    before = data[: max(offset, 0)].decode("utf-8", "replace")
+    return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1

@@ -1,100 +1,35 @@
-"""What links and joints say, read once and strictly: the other checks and the reader's input use this.
-
-A value that is None could not be read, and that has been reported; a value that was not written has the
-specification's default.
-"""
+"""What links and joints say, read once and strictly: the other rules and the reader use the records."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
-from urdfkin.lint.codes import dialect as codes
-from urdfkin.lint.codes import joints as joint_codes
-from urdfkin.lint.codes import structure as structure_codes
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.finding import Severity
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.document import Element
+from urdfkin.lint.rule import ERROR, WARNING, Rule
+from urdfkin.lint.rules.names import named, report_duplicate
 from urdfkin.lint.rules.numbers import NumberReader
 from urdfkin.lint.rules.vocabulary import JOINT_TYPES, nearest
+from urdfkin.urdf.element import Element
+from urdfkin.urdf.records import FURTHER_LIMITS, JointRecord, LimitRecord, MimicRecord, RobotRecord
 
-Vector = tuple[float, ...]
-
-#: Limits that count from version 1.2 on.
-FURTHER_LIMITS = ("acceleration", "deceleration", "jerk")
-
-#: Types whose motion has an axis.
-AXIAL = ("revolute", "continuous", "prismatic")
-
-
-@dataclass(slots=True)
-class LimitRecord:
-    """A `<limit>`: what is written, None for what is not."""
-
-    element: Element
-    lower: float | None
-    upper: float | None
-    effort: float | None
-    velocity: float | None
-    acceleration: float | None = None
-    deceleration: float | None = None
-    jerk: float | None = None
-
-
-@dataclass(slots=True)
-class MimicRecord:
-    """A `<mimic>`."""
-
-    element: Element
-    leader: str
-    multiplier: float
-    offset: float
-
-
-@dataclass(slots=True)
-class JointRecord:
-    """A `<joint>`."""
-
-    element: Element
-    name: str
-    kind: str | None = None
-    parent: str | None = None
-    child: str | None = None
-    xyz: Vector = (0.0, 0.0, 0.0)
-    rpy: Vector = (0.0, 0.0, 0.0)
-    quaternion: Vector | None = None
-    axis: Vector | None = (1.0, 0.0, 0.0)
-    axis_element: Element | None = None
-    origin_element: Element | None = None
-    limit: LimitRecord | None = None
-    mimic: MimicRecord | None = None
-
-
-@dataclass(slots=True)
-class RobotRecord:
-    """A `<robot>`: its links and joints in the order of the file."""
-
-    element: Element
-    version: tuple[int, int]
-    links: dict[str, Element] = field(default_factory=dict)
-    joints: list[JointRecord] = field(default_factory=list)
-
-    @property
-    def by_name(self) -> dict[str, JointRecord]:
-        """Joints by name; the first of two that share one."""
-        found: dict[str, JointRecord] = {}
-        for joint in self.joints:
-            found.setdefault(joint.name, joint)
-        return found
+MISSING_ELEMENT = Rule("URDF210", "missing-element", ERROR)
+MISSING_ATTRIBUTE = Rule("URDF211", "missing-attribute", ERROR)
+UNKNOWN_TYPE = Rule("URDF501", "unknown-joint-type", ERROR)
+EMPTY_AXIS = Rule("URDF504", "axis-without-xyz", ERROR)
+MISSING_LIMIT = Rule("URDF506", "missing-limit", ERROR)
+IGNORED = Rule("URDF510", "ignored-value", WARNING)
+QUATERNION_IGNORED = Rule("URDF511", "quat-xyzw-ignored", WARNING)
+QUATERNION = Rule("URDF512", "quat-xyzw", WARNING)
+BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
 
 
 def read_robot(report: Reporter, root: Element, version: tuple[int, int]) -> RobotRecord:
     """Links and joints of a document, with findings about everything that cannot be read."""
     robot = RobotRecord(root, version)
     for element in root.all("link"):
-        name = _name(report, element)
+        name = named(report, element)
         if name and name in robot.links:
-            _duplicate(report, element, robot.links[name])
+            report_duplicate(report, element, robot.links[name])
         elif name:
             robot.links[name] = element
     reader = JointReader(report, version)
@@ -102,34 +37,10 @@ def read_robot(report: Reporter, root: Element, version: tuple[int, int]) -> Rob
     for element in root.all("joint"):
         joint = reader.read(element)
         if joint.name and joint.name in seen:
-            _duplicate(report, element, seen[joint.name])
+            report_duplicate(report, element, seen[joint.name])
         seen.setdefault(joint.name, element)
         robot.joints.append(joint)
     return robot
-
-
-def _name(report: Reporter, element: Element) -> str:
-    name = element.attributes.get("name")
-    if not name:
-        what = "has no name" if name is None else "has an empty name"
-        report.add(
-            structure_codes.MISSING_NAME,
-            f"a {element.tag} {what}",
-            element,
-            attribute="name",
-            remedy=f'write <{element.tag} name="...">',
-        )
-    return name or ""
-
-
-def _duplicate(report: Reporter, element: Element, first: Element) -> None:
-    report.add(
-        structure_codes.DUPLICATE_NAME,
-        f"another {element.tag} has this name",
-        element,
-        attribute="name",
-        remedy=f"the first is on line {first.line}; rename one",
-    )
 
 
 class JointReader:
@@ -141,7 +52,7 @@ class JointReader:
 
     def read(self, element: Element) -> JointRecord:
         """One joint; what cannot be read is reported and keeps its default."""
-        joint = JointRecord(element, _name(self.report, element))
+        joint = JointRecord(element, named(self.report, element))
         joint.kind = self._kind(element)
         joint.parent, joint.child = self._end(element, "parent"), self._end(element, "child")
         self._origin(joint)
@@ -156,7 +67,7 @@ class JointReader:
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
             self.report.add(
-                codes.MISSING_ATTRIBUTE,
+                MISSING_ATTRIBUTE,
                 f"<{element.tag}> needs {attribute}" + ("" if value is None else ", and it is empty"),
                 element,
                 attribute=attribute,
@@ -171,7 +82,7 @@ class JointReader:
             return written
         close = nearest(written, frozenset(JOINT_TYPES))
         self.report.add(
-            joint_codes.UNKNOWN_TYPE,
+            UNKNOWN_TYPE,
             "unknown joint type",
             element,
             attribute="type",
@@ -185,7 +96,7 @@ class JointReader:
         end = element.first(tag)
         if end is None:
             self.report.add(
-                codes.MISSING_ELEMENT,
+                MISSING_ELEMENT,
                 f"the joint has no <{tag}>",
                 element,
                 remedy=f'write <{tag} link="..."/>',
@@ -206,7 +117,7 @@ class JointReader:
         found = f"quat_xyzw={quoted(origin.attributes['quat_xyzw'])}"
         if self.version < (1, 1):
             self.report.add(
-                joint_codes.QUATERNION_IGNORED,
+                QUATERNION_IGNORED,
                 'quat_xyzw needs version="1.1" and is ignored',
                 origin,
                 attribute="quat_xyzw",
@@ -220,7 +131,7 @@ class JointReader:
         both, zero = "rpy" in origin.attributes, not 1e-150 < sum(abs(x) for x in quaternion) < 1e150
         if both or zero:
             self.report.add(
-                joint_codes.BAD_QUATERNION,
+                BAD_QUATERNION,
                 "rpy and quat_xyzw are both given" if both else "the quaternion has no direction",
                 origin,
                 attribute="quat_xyzw",
@@ -230,7 +141,7 @@ class JointReader:
             return
         joint.quaternion = quaternion
         self.report.add(
-            joint_codes.QUATERNION,
+            QUATERNION,
             "quat_xyzw is obeyed, but most readers ignore it",
             origin,
             attribute="quat_xyzw",
@@ -244,7 +155,7 @@ class JointReader:
             return
         if joint.kind in ("fixed", "floating"):
             # Nobody reads it: a number that is none is worth a note at most.
-            numbers = NumberReader(self.report, joint_codes.IGNORED, joint_codes.IGNORED)
+            numbers = NumberReader(self.report, IGNORED, IGNORED)
             numbers.vector(axis, "xyz")
             return
         if "xyz" in axis.attributes:
@@ -253,7 +164,7 @@ class JointReader:
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
             return  # an error already: the value is written as text (URDF212)
         self.report.add(
-            joint_codes.EMPTY_AXIS,
+            EMPTY_AXIS,
             "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",
             axis,
             remedy='write <axis xyz="1 0 0"/>, or whichever is meant',
@@ -267,7 +178,7 @@ class JointReader:
         if limit is None:
             if bounded:
                 self.report.add(
-                    joint_codes.MISSING_LIMIT,
+                    MISSING_LIMIT,
                     f"a {joint.kind} joint needs a <limit>",
                     joint.element,
                     remedy=f"write {_EXAMPLE_LIMIT}"

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from urdfkin.lint.codes import extras as codes
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.document import Element
+from urdfkin.lint.rule import WARNING, Rule
+from urdfkin.urdf.element import Element
 from urdfkin.urdf.packages import find_package, split_uri
+
+MESH_MISSING = Rule("URDF706", "mesh-missing", WARNING)
+MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
@@ -39,7 +42,7 @@ def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
             _report_file(report, mesh, filename)
     for package, meshes in missing.items():
         report.add(
-            codes.MESH_MISSING,
+            MESH_MISSING,
             f"package {quoted(package)} is not found, where {_count(len(meshes))} should be"
             if package
             else f"an address names no package, for {_count(len(meshes))}",
@@ -47,6 +50,20 @@ def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
             attribute="filename",
             found=quoted(meshes[0].attributes["filename"]),
             remedy="kinematics needs no mesh; add the package's folder to ROS_PACKAGE_PATH to find it",
+        )
+
+
+def check_address(report: Reporter, mesh: Element) -> None:
+    """Whether an address leads into the network."""
+    filename = mesh.attributes["filename"]
+    if filename.lower().startswith(("http:", "https:", "ftp:")):
+        report.add(
+            MESH_REMOTE,
+            "the mesh lies on the network; nothing was fetched",
+            mesh,
+            attribute="filename",
+            found=quoted(filename),
+            remedy="copy it into a package",
         )
 
 
@@ -75,7 +92,7 @@ def _exists(path: Path) -> bool:
 
 def _report_file(report: Reporter, mesh: Element, filename: str) -> None:
     report.add(
-        codes.MESH_MISSING,
+        MESH_MISSING,
         "the mesh is not found",
         mesh,
         attribute="filename",

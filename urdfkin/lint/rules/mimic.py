@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from urdfkin.lint.codes import joints as codes
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.finding import Severity
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rule import Code
-from urdfkin.lint.rules.joints import AXIAL, JointRecord, MimicRecord, RobotRecord
+from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
+from urdfkin.lint.rules import joints
+from urdfkin.urdf.records import AXIAL, JointRecord, MimicRecord, RobotRecord
+
+MIMIC_UNKNOWN = Rule("URDF520", "mimic-unknown", ERROR)
+MIMIC_LOOP = Rule("URDF521", "mimic-loop", ERROR)
+MIMIC_LEADER = Rule("URDF522", "mimic-leader", ERROR)
+MIMIC_CONSTANT = Rule("URDF523", "mimic-constant", WARNING)
+MIMIC_CONTINUOUS = Rule("URDF524", "mimic-continuous", WARNING)
+MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
+MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 
 #: Largest multiplier, and offset in rad or m, that is taken for real.
 LARGEST = 1e6
@@ -21,8 +29,7 @@ def check_mimic(report: Reporter, robot: RobotRecord, *, obeyed: bool) -> None:
         robot: What was read.
         obeyed: Whether mimic is on. When it is off, nothing follows, and every finding is a note.
     """
-    joints = robot.by_name
-    judge = _Judge(report, joints, obeyed)
+    judge = _Judge(report, robot.by_name, obeyed)
     for joint in robot.joints:
         if joint.mimic is not None:
             judge.check(joint, joint.mimic)
@@ -35,7 +42,7 @@ class _Judge:
         self.report, self.joints, self.obeyed = report, joints, obeyed
         self.looped = _looped(joints)
 
-    def add(self, code: Code, message: str, mimic: MimicRecord, attribute: str, remedy: str) -> None:
+    def add(self, code: Rule, message: str, mimic: MimicRecord, attribute: str, remedy: str) -> None:
         """Report a finding at an attribute of a `<mimic>`."""
         written = mimic.element.attributes.get(attribute)
         self.report.add(
@@ -52,7 +59,7 @@ class _Judge:
         """Everything about one follower."""
         if joint.kind == "fixed":
             self.add(
-                codes.IGNORED,
+                joints.IGNORED,
                 "a fixed joint follows nobody; its mimic is ignored",
                 mimic,
                 "joint",
@@ -61,7 +68,7 @@ class _Judge:
             return
         if joint.kind in ("planar", "floating"):
             message = f"a {joint.kind} joint cannot follow another: it has several coordinates"
-            self.add(codes.MIMIC_LEADER, message, mimic, "joint", "remove it")
+            self.add(MIMIC_LEADER, message, mimic, "joint", "remove it")
             return
         leader = self.joints.get(mimic.leader)
         if leader is None:
@@ -69,11 +76,11 @@ class _Judge:
         elif joint.name in self.looped:
             itself = leader is joint
             message = "the joint mimics itself" if itself else "the joints mimic each other in a circle"
-            self.add(codes.MIMIC_LOOP, message, mimic, "joint", "name a joint that moves by itself")
+            self.add(MIMIC_LOOP, message, mimic, "joint", "name a joint that moves by itself")
         elif leader.kind is not None and leader.kind not in AXIAL:
             count = "no coordinate" if leader.kind == "fixed" else "several coordinates"
             message = f"the joint to follow is {leader.kind} and has {count}"
-            self.add(codes.MIMIC_LEADER, message, mimic, "joint", "name a joint with one coordinate")
+            self.add(MIMIC_LEADER, message, mimic, "joint", "name a joint with one coordinate")
         else:
             self.check_sound(joint, mimic, leader)
 
@@ -83,13 +90,13 @@ class _Judge:
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.obeyed:
             remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
-        self.add(codes.MIMIC_UNKNOWN, "the joint to follow does not exist", mimic, "joint", remedy)
+        self.add(MIMIC_UNKNOWN, "the joint to follow does not exist", mimic, "joint", remedy)
 
     def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
         """A follower that can follow: is it what was meant?"""
         if mimic.multiplier == 0.0:
             self.add(
-                codes.MIMIC_CONSTANT,
+                MIMIC_CONSTANT,
                 f"the multiplier is zero: the joint stays at {mimic.offset:g}",
                 mimic,
                 "multiplier",
@@ -98,10 +105,10 @@ class _Judge:
         for attribute, value in (("multiplier", mimic.multiplier), ("offset", mimic.offset)):
             if abs(value) > LARGEST:
                 message = f"the {attribute} is out of all proportion"
-                self.add(codes.MIMIC_SCALE, message, mimic, attribute, "check the exponent")
+                self.add(MIMIC_SCALE, message, mimic, attribute, "check the exponent")
         if joint.kind == "continuous":
             self.add(
-                codes.MIMIC_CONTINUOUS,
+                MIMIC_CONTINUOUS,
                 "a continuous joint follows another; Pinocchio by itself would let it turn freely",
                 mimic,
                 "joint",
@@ -109,7 +116,7 @@ class _Judge:
             )
         if leader.mimic is not None:
             self.add(
-                codes.MIMIC_CHAIN,
+                MIMIC_CHAIN,
                 f"the joint to follow follows {leader.mimic.leader!r} itself",
                 mimic,
                 "joint",

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import unicodedata
 
-from urdfkin.lint.codes import structure as codes
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.finding import Severity
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.document import Element
-from urdfkin.lint.rules.joints import RobotRecord
+from urdfkin.lint.rule import DIFFERS, ERROR, WARNING, Rule
+from urdfkin.urdf.element import Element
+from urdfkin.urdf.records import RobotRecord
+
+MISSING_NAME = Rule("URDF401", "missing-name", ERROR)
+DUPLICATE_NAME = Rule("URDF402", "duplicate-name", ERROR)
+RESERVED_NAME = Rule("URDF403", "reserved-name", WARNING)
+UNIVERSE = Rule("URDF404", "name-universe", WARNING, DIFFERS)
+ODD_NAME = Rule("URDF405", "odd-name", WARNING)
+NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
+LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
 #: Longer names break tables, and paths made of them.
 LONGEST = 200
@@ -33,6 +41,32 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
         _check_lookalikes(report, kind)
 
 
+def named(report: Reporter, element: Element) -> str:
+    """The name of a link or joint; an empty one after the finding that it has none."""
+    name = element.attributes.get("name")
+    if not name:
+        what = "has no name" if name is None else "has an empty name"
+        report.add(
+            MISSING_NAME,
+            f"a {element.tag} {what}",
+            element,
+            attribute="name",
+            remedy=f'write <{element.tag} name="...">',
+        )
+    return name or ""
+
+
+def report_duplicate(report: Reporter, element: Element, first: Element) -> None:
+    """Another link, or joint, of the same name."""
+    report.add(
+        DUPLICATE_NAME,
+        f"another {element.tag} has this name",
+        element,
+        attribute="name",
+        remedy=f"the first is on line {first.line}; rename one",
+    )
+
+
 def _check_odd(report: Reporter, name: str, element: Element) -> None:
     reason = None
     if not name.isprintable():
@@ -49,7 +83,7 @@ def _check_odd(report: Reporter, name: str, element: Element) -> None:
         reason = "the name holds a character that shells or XML treat specially"
     if reason:
         report.add(
-            codes.ODD_NAME,
+            ODD_NAME,
             reason,
             element,
             attribute="name",
@@ -62,7 +96,7 @@ def _check_blanks(report: Reporter, element: Element) -> None:
     raw = report.raw(element, "name") if report.has_raw_blanks else None
     if raw is not None and any(c in raw for c in "\t\r\n"):
         report.add(
-            codes.NAME_BLANKS,
+            NAME_BLANKS,
             "a tab or line end stands inside the name",
             element,
             attribute="name",
@@ -74,7 +108,7 @@ def _check_blanks(report: Reporter, element: Element) -> None:
 def _check_reserved(report: Reporter, name: str, element: Element, root_joint: str | None) -> None:
     if name == "universe" and element.tag == "joint":
         report.add(
-            codes.UNIVERSE,
+            UNIVERSE,
             "Pinocchio calls the world by this name and does not find the joint",
             element,
             attribute="name",
@@ -83,7 +117,7 @@ def _check_reserved(report: Reporter, name: str, element: Element, root_joint: s
     elif (element.tag, name) in (("link", "universe"), ("joint", "root_joint")):
         what = "the world" if name == "universe" else "the joint of a free or planar base"
         report.add(
-            codes.RESERVED_NAME,
+            RESERVED_NAME,
             f"{what} is called by this name",
             element,
             attribute="name",
@@ -101,7 +135,7 @@ def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> Non
         first = seen.setdefault(key, name)
         if first != name:
             report.add(
-                codes.LOOKALIKE,
+                LOOKALIKE,
                 "another name looks the same and is written with other characters",
                 element,
                 attribute="name",

@@ -11,12 +11,17 @@ import math
 import re
 from dataclasses import dataclass
 
-from urdfkin.lint.codes import numbers as codes
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rule import Code
-from urdfkin.lint.rules.document import Element
+from urdfkin.lint.rule import ERROR, REFUSES, WARNING, Rule
 from urdfkin.numerals import DECIMAL
+from urdfkin.urdf.element import Element
+
+BAD_NUMBER = Rule("URDF301", "bad-number", ERROR)
+BAD_VECTOR = Rule("URDF302", "bad-vector", ERROR)
+WHITESPACE = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
+UNDERFLOW = Rule("URDF304", "underflow", WARNING)
+NUMBER_TOO_LONG = Rule("URDF305", "number-too-long", ERROR)
 
 #: No text can be split in two ways by this: one that is no number takes linear time too.
 _BLANKS = re.compile(r"[ \t\r\n]+")
@@ -28,13 +33,13 @@ class NumberReader:
 
     Attributes:
         report: Where findings go.
-        bad_number: Code for what is no number; another one where nothing depends on it.
-        bad_vector: Code for the wrong count.
+        bad_number: Rule for what is no number; another one where nothing depends on it.
+        bad_vector: Rule for the wrong count.
     """
 
     report: Reporter
-    bad_number: Code = codes.BAD_NUMBER
-    bad_vector: Code = codes.BAD_VECTOR
+    bad_number: Rule = BAD_NUMBER
+    bad_vector: Rule = BAD_VECTOR
 
     def scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
         """One number; `default` when the attribute is missing, None when it cannot be read."""
@@ -86,7 +91,7 @@ class NumberReader:
         if value is not None and math.isfinite(value):
             if value == 0.0 and any(digit in _NOT_ZERO for digit in re.split("[eE]", piece)[0]):
                 self.report.add(
-                    codes.UNDERFLOW,
+                    UNDERFLOW,
                     f"{attribute} holds a number too small for a double; it is zero",
                     element,
                     attribute=attribute,
@@ -114,7 +119,7 @@ class NumberReader:
         if len(written) <= most:
             return False
         self.report.add(
-            codes.NUMBER_TOO_LONG,
+            NUMBER_TOO_LONG,
             f"{attribute} has more characters than numbers need",
             element,
             attribute=attribute,
@@ -135,10 +140,10 @@ class NumberReader:
             self._refused(element, attribute, "a tab or line end between or after the numbers")
 
     def _refused(self, element: Element, attribute: str, what: str) -> None:
-        needed = self.bad_number is codes.BAD_NUMBER
+        needed = self.bad_number is BAD_NUMBER
         self.report.add(
             # Where no robot depends on the number, urdfdom drops what it cannot read and reads the file.
-            codes.WHITESPACE if needed else self.bad_number,
+            WHITESPACE if needed else self.bad_number,
             f"{attribute} has {what}, which urdfdom {'refuses' if needed else 'does not read'}",
             element,
             attribute=attribute,

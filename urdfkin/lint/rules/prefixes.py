@@ -6,10 +6,12 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from urdfkin.lint.codes import dialect as codes
 from urdfkin.lint.escape import quoted, shortened
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.document import Element
+from urdfkin.lint.rule import WARNING, Rule
+from urdfkin.urdf.element import Element
+
+UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 
 #: What XML declares itself.
 _PREDECLARED = ("xml", "xmlns")
@@ -32,7 +34,7 @@ def check_prefixes(report: Reporter, root: Element) -> None:
     for prefix, use in _undeclared(root).items():
         more = f" and {use.times - 1} more" if use.times > 1 else ""
         report.add(
-            codes.UNDECLARED_PREFIX,
+            UNDECLARED_PREFIX,
             f"the prefix {quoted(prefix)} is not declared; most XML readers refuse the file",
             use.element,
             attribute=use.attribute,

@@ -5,10 +5,16 @@ Everything here is iterative: a chain of 50,000 links must not meet a stack.
 
 from __future__ import annotations
 
-from urdfkin.lint.codes import structure as codes
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.joints import JointRecord, RobotRecord
+from urdfkin.lint.rule import ERROR, Rule
+from urdfkin.urdf.records import JointRecord, RobotRecord
+
+UNKNOWN_LINK = Rule("URDF408", "unknown-link", ERROR)
+SELF_PARENT = Rule("URDF409", "self-parent", ERROR)
+SEVERAL_PARENTS = Rule("URDF410", "several-parents", ERROR)
+SEVERAL_ROOTS = Rule("URDF411", "several-roots", ERROR)
+CYCLE = Rule("URDF412", "cycle", ERROR)
 
 
 def check_structure(report: Reporter, robot: RobotRecord) -> bool:
@@ -24,7 +30,7 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
         if link is not None and link not in robot.links:
             nearest = report.nearest(link, robot.links)
             report.add(
-                codes.UNKNOWN_LINK,
+                UNKNOWN_LINK,
                 f"the {tag} link does not exist",
                 joint.element.first(tag),
                 attribute="link",
@@ -35,7 +41,7 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
             )
     if joint.parent is not None and joint.parent == joint.child:
         report.add(
-            codes.SELF_PARENT,
+            SELF_PARENT,
             "the joint connects a link with itself",
             joint.element.first("child"),
             attribute="link",
@@ -86,7 +92,7 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
     at = joint.element.first("child")
     if loop:
         report.add(
-            codes.CYCLE,
+            CYCLE,
             f"the joint closes a loop: its child stands above its parent {quoted(joint.parent or '')}",
             at,
             attribute="link",
@@ -96,7 +102,7 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
         return
     other = f"joint {quoted(first.name)} on line {first.element.line}" if first else "another joint"
     report.add(
-        codes.SEVERAL_PARENTS,
+        SEVERAL_PARENTS,
         f"the child link already is the child of {other}",
         at,
         attribute="link",
@@ -110,7 +116,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
     if not roots and robot.links and not report.failed:
-        report.add(codes.CYCLE, "no link is a root: every one is the child of a joint", robot.element)
+        report.add(CYCLE, "no link is a root: every one is the child of a joint", robot.element)
     if len(roots) < 2:
         return len(roots) == 1
     if not children <= robot.links.keys():
@@ -121,7 +127,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     for root in roots:
         if root != main:
             report.add(
-                codes.SEVERAL_ROOTS,
+                SEVERAL_ROOTS,
                 f"the link has no parent, and neither has {quoted(main)}",
                 robot.links[root],
                 attribute="name",

@@ -5,11 +5,18 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from urdfkin.lint.codes import suspicious as codes
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.finding import Severity
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.joints import AXIAL, JointRecord, RobotRecord
+from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
+from urdfkin.urdf.records import AXIAL, JointRecord, RobotRecord
+
+ROUNDED_PI = Rule("URDF601", "rounded-pi", NOTE)
+DEGREES = Rule("URDF602", "degrees", WARNING)
+MILLIMETRES = Rule("URDF603", "huge-length", WARNING)
+TINY_ROBOT = Rule("URDF604", "tiny-robot", WARNING)
+SAME_PLACE = Rule("URDF605", "same-place", NOTE)
+OVERFLOW = Rule("URDF606", "overflow", ERROR)
 
 #: A joint further than this from its parent, in m, is probably given in millimetres.
 FAR = 100.0
@@ -19,7 +26,7 @@ TINY = 1e-4
 
 #: A limit of this many radians and more, in whole degrees, is probably meant in degrees; from `ENDLESS` on
 #: it is the way some exporters write "none".
-DEGREES, ENDLESS = 30.0, 1000.0
+MANY, ENDLESS = 30.0, 1000.0
 
 #: By how much a tip may be off, in m, before a rounded pi is a warning.
 NOTICEABLE = 1e-3
@@ -61,7 +68,7 @@ def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float])
     limit = joint.limit
     if limit is not None and joint.kind == "revolute":
         bounds = [bound for bound in (limit.lower, limit.upper) if bound is not None]
-        if any(DEGREES <= abs(bound) < ENDLESS and bound == round(bound) for bound in bounds):
+        if any(MANY <= abs(bound) < ENDLESS and bound == round(bound) for bound in bounds):
             at = " ".join(
                 f"{name}={quoted(limit.element.attributes[name])}"
                 for name in ("lower", "upper")
@@ -73,7 +80,7 @@ def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float])
 def _degrees(report: Reporter, joint: JointRecord, what: str, found: str) -> None:
     rpy = what == "rpy"
     report.add(
-        codes.DEGREES,
+        DEGREES,
         "the angles of the origin look like degrees" if rpy else "the limits look like degrees",
         joint.origin_element if rpy else joint.limit.element if joint.limit else joint.element,
         attribute="rpy" if rpy else "lower",
@@ -93,7 +100,7 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
         return
     moves = f", which moves what it carries by up to {_metres(off * reach)}" if reach > 0.0 else ""
     report.add(
-        codes.ROUNDED_PI,
+        ROUNDED_PI,
         f"rpy holds a rounded {_as_pi(multiple)}, off by {off:.1e} rad{moves}",
         joint.origin_element,
         attribute="rpy",
@@ -138,7 +145,7 @@ def _metres(length: float) -> str:
 def _check_lengths(report: Reporter, joint: JointRecord) -> None:
     if joint.origin_element is not None and max(abs(x) for x in joint.xyz) >= FAR:
         report.add(
-            codes.MILLIMETRES,
+            MILLIMETRES,
             "the joint sits very far from its parent link",
             joint.origin_element,
             attribute="xyz",
@@ -151,7 +158,7 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
         far = [bound for bound in (limit.lower, limit.upper) if bound and FAR <= abs(bound) < ENDLESS]
         if far:
             report.add(
-                codes.MILLIMETRES,
+                MILLIMETRES,
                 "a prismatic joint moves very far",
                 limit.element,
                 attribute="lower" if far[0] == limit.lower else "upper",
@@ -171,7 +178,7 @@ def _check_places(report: Reporter, robot: RobotRecord) -> None:
         first = places.setdefault(place, joint)
         if first is not joint:
             report.add(
-                codes.SAME_PLACE,
+                SAME_PLACE,
                 f"the joint has the same origin and axis as joint {quoted(first.name)}",
                 joint.element,
                 remedy="fine if that is meant",
@@ -201,7 +208,7 @@ def _check_sums(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -
     if math.isinf(whole):
         far = max(robot.joints, key=lambda joint: max(abs(x) for x in joint.xyz))
         report.add(
-            codes.OVERFLOW,
+            OVERFLOW,
             "lengths along the chain add up to more than a double can hold",
             far.origin_element or far.element,
             attribute="xyz",
@@ -210,7 +217,7 @@ def _check_sums(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -
         )
     elif 0.0 < whole < TINY:
         report.add(
-            codes.TINY_ROBOT,
+            TINY_ROBOT,
             f"all lengths of the robot together are {_metres(whole)}",
             robot.element,
             found=None,

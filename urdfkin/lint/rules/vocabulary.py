@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterator
 from functools import lru_cache
 
-from urdfkin.lint.codes import dialect as codes
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.finding import Severity
 from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.document import Element
+from urdfkin.lint.rule import ERROR, WARNING, Rule
+from urdfkin.urdf.element import Element
+
+MISPLACED = Rule("URDF206", "misplaced-element", ERROR)
+UNKNOWN_ELEMENT = Rule("URDF207", "unknown-element", WARNING)
+UNKNOWN_ATTRIBUTE = Rule("URDF208", "unknown-attribute", WARNING)
+DUPLICATE_ELEMENT = Rule("URDF209", "duplicate-element", WARNING)
+STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 
 #: Extensions that may hold anything, `<joint>` and `<link>` included.
 OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
@@ -129,13 +136,13 @@ def check_vocabulary(report: Reporter, root: Element) -> None:
 
 
 def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) -> None:
-    parts = [part for part in _outside_extensions(element) if _is_part(part)]
+    parts = [part for part in outside_extensions(element) if _is_part(part)]
     for part in parts:
         inside = part.parent.tag if part.parent else ""
         meant = nearest(part.tag, _PARTS)
         what = f"a {meant} inside <{inside}>" if part.tag == meant else f"<{part.tag}>"
         report.add(
-            codes.MISPLACED,
+            MISPLACED,
             f"{what} is not read, so it is missing from the robot",
             part,
             remedy=f"write <{meant}> as a child of <robot>",
@@ -143,11 +150,11 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
         )
     if parts:
         return
-    close = None if report.is_full(codes.UNKNOWN_ELEMENT) else nearest(element.tag, known)
+    close = None if report.is_full(UNKNOWN_ELEMENT) else nearest(element.tag, known)
     parent = element.parent
     if parent is not None and parent.tag in _VECTORS and element.text and not parent.attributes:
         report.add(
-            codes.STRAY_TEXT,
+            STRAY_TEXT,
             f"the value inside <{element.tag}> is skipped",
             element,
             found=quoted(element.text),
@@ -160,7 +167,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
         f"write {_EXAMPLES['origin']}" if foreign else f"did you mean <{close}>?" if close else "remove it"
     )
     report.add(
-        codes.UNKNOWN_ELEMENT,
+        UNKNOWN_ELEMENT,
         f"<{element.tag}> means nothing in <{parent.tag if parent else ''}> and is skipped",
         element,
         remedy=remedy,
@@ -168,13 +175,13 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
     )
 
 
-def _outside_extensions(element: Element) -> list[Element]:
-    found, stack = [], [element]
+def outside_extensions(element: Element) -> Iterator[Element]:
+    """An element and what is below it, but for extensions, which may hold anything."""
+    stack = [element]
     while stack:
-        current = stack.pop()
-        found.append(current)
-        stack += [child for child in reversed(current.children) if child.tag not in OPAQUE]
-    return found
+        element = stack.pop()
+        yield element
+        stack += [child for child in reversed(element.children) if child.tag not in OPAQUE]
 
 
 def _is_part(element: Element) -> bool:
@@ -203,9 +210,9 @@ def _check_attributes(report: Reporter, element: Element) -> None:
     for attribute in element.attributes:
         if attribute in known or ":" in attribute or attribute == "xmlns":
             continue
-        close = None if report.is_full(codes.UNKNOWN_ATTRIBUTE) else nearest(attribute, known)
+        close = None if report.is_full(UNKNOWN_ATTRIBUTE) else nearest(attribute, known)
         report.add(
-            codes.UNKNOWN_ATTRIBUTE,
+            UNKNOWN_ATTRIBUTE,
             f"<{element.tag}> has no attribute of this name; it is skipped",
             element,
             attribute=attribute,
@@ -223,7 +230,7 @@ def _check_text(report: Reporter, element: Element) -> None:
     lost = element.tag in _VECTORS and not element.attributes
     example = _EXAMPLES.get(element.tag)
     report.add(
-        codes.STRAY_TEXT,
+        STRAY_TEXT,
         f"text inside <{element.tag}> is skipped",
         element,
         found=quoted(element.text),
@@ -250,7 +257,7 @@ def _check_repeats(report: Reporter, element: Element) -> None:
     for child in element.children:
         if child.tag in seen and child.tag in once:
             report.add(
-                codes.DUPLICATE_ELEMENT,
+                DUPLICATE_ELEMENT,
                 f"a second <{child.tag}> is skipped: the first, on line {seen[child.tag].line}, counts",
                 child,
                 remedy="remove one of the two",
