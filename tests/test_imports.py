@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -119,6 +120,31 @@ def test_a_part_builds_on_what_stands_above_it(part: str) -> None:
 def test_a_foreign_library_has_one_door(library: str) -> None:
     users = {part for part, path in modules() for name in imported(path) if name.split(".")[0] == library}
     assert users <= DOORS[library]
+
+
+def arrows(path: Path) -> set[str]:
+    """The modules of the package that a file imports, those for types and inside functions included."""
+    names = set[str]()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            parts = {f"{node.module}.{alias.name}" for alias in node.names}
+            names |= (parts & MODULES.keys()) | ({node.module} if parts - MODULES.keys() else set())
+    return names & MODULES.keys()
+
+
+MODULES = {
+    ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__"): path
+    for path in PACKAGE.rglob("*.py")
+}
+
+
+@pytest.mark.parametrize("room", ["lint", "urdf"])
+def test_no_module_of_a_room_comes_back_to_itself(room: str) -> None:
+    own = {name: path for name, path in MODULES.items() if name.startswith(f"urdfkin.{room}.")}
+    graph = {name: arrows(path) & own.keys() for name, path in own.items()}
+    assert len(list(TopologicalSorter(graph).static_order())) == len(own)
 
 
 def test_importing_the_package_or_asking_for_help_loads_nothing_heavy() -> None:
