@@ -64,6 +64,9 @@ DOORS = {
     "mpmath": {"judge"},
 }
 
+#: Those whose door is a single module.
+ALONE = ("jinja2", "jsonschema", "pinocchio", "platformdirs", "trimesh", "viser", "xacrodoc", "yourdfpy")
+
 
 def modules() -> Iterator[tuple[str, Path]]:
     for path in sorted(PACKAGE.rglob("*.py")):
@@ -122,16 +125,17 @@ def test_a_foreign_library_has_one_door(library: str) -> None:
     assert users <= DOORS[library]
 
 
-def arrows(path: Path) -> set[str]:
-    """The modules of the package that a file imports, those for types and inside functions included."""
+@cache
+def everything_imported(path: Path) -> frozenset[str]:
+    """What a file imports, for types and inside functions too; a name of a module by its full name."""
     names = set[str]()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             parts = {f"{node.module}.{alias.name}" for alias in node.names}
-            names |= (parts & MODULES.keys()) | ({node.module} if parts - MODULES.keys() else set())
-    return names & MODULES.keys()
+            names |= (parts & MODULES.keys()) or {node.module}
+    return frozenset(names)
 
 
 MODULES = {
@@ -140,10 +144,20 @@ MODULES = {
 }
 
 
+@pytest.mark.parametrize("library", ALONE)
+def test_exactly_one_module_imports(library: str) -> None:
+    users = [
+        name
+        for name, path in MODULES.items()
+        if library in {imported.split(".")[0] for imported in everything_imported(path)}
+    ]
+    assert len(users) == 1, users
+
+
 @pytest.mark.parametrize("room", ["lint", "urdf"])
 def test_no_module_of_a_room_comes_back_to_itself(room: str) -> None:
-    own = {name: path for name, path in MODULES.items() if name.startswith(f"urdfkin.{room}.")}
-    graph = {name: arrows(path) & own.keys() for name, path in own.items()}
+    own = {name: path for name, path in MODULES.items() if name.split(".")[1:2] == [room]}
+    graph = {name: everything_imported(path) & own.keys() for name, path in own.items()}
     assert len(list(TopologicalSorter(graph).static_order())) == len(own)
 
 
