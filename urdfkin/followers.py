@@ -1,7 +1,9 @@
 """Mimic rules as the URDF's text states them, for the oracle: read apart from urdfkin's own reader.
 
 Pinocchio couples nothing here (see `urdfkin.oracle`), so that a rule which the reader got wrong would be
-wrong on both sides, and agree. `urdfkin.plain_xml` reads it a second time.
+wrong on both sides, and agree. So nothing is taken from the document that `urdfkin.lint` read, neither its
+elements nor its records: who guards a reading must not read through it. Like Pinocchio, this takes the text,
+and only when a result is first checked; `load` reads it once.
 """
 
 from __future__ import annotations

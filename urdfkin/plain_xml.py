@@ -1,7 +1,7 @@
 """XML as urdfdom's parser takes it: names as they are written, prefixes that nobody declared included.
 
 ElementTree's own reader refuses an undeclared prefix, and with it a robot that urdfdom reads. This is a
-second reader beside `urdfkin.lint`: who checks that one must not read through it.
+second reader beside `urdfkin.lint.rules.document`, for those who check what was read through that one.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Each rule's page is true: its example has the finding, the cured one has not."""
 
 import re
+import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -10,9 +12,10 @@ from tests.lint.others import ask
 from urdfkin.errors import UnknownNameError
 from urdfkin.lint import DEFAULT_LIMITS, Limits, check, rules
 from urdfkin.lint.explain import explain
-from urdfkin.lint.pages import RULES, TOPICS, find_rule, page, topic_pages
+from urdfkin.lint.pages import RULES, TOPICS, Page, find_rule, page, topic_pages
 from urdfkin.lint.rule import Rule
 
+HERE = Path(rules.__file__).parent
 EVERY_RULE = pytest.mark.parametrize("rule", RULES.values(), ids=lambda rule: rule.id)
 
 
@@ -79,10 +82,17 @@ def test_the_pages_of_a_topic_are_those_of_its_rules_in_their_order(topic: str) 
     assert list(topic_pages(topic)) == [rule.id for rule in TOPICS[topic]]
 
 
+@pytest.mark.parametrize("topic", TOPICS)
+def test_a_file_of_pages_holds_nothing_that_is_not_read(topic: str) -> None:
+    data = tomllib.loads((HERE / f"{topic}.toml").read_text("utf-8"))
+    known = {field.name for field in fields(Page)} | {"parts"}
+    assert data.keys() - {rule.id for rule in TOPICS[topic]} <= {"cure", "others", "parts"}
+    assert all(data[rule.id].keys() <= known for rule in TOPICS[topic])
+
+
 def test_every_module_of_rules_is_a_topic() -> None:
-    here = Path(rules.__file__).parent
-    assert {path.stem for path in here.glob("*.py")} - {"__init__"} == set(TOPICS)
-    assert {path.stem for path in here.glob("*.toml")} == set(TOPICS)
+    assert {path.stem for path in HERE.glob("*.py")} - {"__init__"} == set(TOPICS)
+    assert {path.stem for path in HERE.glob("*.toml")} == set(TOPICS)
     assert sum(map(len, TOPICS.values())) == len(RULES)
 
 

@@ -1,20 +1,8 @@
-"""Odd URDFs, each with the verdict it deserves and the codes and lines it must be given."""
+"""Odd URDFs, each with the verdict it deserves and the codes and lines it must be given; a module a topic."""
+
+from importlib import import_module
 
 from tests.lint.cases.arm import Case
-from tests.lint.cases.dialect import dialect_cases
-from tests.lint.cases.extras import extras_cases
-from tests.lint.cases.joints import joints_cases
-from tests.lint.cases.numbers import numbers_cases
-from tests.lint.cases.structure import structure_cases
-from tests.lint.cases.suspicious import suspicious_cases
-from tests.lint.cases.text import text_cases
+from urdfkin.lint.pages import TOPICS
 
-CASES: list[Case] = [
-    *text_cases(),
-    *dialect_cases(),
-    *numbers_cases(),
-    *structure_cases(),
-    *joints_cases(),
-    *suspicious_cases(),
-    *extras_cases(),
-]
+CASES: list[Case] = [case for topic in TOPICS for case in import_module(f"tests.lint.cases.{topic}").CASES]

@@ -71,3 +71,18 @@ def fixed(name: str, parent: str, child: str) -> str:
 SPHERE = '<visual><geometry><sphere radius="1"/></geometry></visual>'
 
 MESH = '<link name="base"><visual><geometry><mesh filename="{}"/></geometry></visual></link>'
+
+
+def base_link(inside: str) -> str:
+    return arm(base=f'<link name="base">{inside}</link>')
+
+
+def shape(inside: str) -> str:
+    return f"<visual><geometry>{inside}</geometry></visual>"
+
+
+BALL = 'ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"'
+
+
+def inertial(moments: str, mass: str = '<mass value="1"/>') -> str:
+    return base_link(f"<inertial>{mass}<inertia {moments}/></inertial>")
