@@ -22,80 +22,38 @@ STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
 
 #: Elements and attributes that simulators and vendors add, seen in robots that many people use.
-EXTENSIONS = frozenset(
-    {
-        *(
-            "contact",
-            "collision_checking",
-            "self_filter",
-            "surface",
-            "gravity",
-            "kinematic",
-            "drake",
-            "group",
-        ),
-        *(
-            "dont_collapse",
-            "D",
-            "K",
-            "mu_coulomb",
-            "mu_viscous",
-            "current",
-            "command_effort",
-            "gear_velocity",
-        ),
-    }
+_ADDED = (
+    "contact collision_checking self_filter surface gravity kinematic drake group dont_collapse D K"
+    " mu_coulomb mu_viscous current command_effort gear_velocity"
 )
+EXTENSIONS = frozenset(_ADDED.split())
 
-#: Element -> the elements it may hold. An element that is not a key is not looked into.
-CHILDREN: dict[str, frozenset[str]] = {
-    "robot": frozenset({"link", "joint", "material"}),
-    "link": frozenset({"inertial", "visual", "collision"}),
-    "joint": frozenset(
-        {
-            "origin",
-            "parent",
-            "child",
-            "axis",
-            "limit",
-            "mimic",
-            "dynamics",
-            "safety_controller",
-            "calibration",
-        }
-    ),
-    "inertial": frozenset({"origin", "mass", "inertia"}),
-    "visual": frozenset({"origin", "geometry", "material"}),
-    "collision": frozenset({"origin", "geometry", "material"}),
-    "geometry": frozenset({"box", "cylinder", "sphere", "mesh", "capsule"}),
-    "material": frozenset({"color", "texture"}),
-    **dict.fromkeys(
-        ("origin", "parent", "child", "axis", "limit", "mimic", "dynamics", "safety_controller"), frozenset()
-    ),
-}
-
-#: Element -> its attributes.
-ATTRIBUTES: dict[str, frozenset[str]] = {
-    "robot": frozenset({"name", "version"}),
-    "link": frozenset({"name", "type"}),
-    "joint": frozenset({"name", "type"}),
-    "origin": frozenset({"xyz", "rpy", "quat_xyzw"}),
-    "parent": frozenset({"link"}),
-    "child": frozenset({"link"}),
-    "axis": frozenset({"xyz"}),
-    "limit": frozenset({"lower", "upper", "effort", "velocity", "acceleration", "deceleration", "jerk"}),
-    "mimic": frozenset({"joint", "multiplier", "offset"}),
-    "dynamics": frozenset({"damping", "friction"}),
-    "safety_controller": frozenset({"k_velocity", "k_position", "soft_lower_limit", "soft_upper_limit"}),
-    "calibration": frozenset({"rising", "falling", "reference_position"}),
-    "mass": frozenset({"value"}),
-    "inertia": frozenset({"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}),
-    "box": frozenset({"size"}),
-    "cylinder": frozenset({"radius", "length"}),
-    "sphere": frozenset({"radius"}),
-    "mesh": frozenset({"filename", "scale"}),
-    "color": frozenset({"rgba"}),
-    "texture": frozenset({"filename"}),
+#: Element: its attributes, where they are looked at > the elements that it may hold. One that has no line is
+#: not looked into.
+_TABLE = """
+robot: name version > link joint material
+link: name type > inertial visual collision
+joint: name type > origin parent child axis limit mimic dynamics safety_controller calibration
+inertial > origin mass inertia
+visual > origin geometry material
+collision > origin geometry material
+geometry > box cylinder sphere mesh capsule
+material > color texture
+origin: xyz rpy quat_xyzw >
+parent: link >
+child: link >
+axis: xyz >
+limit: lower upper effort velocity acceleration deceleration jerk >
+mimic: joint multiplier offset >
+dynamics: damping friction >
+safety_controller: k_velocity k_position soft_lower_limit soft_upper_limit >
+"""
+_LINES = [line.partition(">") for line in _TABLE.strip().splitlines()]
+CHILDREN = {head.split()[0].rstrip(":"): frozenset(inside.split()) for head, _, inside in _LINES}
+ATTRIBUTES = {
+    tag: frozenset(names.split())
+    for tag, colon, names in (head.partition(":") for head, *_ in _LINES)
+    if colon
 }
 
 #: Elements and attributes of other formats that say where something is, and are skipped here.
@@ -103,12 +61,8 @@ _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
 #: Children that may stand once only.
 _ONCE = {
-    "joint": CHILDREN["joint"],
-    "inertial": CHILDREN["inertial"],
-    "visual": CHILDREN["visual"],
-    "collision": CHILDREN["collision"],
+    **{tag: CHILDREN[tag] for tag in ("joint", "inertial", "visual", "collision", "geometry")},
     "link": frozenset({"inertial"}),
-    "geometry": CHILDREN["geometry"],
 }
 
 #: Elements whose value would be lost if it stood between the tags.
