@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 
-from urdfkin.lint.finding import Finding, Oracle, Severity, UrdfError, UrdfWarning
+from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rules.axes import tilts
 from urdfkin.lint.runner import read_urdf
@@ -84,8 +84,8 @@ def load(
 def _unverifiable(findings: tuple[Finding, ...]) -> str | None:
     """Why Pinocchio cannot check the robot, if a finding says that it cannot."""
     for finding in findings:
-        if finding.oracle is Oracle.REFUSES:
+        if finding.oracle is PinocchioReading.REFUSES:
             return f"Pinocchio refuses the file ({finding.code}, line {finding.line}: {finding.message})"
-        if finding.oracle is Oracle.DIFFERS:
+        if finding.oracle is PinocchioReading.DIFFERS:
             return f"Pinocchio reads another robot ({finding.code}, line {finding.line}: {finding.message})"
     return None

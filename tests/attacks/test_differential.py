@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 from tests.reading import tree_of
-from urdfkin.lint import Finding, Oracle, Severity, check_text
+from urdfkin.lint import Finding, PinocchioReading, Severity, check_text
 from urdfkin.tree import JointKind, KinematicTree
 
 #: Slot -> what may stand there; the first is plain.
@@ -239,7 +239,7 @@ def judged(data: bytes) -> None:
         return
     marks = {finding.oracle for finding in findings} - {None}
     model = read_by_pinocchio(data)
-    if Oracle.REFUSES in marks:
+    if PinocchioReading.REFUSES in marks:
         assert model is None, (data, said(findings))
         return
     assert model is not None, (data, said(findings))

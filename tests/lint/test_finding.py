@@ -6,7 +6,7 @@ import pickle
 import pytest
 
 from urdfkin.errors import UrdfkinError
-from urdfkin.lint import Finding, Oracle, Severity, UrdfError, check, check_text
+from urdfkin.lint import Finding, PinocchioReading, Severity, UrdfError, check, check_text
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.runner import read_urdf
 
@@ -82,4 +82,4 @@ def test_names_a_root_joint_needs_are_errors_when_there_is_one(tag: str, name: s
 def test_what_pinocchio_refuses_is_marked() -> None:
     text = '<robot name="r"><link name="a"/><link name="b"/>{}</robot>'
     joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/><origin xyz="0\t0 1"/></joint>'
-    assert [f.oracle for f in check(text.format(joint))] == [Oracle.REFUSES]
+    assert [f.oracle for f in check(text.format(joint))] == [PinocchioReading.REFUSES]

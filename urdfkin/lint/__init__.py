@@ -1,6 +1,6 @@
 """Strict, located, coded findings about a URDF, before anything else is asked to read it."""
 
-from urdfkin.lint.finding import Finding, Oracle, Severity, UrdfError, UrdfWarning
+from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
 from urdfkin.lint.runner import check, check_text
 
@@ -8,7 +8,7 @@ __all__ = [
     "DEFAULT_LIMITS",
     "Finding",
     "Limits",
-    "Oracle",
+    "PinocchioReading",
     "Severity",
     "UrdfError",
     "UrdfWarning",

@@ -33,7 +33,7 @@ class Severity(Enum):
         return list(Severity).index(self)
 
 
-class Oracle(Enum):
+class PinocchioReading(Enum):
     """What Pinocchio does with something that is legal, when it does not do what the specification says."""
 
     REFUSES = "refuses"
@@ -70,7 +70,7 @@ class Finding:
     column: int = 1
     element: str | None = None
     name: str | None = None
-    oracle: Oracle | None = None
+    oracle: PinocchioReading | None = None
     also: tuple[int, ...] = ()
 
     @property

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from urdfkin.lint.finding import Oracle, Severity
+from urdfkin.lint.finding import PinocchioReading, Severity
 
 ERROR, WARNING, NOTE = Severity.ERROR, Severity.WARNING, Severity.NOTE
-REFUSES, DIFFERS = Oracle.REFUSES, Oracle.DIFFERS
+REFUSES, DIFFERS = PinocchioReading.REFUSES, PinocchioReading.DIFFERS
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,4 +26,4 @@ class Rule:
     id: str
     slug: str
     severity: Severity
-    oracle: Oracle | None = None
+    oracle: PinocchioReading | None = None
