@@ -1,7 +1,7 @@
 """One finding about a URDF: a stable code, where it is, what was found and what to do about it.
 
 A finding is plain data, so that it can be printed, compared, turned into JSON or SARIF and sent to another
-process. The codes and their pages stand in `urdfkin.lint.codes`.
+process. The rules stand in `urdfkin.lint.rules`, with their pages beside them.
 """
 
 from __future__ import annotations

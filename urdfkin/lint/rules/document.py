@@ -34,7 +34,6 @@ MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
-
 #: Bytes that the parser is given at once.
 _PIECE = 1_000_000
 
