@@ -5,6 +5,9 @@
 Ratios hold on a noisy machine, absolute times do not: each round times every contender once; medians, minima
 and the ratio of medians are printed. Results are compared first; a difference fails the run, a slow time
 never does. Libraries that are not installed are listed and left out.
+
+`--only where` says where the time of a batch and of a single call goes, `--only first` what the first use of
+each quantity costs.
 """
 
 from __future__ import annotations
@@ -13,30 +16,32 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # PyTorch's threads do not spin into the next contender
 
-import urdfkin
-from scripts.benchmarking.batches import batch_rows
-from scripts.benchmarking.clock import Row
-from scripts.benchmarking.contenders import Contender, find
-from scripts.benchmarking.growth import frame_rows, joint_rows, size_rows
-from scripts.benchmarking.machine import machine
-from scripts.benchmarking.memory import peak_over_output
+from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender
+from scripts.benchmarking.machine import USES, first_uses, machine, peak_over_output
 from scripts.benchmarking.operations import operations
-from scripts.benchmarking.show import show
-from scripts.benchmarking.single import single_rows
+from scripts.benchmarking.sections import (
+    batch_rows,
+    frame_rows,
+    joint_rows,
+    single_rows,
+    size_rows,
+    verified_rows,
+)
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
-from scripts.benchmarking.verified import verified_rows
-from scripts.benchmarking.work import DifferenceError
+from scripts.benchmarking.tables import show
+from scripts.benchmarking.timing import DifferenceError, Row
+from scripts.benchmarking.where import parts_of_batches, parts_of_calls
 from urdfkin.validation.report import versions
 
-SECTIONS = ("batch", "single", "verified", "joints", "frames", "sizes", "memory")
+SECTIONS = ("batch", "single", "verified", "where", "first", "joints", "frames", "sizes", "memory")
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,7 @@ class Plan:
     Attributes:
         configurations: Of a batch.
         rounds: Of each table.
+        first: The quantities whose first use is measured.
         joints: Of the chains.
         numbers: Written by a chain's batch of Jacobians.
         frames: How many placements at once.
@@ -56,6 +62,7 @@ class Plan:
 
     configurations: int = 100_000
     rounds: int = 21
+    first: tuple[str, ...] = tuple(USES)
     joints: tuple[int, ...] = (6, 12, 25, 50, 100)
     numbers: int = 4_000_000
     frames: tuple[int, ...] = (1, 4, 16, 1000)
@@ -64,27 +71,27 @@ class Plan:
     memory: int = 1_000_000
 
 
-QUICK = Plan(1_000, 3, (6, 12), 20_000, (1, 1000), 100, (100, 1_000), 200_000)
+QUICK = Plan(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100, (100, 1_000), 200_000)
 
 
-def rows_of(section: str, plan: Plan, contenders: Sequence[Contender]) -> Iterator[Row]:
-    """One section's rows."""
-    if section == "joints":
-        yield from joint_rows(plan.joints, plan.numbers, plan.rounds)
-    elif section == "sizes":
-        yield from size_rows(SUBJECTS[0], plan.sizes, plan.rounds)
-    elif section == "frames":
-        with Subject(*SUBJECTS[1], plan.frame_configurations) as subject:
-            yield from frame_rows(subject, plan.frames, plan.rounds)
-    else:
-        for source in SUBJECTS:
-            with Subject(*source, plan.configurations) as subject:
-                if section == "batch":
-                    yield from batch_rows(subject, contenders, plan.rounds)
-                elif section == "single":
-                    yield from single_rows(subject, contenders, plan.rounds)
-                elif section == "verified":
-                    yield from verified_rows(subject, plan.rounds)
+def rows(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> Iterator[Row]:
+    """Everything that contenders are timed at.
+
+    Raises:
+        DifferenceError: contenders disagree.
+    """
+    n, rounds = plan.configurations, plan.rounds
+    ways: dict[str, Callable[[], Iterator[Row]]] = {
+        "batch": lambda: batch_rows(n, contenders, rounds),
+        "single": lambda: single_rows(n, contenders, rounds),
+        "verified": lambda: verified_rows(n, rounds),
+        "joints": lambda: joint_rows(plan.joints, plan.numbers, rounds),
+        "frames": lambda: frame_rows(plan.frame_configurations, plan.frames, rounds),
+        "sizes": lambda: size_rows(plan.sizes, rounds),
+    }
+    for section, way in ways.items():
+        if section in sections:
+            yield from way()
 
 
 def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> dict[str, Any]:
@@ -94,27 +101,33 @@ def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender
         DifferenceError: contenders disagree.
     """
     name, frame = SUBJECTS[0]
-    return {
+    found: dict[str, Any] = {
         "machine": machine(),
         "versions": versions(),
         "libraries": {contender.library: contender.state for contender in contenders},
         "rounds": plan.rounds,
         "operations": dict(_operations()),
-        "rows": [row.as_data() for section in sections for row in rows_of(section, plan, contenders)],
+        "rows": [asdict(row) for row in rows(plan, sections, contenders)],
         "memory": [
             peak_over_output(name, frame, quantity, plan.memory, out=out)
-            for quantity in ("jacobian", "acceleration")
+            for quantity in QUANTITIES
             for out in (True, False)
             if "memory" in sections
         ],
     }
+    if "where" in sections:
+        single = parts_of_calls(min(plan.configurations, 2_000), plan.rounds)
+        found["where"] = [*parts_of_batches(plan.configurations, plan.rounds), *single]
+    if "first" in sections:
+        found["first"] = list(first_uses(name, frame, plan.first))
+    return found
 
 
 def _operations() -> Iterator[tuple[str, int]]:
-    for name, frame in SUBJECTS:
-        robot = urdfkin.load(name, mimic=False, verify=False)
-        for quantity in QUANTITIES:
-            yield f"{name}, {quantity}", operations(robot.plan([robot.tree.frame_link(frame)]), quantity)
+    for source in SUBJECTS:
+        with Subject(*source, 1) as subject:
+            for quantity in QUANTITIES:
+                yield f"{subject.name}, {quantity}", operations(subject.plan, quantity)
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -129,9 +142,9 @@ def main(words: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(words)
     plan = QUICK if arguments.quick else Plan()
     if arguments.rounds:
-        plan = Plan(**{**vars(plan), "rounds": arguments.rounds})
+        plan = replace(plan, rounds=arguments.rounds)
     try:
-        figures = document(plan, arguments.only, find(peers=not arguments.no_peers))
+        figures = document(plan, arguments.only, ALWAYS if arguments.no_peers else ALWAYS + PEERS)
     except DifferenceError as difference:
         print(f"results differ: {difference}", file=sys.stderr)
         return 1

@@ -19,29 +19,31 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
 from scripts.benchmarking.picture import draw
-from scripts.benchmarking.tables import tables
-from scripts.benchmarking.words import Words
+from scripts.benchmarking.tables import Words, tables
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE, FIGURES, PICTURE = (
     DOCS / name for name in ("performance.md", "performance.json", "images/performance.svg")
 )
+NOT_MEASURED = "Not measured yet."
 _PLACE = re.compile(r"(<!-- figures: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def page(text: str, figures: Mapping[str, Any]) -> str:
-    """`text` with the figures at their places.
+    """`text` with the figures at their places; a place for what was not measured says so.
 
     Raises:
-        ValueError: the page has a place for what was not measured, or none for what was.
+        ValueError: the page has no place for what was measured, or two.
     """
     parts: dict[str, list[str]] = {"machine": [_machine(figures)]}
     for words in tables(figures):
         parts.setdefault(words.section, []).append(_table(words))
     places = [place[1] for place in _PLACE.findall(text)]
-    if sorted(places) != sorted(parts):
+    if set(parts) - set(places) or len(places) != len(set(places)):
         raise ValueError(f"the page has places for {places}, the figures are {list(parts)}")
-    return _PLACE.sub(lambda place: place[1] + "\n\n".join(parts[place[2]]) + "\n" + place[3], text)
+    return _PLACE.sub(
+        lambda place: place[1] + "\n\n".join(parts.get(place[2], [NOT_MEASURED])) + "\n" + place[3], text
+    )
 
 
 def _machine(figures: Mapping[str, Any]) -> str:

@@ -2,9 +2,11 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import xml.dom.minidom
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +14,16 @@ import pytest
 
 import urdfkin
 from scripts import benchmark
-from scripts.benchmarking.bare import bare_urdf
+from scripts.benchmarking import generated, where
 from scripts.benchmarking.calls import Calls
-from scripts.benchmarking.chains import TIP, chain_urdf
-from scripts.benchmarking.clock import Table, measure
-from scripts.benchmarking.contenders import CONTENDERS, find
-from scripts.benchmarking.conventions import breadth_first, positions, spread
-from scripts.benchmarking.subject import SUBJECTS, Subject
+from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender
+from scripts.benchmarking.machine import EMPTY, KEPT, USES
+from scripts.benchmarking.peers import breadth_first, positions, spread
+from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, bare_urdf, chain_urdf
 from scripts.benchmarking.tables import tables
-from scripts.benchmarking.work import DifferenceError, Work, agree
+from scripts.benchmarking.timing import DifferenceError, Table, Work, agree, measure
+from urdfkin.recursion.plan import Step
+from urdfkin.recursion.program import program_of
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
 
@@ -40,14 +43,21 @@ def test_the_quick_benchmark_finds_equal_results_and_writes_every_section(tmp_pa
         text=True,
     )
     figures = json.loads(file.read_text())
-    assert {row["section"] for row in figures["rows"]} | {"memory"} == set(benchmark.SECTIONS)
+    assert {row["section"] for row in figures["rows"]} | {"memory", "where", "first"} == set(
+        benchmark.SECTIONS
+    )
     assert all(0 < row["minimum_ns"] <= row["median_ns"] for row in figures["rows"])
     batches = [row for row in figures["rows"] if row["section"] == "batch"]
     assert {(row["robot"], row["quantity"]) for row in batches} == {
-        (robot, quantity) for robot in ("panda", "talos") for quantity in ("jacobian", "acceleration")
+        (robot, quantity) for robot, _ in SUBJECTS for quantity in QUANTITIES
     }
     assert all(entry["peak_bytes"] >= 0.9 * entry["output_bytes"] for entry in figures["memory"])
-    assert set(figures["libraries"]) == {contender.library for contender in find()}
+    assert {entry["kind"]: entry["robot"] for entry in figures["where"]} == {
+        "batch": "talos",
+        "single": "talos",
+    }
+    assert all(0 < entry[KEPT] < entry[EMPTY] for entry in figures["first"])
+    assert set(figures["libraries"]) == {contender.library for contender in (*ALWAYS, *PEERS)}
     assert [words.title for words in tables(figures) if words.title not in run.stdout] == []
     assert len(picture.read_bytes()) < 60_000
     xml.dom.minidom.parse(str(picture))
@@ -93,11 +103,83 @@ def test_each_contender_computes_once_untimed_and_once_timed_in_each_round() -> 
     assert fast.median_ns < slow.minimum_ns
 
 
-def test_a_library_that_is_missing_is_listed_and_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(CONTENDERS, "jax_batch", "no_such_library")
-    last = find()[-1]
-    assert (last.library, last.state, last.module) == ("no_such_library", "not installed", None)
-    assert {contender.library for contender in find(peers=False)} == {"urdfkin", "pin"}
+def test_a_library_or_a_program_that_is_missing_is_listed_and_left_out() -> None:
+    def never(subject: Subject, quantity: str) -> Iterator[Work]:
+        raise AssertionError
+
+    for contender, state in (
+        (Contender("none", "no_such_library", batches=never), "not installed"),
+        (Contender("numpy", "numpy", batches=never, program="no-such-cc"), "left out, no no-such-cc"),
+    ):
+        assert contender.state == state
+        with Subject(*SUBJECTS[0], 1) as subject:
+            assert contender.works(subject, "jacobian") == []
+            assert contender.singles(subject, "jacobian") == []
+
+
+@pytest.mark.parametrize(("name", "frame"), [*SUBJECTS, ("polar", "slider")])
+def test_the_path_written_out_for_one_robot_has_the_robots_jacobian_and_acceleration(
+    name: str, frame: str
+) -> None:
+    with Subject(name, frame, 1) as subject:
+        q, v, a = subject.q[0], subject.v[0], subject.a[0]
+        of_q, of_v = (subject.plan.steps[:, place] for place in (Step.Q, Step.V))
+        x = q[of_q].tolist()
+        sines, cosines = np.sin(x).tolist(), np.cos(x).tolist()
+        J = np.zeros((6, subject.nv))
+        columns = generated.columns(subject.plan, x, sines, cosines)
+        J[:, of_v] = np.array([[*linear, *angular] for linear, angular in columns]).T
+        np.testing.assert_allclose(J, subject.robot.jacobian(q, frame), rtol=0, atol=1e-13)
+        rates = v[of_v].tolist(), a[of_v].tolist()
+        linear, angular = generated.acceleration(subject.plan, x, sines, cosines, *rates)
+        acceleration = subject.robot.acceleration(q, v, a, frame)
+        np.testing.assert_allclose([*linear, *angular], acceleration, rtol=0, atol=1e-11)
+
+
+@pytest.mark.skipif(shutil.which(generated.COMPILER) is None, reason="no C compiler")
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_code_generated_for_one_robot_computes_what_the_robot_does_and_writes_nothing_else(
+    quantity: str,
+) -> None:
+    pytest.importorskip("casadi")
+    with Subject("polar", "slider", 17) as subject:
+        compute = generated.compiled(subject, quantity)
+        for n in (1, 7, 8, 9, 17):
+            inputs = subject.inputs(quantity, n)
+            out = np.full((n + 1, *subject.width(quantity)), 7.0)
+            compute(n, *(x.ctypes.data for x in (*inputs, *inputs, *inputs)[:3]), out.ctypes.data)
+            expected = getattr(subject.robot, quantity)(*inputs, subject.frame)
+            np.testing.assert_allclose(out[:n], expected, rtol=0, atol=1e-13)
+            assert (out[n] == 7.0).all()
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_a_batch_taken_apart_is_whole_when_nothing_is_left_out(quantity: str) -> None:
+    with Subject(*SUBJECTS[0], 9) as subject:
+        program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
+        sizes = [where.cut(program, end) for end in range(1, len(where.PARTS) + 1)]
+        np.testing.assert_array_equal(sizes[-1].words, program.words)
+        lengths = [len(part.words) for part in sizes]
+        assert lengths == sorted(lengths)
+        assert lengths[0] < lengths[-1]
+        (entry,) = [
+            entry
+            for entry in where.parts_of_batches(100, 1)
+            if (entry["robot"], entry["quantity"]) == (subject.name, quantity)
+        ]
+        assert ("columns" in entry["parts"]) == (quantity == "jacobian")
+        assert sum(entry["parts"].values()) == pytest.approx(entry["ns"], abs=0.05)
+
+
+def test_a_first_use_is_one_of_what_a_robot_computes() -> None:
+    robot = urdfkin.load("one_link", verify=False)
+    for use, count in USES.items():
+        inputs = [np.zeros(robot.nq)] * count
+        if use.startswith("prepared."):
+            prepared = robot.prepare("tip")
+            assert getattr(prepared, use.removeprefix("prepared."))(*inputs).shape[0] == 6
+        else:
+            getattr(robot, use)(*inputs, "tip")
 
 
 @pytest.mark.parametrize(("name", "frame"), SUBJECTS)

@@ -34,3 +34,24 @@ def test_no_figure_is_typed() -> None:
 def test_the_picture_is_light() -> None:
     assert maker.PICTURE.is_file()
     assert maker.PICTURE.stat().st_size < 60_000
+
+
+def test_what_was_not_measured_is_said_to_be_missing() -> None:
+    without = {**FIGURES, "rows": [row for row in FIGURES["rows"] if row["section"] != "sizes"]}
+    place = maker.page(TEXT, without).partition("<!-- figures: sizes -->\n")[2]
+    assert place.startswith(maker.NOT_MEASURED)
+
+
+def test_the_page_shows_where_the_time_of_a_batch_and_of_a_single_call_goes() -> None:
+    where = [
+        {
+            "kind": kind,
+            "robot": "panda",
+            "quantity": "jacobian",
+            "ns": 40.0,
+            "parts": {"walk": 10.0, "rest": 30.0},
+        }
+        for kind in ("batch", "single")
+    ]
+    page = maker.page(TEXT, {**FIGURES, "where": where})
+    assert page.count("| walk | 10.0 (25 %) |") == 2

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from scripts.benchmarking.subject import Subject
-from scripts.benchmarking.work import TOLERANCE, Work
+from scripts.benchmarking.timing import TOLERANCE, Work
 from urdfkin.tree import FloatArray
 
 

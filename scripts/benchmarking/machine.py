@@ -1,10 +1,41 @@
-"""The machine the figures were measured on."""
+"""The machine, and what a process of its own must tell: a batch's memory, and what a first use costs.
+
+Run as a module in a fresh process: the kernel tells the largest size that a process had since it was last
+told to forget it, and what is compiled or loaded once is not there yet.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import urdfkin
+from urdfkin.robot import Robot
+
+ROOT = Path(__file__).parents[2]
+#: Entries of a first use's figures: an empty cache, one with the kernels on disk.
+EMPTY, KEPT = "empty_ms", "kept_ms"
+#: Every quantity whose first use compiles something, and how many of q, v, a it takes.
+USES = {
+    "placement": 1,
+    "velocity": 2,
+    "jacobian": 1,
+    "jacobian_rate": 2,
+    "acceleration": 3,
+    "acceleration_breakdown": 3,
+    "prepared.jacobian": 1,
+    "prepared.acceleration": 3,
+}
 
 
 def machine() -> dict[str, object]:
@@ -21,3 +52,85 @@ def machine() -> dict[str, object]:
         "system": platform.system(),
         "python": platform.python_version(),
     }
+
+
+def peak_over_output(robot: str, frame: str, quantity: str, n: int, *, out: bool) -> dict[str, Any]:
+    """Bytes that `n` results take at the most, and those of the results themselves."""
+    return _asked("memory", robot, frame, quantity, str(n), "out" if out else "fresh")
+
+
+def first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Processor time of the first use of each, and of all of them in one process.
+
+    Once where nothing was compiled before, and once more, in another process, where kernels lie on disk.
+    """
+    together = " + ".join(uses) if len(uses) > 1 else None
+    for what in (*uses, *filter(None, [together])):
+        with tempfile.TemporaryDirectory() as folder:
+            words = "first", robot, frame, *what.split(" + ")
+            times = {key: _asked(*words, cache=folder)["ms"] for key in (EMPTY, KEPT)}
+        yield {"robot": robot, "what": "all of them" if what == together else what, **times}
+
+
+def _asked(*words: str, cache: str | None = None) -> dict[str, Any]:
+    """What this module answers in a fresh process."""
+    command = [sys.executable, "-m", "scripts.benchmarking.machine", *words]
+    given = {} if cache is None else {"NUMBA_CACHE_DIR": cache}
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, check=True, env={**os.environ, **given}
+    )
+    result: dict[str, Any] = json.loads(done.stdout)
+    return result
+
+
+# -- in that process -------------------------------------------------------------------------------------
+
+
+def _first(robot: str, frame: str, *uses: str) -> dict[str, object]:
+    model = urdfkin.load(robot, verify=False, mimic=False)
+    begin = time.process_time()
+    for use in uses:
+        _use(model, frame, use)
+    return {"ms": round(1e3 * (time.process_time() - begin), 1)}
+
+
+def _use(model: Robot, frame: str, use: str) -> None:
+    inputs = [np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv)][: USES[use]]
+    if use.startswith("prepared."):
+        getattr(model.prepare(frame), use.removeprefix("prepared."))(*inputs)
+    else:
+        getattr(model, use)(*inputs, frame, verify=False)
+
+
+def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dict[str, object]:
+    from scripts.benchmarking.subject import Subject  # noqa: PLC0415  a first use does not pay for it
+
+    n = int(count)
+    with Subject(robot, frame, n) as subject:
+        method, inputs = getattr(subject.robot, quantity), subject.inputs(quantity, n)
+        out = np.ones((n, *subject.width(quantity))) if kind == "out" else None
+        few = tuple(x[:64] for x in inputs)
+        method(*few, frame, verify=False, threads=2)  # compiled code and threads are there
+        Path("/proc/self/clear_refs").write_text("5")  # forget the largest size
+        before = _bytes("VmRSS")
+        result = method(*inputs, frame, out=out, verify=False)
+        taken = _bytes("VmHWM") - before + (out.nbytes if out is not None else 0)
+    return {
+        "robot": robot,
+        "quantity": quantity,
+        "n": n,
+        "out": kind == "out",
+        "output_bytes": result.nbytes,
+        "peak_bytes": taken,
+    }
+
+
+def _bytes(entry: str) -> int:
+    """VmRSS is the memory in use, VmHWM the most that was in use."""
+    lines = Path("/proc/self/status").read_text("utf-8").splitlines()
+    return 1024 * next(int(line.split()[1]) for line in lines if line.startswith(entry))
+
+
+if __name__ == "__main__":
+    question, *given = sys.argv[1:]
+    print(json.dumps(_first(*given) if question == "first" else _memory(*given)))

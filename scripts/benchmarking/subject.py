@@ -6,20 +6,23 @@ import contextlib
 import tempfile
 from functools import cached_property
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 
 import urdfkin
-from scripts.benchmarking.bare import bare_urdf
+from urdfkin.recursion.plan import Plan
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
 
 #: The quantities of the tables.
 QUANTITIES = ("jacobian", "acceleration")
-#: Robot and frame: an arm, and a humanoid of which the path is a small part.
-SUBJECTS = (("panda", "panda_hand"), ("talos", "gripper_left_base_link"))
+#: Robot and frame: two arms, and a humanoid of which the path is a small part.
+SUBJECTS = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
 #: How many configurations a library called in a loop takes; its cost for one does not depend on it.
 LOOP = 2_000
+#: The frame at the end of a chain.
+TIP = "tip"
 
 
 class Subject:
@@ -63,17 +66,27 @@ class Subject:
         """How many configurations a loop takes."""
         return min(self.n, LOOP)
 
+    @property
+    def plan(self) -> Plan:
+        """The walk that meets the frame."""
+        return self.robot.plan([self.robot.tree.frame_link(self.frame)])
+
     @cached_property
     def urdf(self) -> str:
         """The robot without meshes, inertias and rules."""
         return bare_urdf(self.robot.urdf)
 
     @cached_property
+    def folder(self) -> Path:
+        """For a contender's files; gone when the subject is closed."""
+        return Path(self.stack.enter_context(tempfile.TemporaryDirectory()))
+
+    @cached_property
     def file(self) -> Path:
-        """`urdf` as a file, for libraries that read nothing else; gone when the subject is closed."""
-        folder = Path(self.stack.enter_context(tempfile.TemporaryDirectory()))
-        (folder / "robot.urdf").write_text(self.urdf, "utf-8")
-        return folder / "robot.urdf"
+        """`urdf` as a file, for libraries that read nothing else."""
+        file = self.folder / "robot.urdf"
+        file.write_text(self.urdf, "utf-8")
+        return file
 
     def width(self, quantity: str) -> tuple[int, ...]:
         """The shape of one configuration's result."""
@@ -86,3 +99,65 @@ class Subject:
     def inputs(self, quantity: str, n: int) -> tuple[FloatArray, ...]:
         """The first `n` of q, or of q, v and a: what the quantity depends on."""
         return tuple(x[:n] for x in ((self.q,) if quantity == "jacobian" else (self.q, self.v, self.a)))
+
+
+# -- what every library reads ----------------------------------------------------------------------------
+
+_INERTIA = {"ixx": "1", "iyy": "1", "izz": "1", "ixy": "0", "ixz": "0", "iyz": "0"}
+#: What a joint keeps.
+_KEPT = ("origin", "parent", "child", "axis", "limit")
+
+
+def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
+    """The links and joints of `urdf` and nothing else.
+
+    Links get the same unit inertia, since some libraries refuse a link without one; no kinematics depends on
+    it. Mimic rules are dropped: everyone computes with the same free coordinates.
+
+    Args:
+        urdf: The text of a URDF.
+        flags: Attributes of MuJoCo's own element `mujoco/compiler`; None to leave it out.
+    """
+    whole = ET.fromstring(urdf)
+    robot = ET.Element("robot", name=whole.get("name", "robot"))
+    if flags is not None:
+        ET.SubElement(ET.SubElement(robot, "mujoco"), "compiler", flags)
+    for link in whole.findall("link"):
+        inertial = ET.SubElement(ET.SubElement(robot, "link", name=link.attrib["name"]), "inertial")
+        ET.SubElement(inertial, "mass", value="1")
+        ET.SubElement(inertial, "inertia", _INERTIA)
+    for joint in whole.findall("joint"):
+        copy = ET.SubElement(robot, "joint", joint.attrib)
+        copy.extend(part for tag in _KEPT for part in joint.findall(tag))
+    return ET.tostring(robot, encoding="unicode")
+
+
+def chain_urdf(joints: int, seed: int = 0) -> str:
+    """A serial robot of revolute joints, each axis in another direction, links of 0.1 m.
+
+    Joint names sort in the chain's order; the frame `TIP` is fixed to the last link.
+    """
+    generator = np.random.default_rng(seed)
+    axes = generator.standard_normal((joints, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    turns = generator.uniform(-3.0, 3.0, (joints, 3))
+    links = [f'<link name="link{i:03}"/>' for i in range(joints + 1)]
+    moving = [
+        f'<joint name="joint{i:03}" type="revolute">{_origin(0.1, turns[i])}'
+        f'<parent link="link{i:03}"/><child link="link{i + 1:03}"/><axis xyz="{_text(axes[i])}"/>'
+        '<limit lower="-3" upper="3" velocity="1" effort="1"/></joint>'
+        for i in range(joints)
+    ]
+    tip = (
+        f'<link name="{TIP}"/><joint name="end" type="fixed">{_origin(0.1, np.zeros(3))}'
+        f'<parent link="link{joints:03}"/><child link="{TIP}"/></joint>'
+    )
+    return f'<robot name="chain{joints}">{"".join(links)}{"".join(moving)}{tip}</robot>'
+
+
+def _origin(length: float, rpy: FloatArray) -> str:
+    return f'<origin xyz="{length} 0 0" rpy="{_text(rpy)}"/>'
+
+
+def _text(numbers: FloatArray) -> str:
+    return " ".join(repr(float(x)) for x in numbers)

@@ -2,12 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from scripts.benchmarking.growth_tables import growth_tables
-from scripts.benchmarking.words import Entry, Words, number
+from rich.console import Console
+from rich.table import Table
+
+from scripts.benchmarking.contenders import FLOOR
+from scripts.benchmarking.generated import GENERATED
+from scripts.benchmarking.machine import EMPTY, KEPT
+
+#: A row of the figures, as data.
+Entry = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Words:
+    """One table: its section, what it is of, the columns' heads, the rows; the first column is words."""
+
+    section: str
+    title: str
+    head: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    remarks: tuple[str, ...] = ()
+
+
+def number(x: float) -> str:
+    """Three digits, and no power of ten."""
+    digits = 2 if abs(x) < 10 else 1 if abs(x) < 100 else 0
+    return f"{x:,.{digits}f}"
 
 
 def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
@@ -21,61 +46,100 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
     if batch := [row for row in entries if row["section"] == "batch"]:
         yield _summary(batch)
         yield _floor(batch, figures["operations"])
-    yield from growth_tables(figures)
+    for kind, what in (("batch", "a batch, one thread"), ("single", "a single call")):
+        if chosen := [entry for entry in figures.get("where", ()) if entry["kind"] == kind]:
+            yield _where(f"{what}: where the time goes, ns for one configuration", chosen)
+    if entries := figures.get("first"):
+        yield _first(entries)
+    for section, make in (("joints", _joints), ("frames", _frames), ("sizes", _sizes)):
+        if chosen := [row for row in figures["rows"] if row["section"] == section]:
+            yield make(chosen)
+    if figures["memory"]:
+        yield _memory(figures["memory"])
+
+
+def show(figures: Mapping[str, Any], console: Console | None = None) -> None:
+    """Print every table, the machine and the libraries."""
+    console = console or Console(width=110, highlight=False)
+    machine = figures["machine"]
+    console.print(
+        f"{machine['processor']}, {machine['processors']} processors, {machine['vectors']}, "
+        f"Python {machine['python']}; {figures['rounds']} rounds, float64"
+    )
+    console.print("; ".join(f"{name} {state}" for name, state in figures["libraries"].items()))
+    for words in tables(figures):
+        table = Table(title=words.title, title_justify="left", box=None, pad_edge=False, header_style="dim")
+        for i, head in enumerate(words.head):
+            table.add_column(head, justify="right" if i else "left", no_wrap=not i)
+        for row in words.rows:
+            table.add_row(*(cell.replace("[", "\\[") for cell in row))
+        console.print()
+        console.print(table)
+        for i, remark in enumerate(words.remarks):
+            console.print(f"  \\[{i + 1}] {remark}")
+
+
+# -- contests ------------------------------------------------------------------------------------------
 
 
 def _contest(section: str, title: str, rows: list[Entry]) -> Words:
-    own = section == "verified"
-    ratio = "cost, Pinocchio's own = 1" if own else "times as fast as Pinocchio's loop"
+    own, single = section == "verified", section == "single"
+    ratio = "cost, Pinocchio's own = 1" if own else f"times Pinocchio's {'calls' if single else 'loop'}"
     remarks = tuple(dict.fromkeys(row["remark"] for row in rows if row["remark"]))
     marks = {remark: f" [{i + 1}]" for i, remark in enumerate(remarks)}
+    ceiling = _generated(rows)
+
+    def cells(row: Entry) -> Iterator[str]:
+        yield row["who"] + marks.get(row["remark"], "")
+        yield number(row["median_ns"])
+        yield number(row["minimum_ns"])
+        yield number(1 / row["ratio"] if own else row["ratio"])
+        if ceiling:
+            yield number(ceiling / row["median_ns"])
+        yield f"{1 if single else row['n']:,}"
+
     return Words(
         section,
         f"{title}: {rows[0]['numbers']} numbers, ns for one configuration",
-        (
-            "",
-            "median",
-            "minimum",
-            ratio.replace("loop", "calls") if section == "single" else ratio,
-            "at a time",
-        ),
-        [
-            (
-                row["who"] + marks.get(row["remark"], ""),
-                number(row["median_ns"]),
-                number(row["minimum_ns"]),
-                number(1 / row["ratio"] if own else row["ratio"]),
-                f"{1 if section == 'single' else row['n']:,}",
-            )
-            for row in rows
-        ],
+        ("", "median", "minimum", ratio, *([_SHARE] if ceiling else ()), "at a time"),
+        [tuple(cells(row)) for row in rows],
         remarks,
     )
 
 
+_SHARE = "times generated code"
+
+
+def _generated(rows: Sequence[Entry]) -> float | None:
+    """What code generated for the one robot takes, if that was measured."""
+    return next((float(row["median_ns"]) for row in rows if row["who"] == GENERATED), None)
+
+
 def _summary(rows: list[Entry]) -> Words:
-    """One thread and all, against Pinocchio's loop and against the fastest other, whoever that is."""
+    """One thread and all; against Pinocchio, code for this robot alone, and the fastest other library."""
     found = []
     for title, group in _tables_of(rows):
-        who = {row["who"]: row for row in group}
-        ours = [row for name, row in who.items() if name.startswith("urdfkin") and "no out" not in name]
-        others = [row for name, row in who.items() if not name.startswith(("urdfkin", "output"))]
-        best = min(others, key=lambda row: float(row["median_ns"]))
+        ours = [row for row in group if row["who"].startswith("urdfkin") and "no out" not in row["who"]]
+        one = float(ours[0]["median_ns"])
+        others = [row for row in group if not row["who"].startswith(("urdfkin", FLOOR, GENERATED))]
+        best, ceiling = min(others, key=lambda row: float(row["median_ns"])), _generated(group)
         found.append(
             (
                 title,
-                number(ours[0]["median_ns"]),
+                number(one),
                 number(ours[0]["ratio"]),
                 number(ours[-1]["ratio"]),
+                number(ceiling / one) if ceiling else "not measured",
                 f"{best['who']}, {number(best['median_ns'])}",
-                number(best["median_ns"] / ours[0]["median_ns"]),
+                number(best["median_ns"] / one),
             )
         )
     heads = (
         "1 thread, ns",
         "times Pinocchio's loop",
         "all threads",
-        "fastest other, ns",
+        _SHARE,
+        "fastest other library, ns",
         "times that, 1 thread",
     )
     return Words("summary", "urdfkin against the others, medians", ("", *heads), found)
@@ -86,7 +150,7 @@ def _floor(rows: list[Entry], operations: Mapping[str, int]) -> Words:
     found = []
     for title, group in _tables_of(rows):
         who = {row["who"].partition(",")[0]: row for row in reversed(group)}
-        fill, ours = who["output written once (fill)"], who["urdfkin"]
+        fill, ours = who[FLOOR], who["urdfkin"]
         size = 8 * fill["numbers"]
         found.append(
             (
@@ -113,3 +177,109 @@ def _floor(rows: list[Entry], operations: Mapping[str, int]) -> Words:
 def _tables_of(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
     for (robot, quantity), group in groupby(rows, key=lambda row: (row["robot"], row["quantity"])):
         yield f"{robot}, {quantity}", list(group)
+
+
+# -- where the time goes ---------------------------------------------------------------------------------
+
+
+def _where(title: str, entries: Sequence[Entry]) -> Words:
+    """One column a robot and quantity: nanoseconds, and the share of the whole."""
+    parts = dict.fromkeys(part for entry in entries for part in entry["parts"])
+
+    def cell(entry: Entry, part: str) -> str:
+        if part not in entry["parts"]:
+            return ""
+        ns = entry["parts"][part]
+        return f"{number(ns)} ({100 * ns / entry['ns']:.0f} %)"
+
+    rows = [(part, *(cell(entry, part) for entry in entries)) for part in parts]
+    rows.append(("in all", *(number(entry["ns"]) for entry in entries)))
+    heads = (f"{entry['robot']}, {entry['quantity']}" for entry in entries)
+    return Words("where", title, ("", *heads), rows)
+
+
+def _first(entries: Sequence[Entry]) -> Words:
+    return Words(
+        "first",
+        f"{entries[0]['robot']}: processor time of a first use, s",
+        ("", "nothing compiled before", "kernels on disk"),
+        [(entry["what"], *(number(entry[key] / 1e3) for key in (EMPTY, KEPT))) for entry in entries],
+    )
+
+
+# -- growth ----------------------------------------------------------------------------------------------
+
+
+def _joints(rows: list[Entry]) -> Words:
+    return Words(
+        "joints",
+        "chains: the tip's result, one thread",
+        ("", "joints", "ns for one configuration", "for one joint", "for one number written"),
+        [
+            (
+                f"{row['quantity']}, {row['who']}",
+                str(row["size"]),
+                number(row["median_ns"]),
+                number(row["median_ns"] / row["size"]),
+                number(row["median_ns"] / row["numbers"]),
+            )
+            for row in _together(rows)
+        ],
+    )
+
+
+def _frames(rows: list[Entry]) -> Words:
+    return Words(
+        "frames",
+        f"{rows[0]['robot']}: placements of several links, one thread",
+        ("", "links", "ns for one configuration", "for one link"),
+        [
+            (row["who"], str(row["size"]), number(row["median_ns"]), number(row["median_ns"] / row["size"]))
+            for row in _together(rows)
+        ],
+    )
+
+
+def _sizes(rows: list[Entry]) -> Words:
+    return Words(
+        "sizes",
+        f"{rows[0]['robot']}: batches of several sizes, one thread, out= given",
+        ("", "configurations", "ns for one, median", "minimum"),
+        [
+            (
+                f"{row['quantity']}, {row['who']}",
+                f"{row['size']:,}",
+                number(row["median_ns"]),
+                number(row["minimum_ns"]),
+            )
+            for row in _together(rows)
+        ],
+    )
+
+
+def _together(rows: list[Entry]) -> list[Entry]:
+    """Rows of one contender and quantity beside each other, in the order in which they first come."""
+    seen = list(dict.fromkeys((row["quantity"], row["who"]) for row in rows))
+    quantities = list(dict.fromkeys(row["quantity"] for row in rows))
+    return sorted(
+        rows,
+        key=lambda row: (quantities.index(row["quantity"]), seen.index((row["quantity"], row["who"]))),
+    )
+
+
+def _memory(entries: list[Entry]) -> Words:
+    return Words(
+        "memory",
+        f"{entries[0]['robot']}: memory of a batch, output included",
+        ("", "configurations", "output, MB", "at the most, MB", "beyond the output"),
+        [
+            (
+                f"{entry['quantity']}, {'out= given' if entry['out'] else 'no out='}",
+                f"{entry['n']:,}",
+                number(entry["output_bytes"] / 1e6),
+                number(entry["peak_bytes"] / 1e6),
+                f"{100 * (entry['peak_bytes'] / entry['output_bytes'] - 1):.1f} %",
+            )
+            for entry in entries
+        ],
+    )

@@ -1,0 +1,226 @@
+"""Who is measured: urdfkin, Pinocchio, code generated for one robot, and the peers that are installed."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from importlib import metadata, util
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from scripts.benchmarking import generated, peers
+from scripts.benchmarking.calls import Calls
+from scripts.benchmarking.subject import QUANTITIES, Subject
+from scripts.benchmarking.timing import Work
+from urdfkin.tree import FloatArray
+
+ONE = "urdfkin, 1 thread"
+FRESH = "urdfkin, 1 thread, no out="
+FLOOR = "output written once (fill)"
+PROCESSORS = len(os.sched_getaffinity(0))
+SEVERAL = f"urdfkin, {PROCESSORS} threads"
+LOOP = "Pinocchio, Python loop"
+PROCESSES = f"Pinocchio, {PROCESSORS} processes"
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A library and its ways to a quantity.
+
+    Attributes:
+        library: The distribution's name.
+        module: What Python imports.
+        calls: Its ways for one configuration.
+        batches: Its ways for a batch; None: the calls in a loop.
+        program: What must be there beside it.
+    """
+
+    library: str
+    module: str
+    calls: Callable[[Subject, str], Iterator[Calls]] | None = None
+    batches: Callable[[Subject, str], Iterator[Work]] | None = None
+    program: str | None = None
+
+    @property
+    def missing(self) -> str | None:
+        """Why it is left out."""
+        if util.find_spec(self.module) is None:
+            return "not installed"
+        if self.program and shutil.which(self.program) is None:
+            return f"left out, no {self.program}"
+        return None
+
+    @property
+    def state(self) -> str:
+        """Its version, or why it is left out."""
+        try:
+            return self.missing or metadata.version(self.library)
+        except metadata.PackageNotFoundError:
+            return "a checkout"
+
+    def works(self, subject: Subject, quantity: str) -> list[Work]:
+        """Its batches."""
+        if self.missing:
+            return []
+        if self.batches is not None:
+            return list(self.batches(subject, quantity))
+        return [one.batch(subject, quantity) for one in self.singles(subject, quantity)]
+
+    def singles(self, subject: Subject, quantity: str) -> list[Calls]:
+        """Its calls for one configuration."""
+        return [] if self.missing or self.calls is None else list(self.calls(subject, quantity))
+
+
+# -- urdfkin ---------------------------------------------------------------------------------------------
+
+
+def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
+    """One thread, every thread, and into fresh memory; with them the floor, an array written once."""
+    method = getattr(subject.robot, quantity)
+    inputs = subject.inputs(quantity, subject.n)
+    out = np.empty((subject.n, *subject.width(quantity)))
+    last: list[FloatArray] = []
+
+    def into(threads: int) -> Callable[[], object]:
+        return lambda: method(*inputs, subject.frame, out=out, threads=threads, verify=False)
+
+    def fresh() -> None:
+        last[:] = [method(*inputs, subject.frame, threads=1, verify=False)]
+
+    yield Work(ONE, subject.n, into(1), lambda: out)
+    if PROCESSORS > 1:
+        yield Work(SEVERAL, subject.n, into(PROCESSORS), lambda: out)
+    yield Work(FRESH, subject.n, fresh, lambda: last[0])
+    floor = np.empty_like(out)
+    yield Work(FLOOR, subject.n, lambda: floor.fill(1.0))
+
+
+def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
+    """The method, and the prepared form with and without `out=`."""
+    robot, arguments = subject.robot, "q" if quantity == "jacobian" else "q, v, a"
+    names = {
+        "robot": robot,
+        "frame": subject.frame,
+        "out": np.empty(subject.width(quantity)),
+        "fast": robot.prepare(subject.frame),
+    }
+    for line in (
+        f"robot.{quantity}({arguments}, frame, verify=False)",
+        f"fast.{quantity}({arguments})",
+        f"fast.{quantity}({arguments}, out=out)",
+    ):
+        who, _, given = line.replace("fast", "prepared").partition("(")
+        shown = [word for word in ("verify=False", "out=") if word in given]
+        yield Calls(f"urdfkin, {who}({', '.join(shown)})", names, (line,))
+
+
+# -- Pinocchio -------------------------------------------------------------------------------------------
+
+
+def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
+    """The fewest calls: `computeFrameJacobian`; `forwardKinematics`, `getFrameClassicalAcceleration`."""
+    model = pin.buildModelFromXML(urdf)
+    names = {
+        "model": model,
+        "data": model.createData(),
+        "frame": model.getFrameId(frame),
+        "aligned": pin.LOCAL_WORLD_ALIGNED,
+        "jacobian": pin.computeFrameJacobian,
+        "forward": pin.forwardKinematics,
+        "acceleration": pin.getFrameClassicalAcceleration,
+    }
+    if quantity == "jacobian":
+        return Calls(LOOP, names, ("jacobian(model, data, q, frame, aligned)",))
+    forward, get = "forward(model, data, q, v, a)", "acceleration(model, data, frame, aligned)"
+    return Calls(
+        LOOP,
+        names,
+        (forward, get),
+        store=(forward, f"out[k] = {get}.vector"),
+        read_one=lambda motion: np.array(motion.vector),
+    )
+
+
+def oracle_calls(subject: Subject, quantity: str) -> Calls:
+    """What a check of urdfkin asks Pinocchio: `computeJointJacobians` and `getFrameJacobian`, or as above."""
+    usual = pinocchio_calls(subject.urdf, subject.frame, quantity)
+    if quantity == "acceleration":
+        return usual
+    names = {**usual.names, "compute": pin.computeJointJacobians, "get": pin.getFrameJacobian}
+    return Calls(LOOP, names, ("compute(model, data, q)", "get(model, data, frame, aligned)"))
+
+
+def _pinocchio(subject: Subject, quantity: str) -> Iterator[Calls]:
+    yield pinocchio_calls(subject.urdf, subject.frame, quantity)
+
+
+def _pinocchio_batches(subject: Subject, quantity: str) -> Iterator[Work]:
+    yield pinocchio_calls(subject.urdf, subject.frame, quantity).batch(subject, quantity)
+    yield _in_processes(subject, quantity)
+
+
+#: A worker's own: the loop of each quantity, and the arrays it reads and writes.
+_here: dict[str, Any] = {}
+
+
+def _in_processes(subject: Subject, quantity: str) -> Work:
+    """The batch spread over processes that were started before, in memory that all of them see."""
+    spawn: Any = multiprocessing.get_context("spawn")
+    buffers, arrays = [], []
+    for x in (*subject.inputs(quantity, subject.n), np.zeros((subject.n, *subject.width(quantity)))):
+        buffer = spawn.RawArray("d", x.size)
+        buffers.append((buffer, x.shape))
+        arrays.append(_array(buffer, x.shape))
+        arrays[-1][...] = x
+    pool = subject.stack.enter_context(
+        ProcessPoolExecutor(PROCESSORS, spawn, _start, (subject.urdf, subject.frame, quantity, buffers))
+    )
+    edges = [subject.n * i // PROCESSORS for i in range(PROCESSORS + 1)]
+
+    def compute() -> None:
+        for done in [pool.submit(_share, *edges[i : i + 2]) for i in range(PROCESSORS)]:
+            done.result()
+
+    return Work(PROCESSES, subject.n, compute, lambda: arrays[-1])
+
+
+def _array(buffer: Any, shape: Sequence[int]) -> FloatArray:
+    return np.frombuffer(buffer).reshape(shape)
+
+
+def _start(urdf: str, frame: str, quantity: str, buffers: Sequence[tuple[Any, tuple[int, ...]]]) -> None:
+    """In a worker: make a model and find the memory."""
+    if quantity not in QUANTITIES:
+        raise ValueError(quantity)
+    _here["loop"] = pinocchio_calls(urdf, frame, quantity).loop()
+    _here["arrays"] = [_array(*buffer) for buffer in buffers]
+
+
+def _share(start: int, stop: int) -> None:
+    """In a worker: a share of the batch."""
+    *inputs, out = (x[start:stop] for x in _here["arrays"])
+    _here["loop"](out, *inputs)
+
+
+# -- everyone --------------------------------------------------------------------------------------------
+
+#: What must be there: what the benchmark is about.
+ALWAYS = (
+    Contender("urdfkin", "urdfkin", urdfkin_calls, urdfkin_batches),
+    Contender("pin", "pinocchio", _pinocchio, _pinocchio_batches),
+)
+PEERS = (
+    Contender("casadi", "casadi", batches=generated.batches, program=generated.COMPILER),
+    Contender("dynibo", "dynibo", peers.dynibo),
+    Contender("mujoco", "mujoco", peers.mujoco),
+    Contender("drake", "pydrake", peers.drake),
+    Contender("roboticstoolbox-python", "roboticstoolbox", peers.toolbox),
+    Contender("pytorch-kinematics", "pytorch_kinematics", batches=peers.torch),
+    Contender("jax", "jax", batches=peers.jax),
+)

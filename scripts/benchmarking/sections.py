@@ -1,0 +1,142 @@
+"""What is measured: each section of the benchmark as rows of figures.
+
+Results are compared before anything is timed: every generator here raises `DifferenceError` where contenders
+disagree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from scripts.benchmarking.contenders import (
+    FLOOR,
+    LOOP,
+    ONE,
+    PROCESSES,
+    Contender,
+    oracle_calls,
+    pinocchio_calls,
+    urdfkin_batches,
+)
+from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, chain_urdf
+from scripts.benchmarking.timing import Row, Table, Work, agree, measure
+from urdfkin.tree import FloatArray
+
+#: Pinocchio's own part of a check.
+OWN = "Pinocchio's own calls, Python loop"
+FEWEST = "Pinocchio, computeFrameJacobian, Python loop"
+ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other"
+
+
+def batch_rows(n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
+    """Everyone's Jacobians and accelerations of the same configurations, beside Pinocchio's Python loop."""
+    for subject, quantity, table in _contests("batch", n):
+        works = [work for contender in contenders for work in contender.works(subject, quantity)]
+        named = {work.who: work for work in works}
+        # The processes compute the whole batch, so that every row of everyone's result is held.
+        agree(works, named[PROCESSES], f"{subject.name}, {quantity}")
+        yield from measure(table, works, rounds, named[LOOP])
+
+
+def single_rows(n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
+    """Single calls from Python, all overhead included, beside Pinocchio's calls."""
+    for subject, quantity, table in _contests("single", n):
+        calls = [one for contender in contenders for one in contender.singles(subject, quantity)]
+        works = [one.single(subject, quantity) for one in calls]
+        reference = pinocchio_calls(subject.urdf, subject.frame, quantity)
+        agree(works, reference.batch(subject, quantity), f"{subject.name}, single {quantity}")
+        yield from measure(table, works, rounds, next(work for work in works if work.who == LOOP))
+
+
+def verified_rows(n: int, rounds: int) -> Iterator[Row]:
+    """What it costs to have every result, or a sample, checked, beside the calls that a check makes."""
+    for subject, quantity, table in _contests("verified", n):
+        own = replace(oracle_calls(subject, quantity).batch(subject, quantity), who=OWN)
+        works = [*(_verified(subject, quantity, verify) for verify in (True, "sample", False)), own]
+        if quantity == "jacobian":
+            fewest = pinocchio_calls(subject.urdf, subject.frame, quantity).batch(subject, quantity)
+            works.append(replace(fewest, who=FEWEST))
+        agree(works, own, f"{subject.name}, verified {quantity}")
+        yield from measure(table, works, rounds, own)
+
+
+def _verified(subject: Subject, quantity: str, verify: bool | str) -> Work:
+    method, inputs = getattr(subject.robot, quantity), subject.inputs(quantity, subject.loop)
+    out = np.empty((subject.loop, *subject.width(quantity)))
+
+    def compute() -> object:
+        return method(*inputs, subject.frame, out=out, verify=verify)
+
+    return Work(f"urdfkin, verify={verify!r}", subject.loop, compute, lambda: out)
+
+
+def _contests(section: str, n: int) -> Iterator[tuple[Subject, str, Table]]:
+    """Each subject and quantity, and what their rows share."""
+    for source in SUBJECTS:
+        with Subject(*source, n) as subject:
+            for quantity in QUANTITIES:
+                yield subject, quantity, _table(section, subject, quantity)
+
+
+def _table(section: str, subject: Subject, quantity: str, size: int = 0) -> Table:
+    return Table(section, subject.name, quantity, subject.numbers(quantity), size)
+
+
+# -- how cost grows --------------------------------------------------------------------------------------
+
+
+def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
+    """With the joints of a chain: the tip's Jacobian and acceleration, one thread.
+
+    Batches are cut so that each writes `numbers` numbers of Jacobian: memory is as far away for everyone.
+    """
+    for size in joints:
+        n = max(numbers // (6 * size), 16)
+        with Subject(chain_urdf(size), TIP, n, name=f"chain of {size}") as subject:
+            yield from _growth("joints", subject, size, rounds)
+
+
+def size_rows(sizes: Sequence[int], rounds: int) -> Iterator[Row]:
+    """With the configurations of a batch: the first subject, one thread, `out=` given."""
+    for size in sizes:
+        with Subject(*SUBJECTS[0], size) as subject:
+            yield from _growth("sizes", subject, size, rounds)
+
+
+def _growth(section: str, subject: Subject, size: int, rounds: int) -> Iterator[Row]:
+    for quantity in QUANTITIES:
+        works = [work for work in urdfkin_batches(subject, quantity) if work.who in (ONE, FLOOR)]
+        pinocchio = pinocchio_calls(subject.urdf, subject.frame, quantity).batch(subject, quantity)
+        works += [pinocchio] * (section == "joints")
+        agree(works, pinocchio, f"{subject.name}, {quantity}, {size} {section}")
+        baseline = pinocchio if section == "joints" else None
+        yield from measure(_table(section, subject, quantity, size), works, rounds, baseline)
+
+
+def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
+    """With the frames of the humanoid: placements of links all over it in one pass, and one call for each."""
+    with Subject(*SUBJECTS[-1], n) as subject:
+        links = subject.robot.link_names
+        for count in sorted({min(count, len(links)) for count in counts}):
+            frames = [f"link:{links[i]}" for i in np.linspace(0, len(links) - 1, count).astype(int)]
+            works = _frame_works(subject, frames)
+            agree(works, works[1], f"{subject.name}, {count} placements")
+            table = Table("frames", subject.name, "placement", 16 * count, count)
+            yield from measure(table, works, rounds, works[1])
+
+
+def _frame_works(subject: Subject, frames: Sequence[str]) -> list[Work]:
+    robot, q, n = subject.robot, subject.q, subject.n
+    out, every = np.empty((len(frames), n, 4, 4)), np.empty((n, len(frames), 4, 4))
+
+    def together() -> FloatArray:
+        return robot.placements(q, frames, out=every, threads=1, verify=False)
+
+    def apart() -> None:
+        for k, frame in enumerate(frames):
+            robot.placement(q, frame, out=out[k], threads=1, verify=False)
+
+    return [Work(ONE_PASS, n, together, together), Work(ONE_BY_ONE, n, apart, lambda: out.swapaxes(0, 1))]

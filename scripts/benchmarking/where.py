@@ -1,0 +1,185 @@
+"""Where the time goes: a batch's parts and a single call's, each measured by leaving it out.
+
+A walk is a program of a few instructions (`urdfkin.recursion.program`), so that a part is left out by leaving
+its instructions out: what the whole takes longer is what the part takes. A single call is taken apart from
+outside: an empty function of Python's, an empty kernel that Numba calls with the same arrays, and so on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from scripts.benchmarking.calls import Calls
+from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
+from scripts.benchmarking.timing import Work, times
+from urdfkin.recursion import cores
+from urdfkin.recursion.compiling import BOUND, NUMBERS, compiling_allowed, jitted, output
+from urdfkin.recursion.program import WIDTH, Head, Op, Program, program_of
+from urdfkin.recursion.single import single
+from urdfkin.recursion.task import Task, scratch
+from urdfkin.reference import Reference
+from urdfkin.tree import FloatArray
+
+#: The parts of a batch, in the order in which they come to what came before: the instructions of each.
+PARTS: Mapping[str, frozenset[Op]] = {
+    "reading inputs": frozenset(),
+    "sines and cosines": frozenset(),
+    "the walk": frozenset(Op) - {Op.END, Op.KEEP, Op.COLUMN, Op.EMIT},
+    "columns": frozenset((Op.KEEP, Op.COLUMN)),
+    "writing results": frozenset((Op.EMIT,)),
+}
+
+
+def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
+    """What each part of a batch takes, ns for one configuration, one thread."""
+    for subject, quantity in _subjects(n):
+        program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
+        works = [_core(subject, quantity, cut(program, end), part) for end, part in enumerate(PARTS, start=1)]
+        if quantity == "acceleration":
+            works = [work for work in works if work.who != "columns"]  # it has none
+        found = _times(works, rounds)
+        before, parts = np.zeros(rounds), {}
+        for who, taken in found.items():
+            parts[who], before = taken - before, taken
+        yield _entry("batch", subject, quantity, parts, before)
+
+
+def cut(program: Program, parts: int) -> Program:
+    """The first so many parts of a program."""
+    ops = frozenset[Op]().union(*list(PARTS.values())[:parts])
+    words = program.words.copy()
+    code = words[words[Head.CODE] :].reshape(-1, WIDTH)
+    chosen = [line for line in code if Op(line[0]) in ops]
+    end = np.zeros((1, WIDTH), dtype=np.int64)  # Op.END
+    words = np.concatenate([words[: words[Head.CODE]], *chosen, *end])
+    if parts < 2:
+        words[Head.ANGLES_END] = words[Head.ANGLES]
+    return replace(program, words=words)
+
+
+def _core(subject: Subject, quantity: str, program: Program, who: str) -> Work:
+    """A core at work on a whole batch."""
+    inputs = subject.inputs(quantity, subject.n)
+    out, memory = np.empty((subject.n, *subject.width(quantity))), scratch(program)
+    task = np.zeros(len(Task), dtype=np.int64)
+    task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
+    task[Task.SCRATCH], task[Task.OUT] = memory.ctypes.data, out.ctypes.data
+    task[Task.REFERENCE], task[Task.N] = Reference.LOCAL_WORLD_ALIGNED, subject.n
+    for place, x in zip((Task.Q, Task.V, Task.A), inputs, strict=False):
+        task[place] = x.ctypes.data
+    core = getattr(cores, f"{quantity}s")
+    kept = program, memory, out, inputs  # what the task holds addresses of
+
+    def compute(_: object = kept) -> None:
+        core(task.ctypes.data)
+
+    compute()
+    return Work(who, subject.n, compute)
+
+
+# -- single calls ----------------------------------------------------------------------------------------
+
+
+def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
+    """What each part of a single call of a prepared frame, and of the robot's method, takes, ns."""
+    for subject, quantity in _subjects(n):
+        calls = list(_calls(subject, quantity))
+        works = [call.single(subject, quantity) for call in calls]
+        for work in works:
+            work.compute()
+        loop, function, empty, array, kernel, prepared, method = _times(works, rounds).values()
+        parts = {
+            "Python's call": function - loop,
+            "Numba's, an empty kernel": empty - loop,
+            "the walk": kernel - empty,
+            "prepared, beside these": prepared - kernel - (function - loop),
+            "NumPy's new array": array - loop,
+            "the robot's method, beside all that": method - prepared - (array - loop),
+        }
+        yield _entry("single", subject, quantity, parts, method - loop)
+
+
+def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
+    q_v_a = "q" if quantity == "jacobian" else "q, v, a"
+    made = single(quantity, subject.plan, Reference.LOCAL_WORLD_ALIGNED)
+    names = {
+        "robot": subject.robot,
+        "fast": subject.robot.prepare(subject.frame),
+        "frame": subject.frame,
+        "function": _function(quantity),
+        "nothing": _empty_kernel(quantity),
+        "kernel": made.kernel,
+        "task": made.task,
+        "kept": made.kept,
+        "empty": np.empty,
+        "shape": subject.width(quantity),
+        "out": np.empty(subject.width(quantity)),
+    }
+    for line in (
+        "q",  # an empty loop
+        f"function({q_v_a}, out=out)",
+        f"nothing(task, {q_v_a}, out)",
+        "empty(shape)",
+        f"kernel(task, {q_v_a}, out)",
+        f"fast.{quantity}({q_v_a}, out=out)",
+        f"robot.{quantity}({q_v_a}, frame, verify=False)",
+    ):
+        yield Calls(line, names, (line,))
+
+
+def _function(quantity: str) -> Callable[..., object]:
+    """A method that does nothing, called as a prepared frame's is."""
+
+    class Empty:
+        def jacobian(self, q: object, out: object = None) -> object:
+            return out
+
+        def acceleration(self, q: object, v: object, a: object, out: object = None) -> object:
+            return out
+
+    method: Callable[..., object] = getattr(Empty(), quantity)
+    return method
+
+
+def _empty_kernel(quantity: str) -> Any:
+    """A kernel that takes what the real one takes and does nothing."""
+
+    def matrix(bound: object, q: object, out: object) -> int:
+        return 1
+
+    def six(bound: object, q: object, v: object, a: object, out: object) -> int:
+        return 1
+
+    columns = quantity == "jacobian"
+    kernel = jitted()(matrix if columns else six)
+    with compiling_allowed():
+        kernel.compile((BOUND, NUMBERS, output(2)) if columns else (BOUND, *[NUMBERS] * 3, output(1)))
+    kernel.disable_compile()
+    return kernel
+
+
+# -- both ------------------------------------------------------------------------------------------------
+
+
+def _subjects(n: int) -> Iterator[tuple[Subject, str]]:
+    for source in SUBJECTS:
+        with Subject(*source, n) as subject:
+            for quantity in QUANTITIES:
+                yield subject, quantity
+
+
+def _times(works: list[Work], rounds: int) -> dict[str, FloatArray]:
+    return {who: np.array(values) for who, values in times(works, rounds).items()}
+
+
+def _entry(
+    kind: str, subject: Subject, quantity: str, parts: Mapping[str, FloatArray], total: FloatArray
+) -> dict[str, Any]:
+    """Medians over the rounds; differences are taken within a round, which slows or quickens both alike."""
+    medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
+    ns = round(float(np.median(total)), 2)
+    return {"kind": kind, "robot": subject.name, "quantity": quantity, "ns": ns, "parts": medians}
