@@ -1,0 +1,237 @@
+"""Whether results are the same to the last bit: single and in a batch, and before and after a change.
+
+    python scripts/check_bits.py [ROBOT ...]           # single = prepared = row of a batch = one of frames
+    python scripts/check_bits.py --write before.npz    # and keep the results
+    python scripts/check_bits.py --against before.npz  # and hold them against those that were kept
+
+Every robot of the catalogue, every quantity, all three references. The fusing of products and sums is written
+out and sine and cosine are urdfkin's own, so that digests are the same on every machine. Where results differ
+from the kept ones, the largest difference is told as a share of the bound that they were then held against.
+Exit 1 where a bit differs that should not, or, with `--within SHARE`, where a result differs by more.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import sys
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+
+import urdfkin
+from urdfkin.call import Call
+from urdfkin.catalogue import catalogue
+from urdfkin.checks import bound_of
+from urdfkin.reference import Reference
+from urdfkin.robot import Robot
+from urdfkin.tree import FloatArray
+from urdfkin.verification.bounds import EPS, Quantity
+
+#: What is computed, and how many of q, v, a it takes.
+QUANTITIES = {
+    Quantity.PLACEMENT: 1,
+    Quantity.VELOCITY: 2,
+    Quantity.JACOBIAN: 1,
+    Quantity.JACOBIAN_RATE: 2,
+    Quantity.ACCELERATION: 3,
+}
+#: Lengths of batches: less than a block of eight, one, more, and many with a rest.
+LENGTHS = (1, 2, 7, 8, 9, 100)
+#: How many threads a batch is spread over; None: as many as urdfkin takes.
+THREADS = (None, 1, 2, 3)
+#: How many configurations, of how many frames, are kept.
+KEPT, FRAMES = 9, 6
+
+Arrays = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A robot, its inputs and frames: the tip, and some all over it."""
+
+    name: str
+    robot: Robot
+    inputs: tuple[FloatArray, ...]
+    frames: tuple[str, ...]
+
+    @classmethod
+    def of(cls, name: str, kept: Arrays | None = None) -> Subject:
+        """With the inputs and frames of a file, or with new ones."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what is said of a file is another program's business
+            robot = urdfkin.load(name, mimic=catalogue()[name].mimic, verify=False)
+        if kept is not None:
+            inputs = tuple(kept[f"{name}/{x}"] for x in "qva")
+            return cls(name, robot, inputs, tuple(kept[f"{name}/frames"].tolist()))
+        n = max(LENGTHS)
+        v, a = np.random.default_rng(0).standard_normal((2, n, robot.nv))
+        links = [f"link:{robot.link_names[i]}" for i in spread(len(robot.link_names))]
+        return cls(name, robot, (robot.sample(n), v, a), (robot.tip_frame, *links))
+
+    def results(self) -> Iterator[tuple[str, Quantity, Reference, tuple[FloatArray, ...]]]:
+        """(what, quantity, reference, the inputs that it takes)."""
+        for quantity, count in QUANTITIES.items():
+            for reference in Reference if quantity is not Quantity.PLACEMENT else (_ALIGNED,):
+                yield f"{self.name}/{quantity}/{reference.name}", quantity, reference, self.inputs[:count]
+
+
+_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+
+
+def spread(count: int) -> list[int]:
+    """At most `FRAMES` - 1 of so many, from the first to the last."""
+    return sorted({int(i) for i in np.linspace(0, count - 1, FRAMES - 1)})
+
+
+def computed(
+    subject: Subject, quantity: Quantity, reference: Reference, frame: str, inputs: Sequence[Any], **how: Any
+) -> FloatArray:
+    """A method's result."""
+    words = (frame,) if quantity is Quantity.PLACEMENT else (frame, reference)
+    method = getattr(subject.robot, quantity.replace(" ", "_"))
+    result: FloatArray = method(*inputs, *words, verify=False, **how)
+    return result
+
+
+def same(x: FloatArray, y: FloatArray) -> bool:
+    """To the last bit: 0 and -0 are not."""
+    return x.shape == y.shape and x.tobytes() == y.tobytes()
+
+
+# -- single, prepared and in a batch ---------------------------------------------------------------------
+
+
+def differing(subject: Subject) -> Iterator[str]:
+    """What is not the same as the single calls, in words."""
+    frame = subject.frames[0]
+    for what, quantity, reference, inputs in subject.results():
+        rows = list(zip(*inputs, strict=True))
+        single = np.stack([computed(subject, quantity, reference, frame, row) for row in rows])
+        if not np.isfinite(single).all():
+            yield f"{what}: not finite"
+        fast = getattr(subject.robot.prepare(frame, reference), quantity, None)
+        if fast is not None:
+            out = np.empty_like(single)
+            for row, place in zip(rows, out, strict=True):
+                fast(*row, out=place)
+            if not same(single, out):
+                yield f"{what}: prepared"
+        for n in LENGTHS:
+            for first in {0, min(5, len(rows) - n)}:
+                part = [x[first : first + n] for x in inputs]
+                for threads in THREADS:
+                    batch = computed(subject, quantity, reference, frame, part, threads=threads)
+                    for k in range(n):
+                        if not same(batch[k], single[first + k]):
+                            yield f"{what}: row {k} of {n} from {first} on, threads={threads}"
+
+
+#: What computes a quantity of several frames in one pass.
+_IN_ONE_PASS = {
+    Quantity.PLACEMENT: "placements",
+    Quantity.VELOCITY: "velocities",
+    Quantity.JACOBIAN: "jacobians",
+    Quantity.ACCELERATION: "accelerations",
+}
+
+
+def differing_in_one_pass(subject: Subject, now: Arrays) -> Iterator[str]:
+    """What is not the same for several frames in one pass as for one after the other."""
+    for what, quantity, reference, inputs in subject.results():
+        if quantity in _IN_ONE_PASS:
+            words = (subject.frames,) if quantity is Quantity.PLACEMENT else (subject.frames, reference)
+            method = getattr(subject.robot, _IN_ONE_PASS[quantity])
+            if not same(method(*(x[:KEPT] for x in inputs), *words, verify=False), now[what]):
+                yield f"{what}: several frames in one pass"
+
+
+# -- before and after ------------------------------------------------------------------------------------
+
+
+def to_keep(subject: Subject) -> dict[str, Any]:
+    """Inputs, frames, and each result with the bound that it is held against."""
+    kept: dict[str, Any] = {
+        f"{subject.name}/{x}": array for x, array in zip("qva", subject.inputs, strict=True)
+    }
+    kept[f"{subject.name}/frames"] = np.array(subject.frames)
+    for what, quantity, reference, inputs in subject.results():
+        few = [x[:KEPT] for x in inputs]
+        parts = [computed(subject, quantity, reference, frame, few) for frame in subject.frames]
+        kept[what] = results = np.stack(parts, axis=1)
+        call = Call(subject.robot, subject.frames, reference, None, *few)
+        bound = bound_of(quantity, call.part(slice(0, KEPT)))
+        kept[f"{what}/bound"] = np.broadcast_to(EPS * bound.k * bound.scale, results.shape).astype(np.float32)
+    return kept
+
+
+def digest(now: Arrays) -> str:
+    """Of every result: the same on every machine."""
+    whole = hashlib.sha256()
+    for what in sorted(now):
+        if what.count("/") == 2:
+            whole.update(what.encode() + np.ascontiguousarray(now[what]).tobytes())
+    return whole.hexdigest()[:16]
+
+
+def share(what: str, now: Arrays, kept: Arrays) -> float:
+    """How far a result lies from the kept one, as a share of the kept bound; 0 where all bits are equal."""
+    if same(now[what], kept[what]):
+        return 0.0
+    apart = np.abs(now[what] - kept[what])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(apart == 0.0, 0.0, apart / kept[f"{what}/bound"])
+    # Other bits and no difference: a zero has another sign.
+    return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
+
+
+def compared(name: str, now: Arrays, kept: Arrays) -> tuple[str, float]:
+    """A robot's results beside the kept ones: in words, and the largest share."""
+    shares = {what: share(what, now, kept) for what in now if what.count("/") == 2}
+    others = {what: x for what, x in shares.items() if x}
+    if not others:
+        return "equal", 0.0
+    worst = max(others, key=lambda what: others[what])
+    where = worst.removeprefix(f"{name}/")
+    return (
+        f"{len(others)} of {len(shares)} differ, by at most {others[worst]:.2g} of the bound ({where})",
+        others[worst],
+    )
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Exit 1 where something differs that should not."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("robots", nargs="*", help="names of the catalogue; none: all of them")
+    parser.add_argument("--write", type=Path, help="keep the results in this file (.npz)")
+    parser.add_argument("--against", type=Path, help="hold the results against those in this file")
+    parser.add_argument(
+        "--within", type=float, default=0.0, help="a share of the bound that they may differ by"
+    )
+    given = parser.parse_args(words)
+    before = None if given.against is None else np.load(given.against)
+    known = catalogue() if before is None else dict.fromkeys(name.partition("/")[0] for name in before)
+    everything: dict[str, Any] = {}
+    wrong = 0
+    for name in given.robots or known:
+        subject = Subject.of(name, before)
+        now = to_keep(subject)
+        found = [*differing(subject), *differing_in_one_pass(subject, now)]
+        everything |= now
+        said, most = ("", 0.0) if before is None else compared(name, now, before)
+        print(f"{name:28} {digest(now)} {said}", *found[:3], sep="\n    " if found else " ", flush=True)
+        wrong += bool(found) or most > given.within
+    print(f"{'all of them':28} {digest(everything)} {wrong} wrong")
+    if given.write is not None:
+        np.savez_compressed(given.write, **everything)
+    return int(wrong > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,69 @@
+"""The program that compares results to the last bit finds a bit that differs, wherever it is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scripts import check_bits
+from urdfkin.robot import Robot
+from urdfkin.tree import FloatArray
+
+ROBOTS = ("polar", "planar_two_link")
+
+
+def last_bit_changed(x: FloatArray) -> FloatArray:
+    return x * (1.0 + 2.0**-52)
+
+
+def test_results_are_equal_single_in_batches_and_to_those_that_were_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "kept.npz"
+    assert check_bits.main([*ROBOTS, "--write", str(file)]) == 0
+    first = capsys.readouterr().out.splitlines()
+    assert check_bits.main(["--against", str(file)]) == 0
+    again = capsys.readouterr().out.splitlines()
+    assert [line.split()[:2] for line in again[:2]] == [line.split()[:2] for line in first[:2]]
+    assert [line.split()[2:] for line in again[:2]] == [["equal"], ["equal"]]
+
+
+def test_a_row_of_a_batch_that_differs_in_its_last_bit_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    right = Robot.velocity
+
+    def wrong(self: Robot, q: FloatArray, *arguments: object, **how: object) -> FloatArray:
+        result = right(self, q, *arguments, **how)  # type: ignore[arg-type]
+        if len(result) == 7:
+            result[3] = last_bit_changed(result[3])
+        return result
+
+    monkeypatch.setattr(Robot, "velocity", wrong)
+    assert check_bits.main(["polar"]) == 1
+    assert "polar/velocity/LOCAL: row 3 of 7 from 0 on" in capsys.readouterr().out
+
+
+def test_a_change_is_told_as_a_share_of_the_bound_and_allowed_within_what_is_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "kept.npz"
+    assert check_bits.main(["polar", "--write", str(file)]) == 0
+    right = Robot.jacobian_rate
+
+    def other(self: Robot, *arguments: object, **how: object) -> FloatArray:
+        return last_bit_changed(right(self, *arguments, **how))  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Robot, "jacobian_rate", other)
+    capsys.readouterr()
+    assert check_bits.main(["--against", str(file)]) == 1
+    said = capsys.readouterr().out
+    assert "3 of 13 differ, by at most 0." in said
+    assert check_bits.main(["--against", str(file), "--within", "1"]) == 0
+
+
+def test_a_zero_of_the_other_sign_is_another_bit_and_no_difference() -> None:
+    kept = {"r/x/LOCAL": np.zeros(1), "r/x/LOCAL/bound": np.zeros(1)}
+    assert check_bits.share("r/x/LOCAL", {"r/x/LOCAL": np.zeros(1)}, kept) == 0.0
+    assert 0.0 < check_bits.share("r/x/LOCAL", {"r/x/LOCAL": -np.zeros(1)}, kept) < 1e-300
+    assert check_bits.share("r/x/LOCAL", {"r/x/LOCAL": np.full(1, 1e-300)}, kept) == np.inf
