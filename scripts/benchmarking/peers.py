@@ -141,8 +141,10 @@ def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
 
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModelsFromString(subject.urdf, "urdf")
+    joints = ET.fromstring(subject.urdf).findall("joint")
+    (root,) = {_link(x, "parent") for x in joints} - {_link(x, "child") for x in joints}
     world = plant.world_frame()
-    plant.WeldFrames(world, plant.GetFrameByName(subject.robot.link_names[0]))
+    plant.WeldFrames(world, plant.GetFrameByName(root))
     plant.Finalize()
     starts = [plant.GetJointByName(name).velocity_start() for name in subject.robot.joint_names]
     frame = plant.GetFrameByName(subject.frame)

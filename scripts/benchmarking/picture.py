@@ -10,7 +10,7 @@ from typing import Any
 from urdfkin.figure import new_figure, save, style
 
 #: Okabe and Ito's colours, which differ for every kind of eye; then other libraries and the floor in greys.
-OURS, THEIRS, OTHERS, FLOOR = "#0072B2", "#D55E00", "#999999", "#CCCCCC"
+OURS, THEIRS, CEILING, OTHERS, FLOOR = "#0072B2", "#D55E00", "#009E73", "#999999", "#CCCCCC"
 MARKS = {"jacobian": ("o", "-"), "acceleration": ("s", "--")}
 TITLES = {"jacobian": "Jacobian", "acceleration": "acceleration"}
 
@@ -49,7 +49,7 @@ def _chosen(rows: Sequence[Entry], section: str, quantity: str) -> list[Entry]:
 
 
 def _colour(who: str) -> str:
-    kinds = {"urdfkin": OURS, "Pinocchio": THEIRS, "output": FLOOR}
+    kinds = {"urdfkin": OURS, "Pinocchio": THEIRS, "generated": CEILING, "output": FLOOR}
     return next((colour for word, colour in kinds.items() if who.startswith(word)), OTHERS)
 
 

@@ -112,7 +112,8 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
     """The links and joints of `urdf` and nothing else.
 
     Links get the same unit inertia, since some libraries refuse a link without one; no kinematics depends on
-    it. Mimic rules are dropped: everyone computes with the same free coordinates.
+    it. Mimic rules are dropped: everyone computes with the same free coordinates. A link that is called world
+    gets another name, since some libraries have a body of their own that is called so.
 
     Args:
         urdf: The text of a URDF.
@@ -129,6 +130,9 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
     for joint in whole.findall("joint"):
         copy = ET.SubElement(robot, "joint", joint.attrib)
         copy.extend(part for tag in _KEPT for part in joint.findall(tag))
+    for attribute in ("name", "link"):
+        for element in robot.iterfind(f".//*[@{attribute}='world']"):
+            element.set(attribute, "root")
     return ET.tostring(robot, encoding="unicode")
 
 
