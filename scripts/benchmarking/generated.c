@@ -63,7 +63,8 @@ INLINE v8 polynomial(v8 z, const double *coefficients, int count) {
     return value;
 }
 
-// Cody and Waite's reduction, fdlibm's polynomials, as in urdfkin/recursion/sine.py.
+// Cody and Waite's reduction and fdlibm's polynomials, as in urdfkin/recursion/sine.py, without what that does
+// to be right to the last digit.
 INLINE void sine_cosine(v8 x, v8 *sine, v8 *cosine) {
     const double no_fraction = 0x1.8p52, pi_2 = 0x1.921fb54442d18p0;
     v8 shifted = x * (1 / pi_2) + no_fraction, n = shifted - no_fraction;
