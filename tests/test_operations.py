@@ -14,8 +14,8 @@ def test_one_joint_about_z_at_the_origin_costs_what_one_counts_by_hand() -> None
       <parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>"""
     robot = urdfkin.load(text)
     plan = robot.plan([1])
-    # Sine and cosine 51. R Rz: three rows of two numbers, each two products and a sum: 18. The column: p - o 3
-    # and z x d 9, and nothing else.
+    # Sine and cosine 51. R Rz: three rows of two numbers, each two products and a sum: 18. The column: p - o
+    # 3 and z x d 9, and nothing else.
     assert operations(plan, "jacobian") == 51 + 18 + 12
     # w + v z: 6.
     assert operations(plan, "velocity") == 51 + 18 + 6

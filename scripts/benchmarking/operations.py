@@ -84,7 +84,7 @@ class _Walk:
     written: list[Any] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        x, zero, one = Number(), Number(0), Number(1)
+        x, zero, one, nothing = Number(), Number(0), Number(1), Number(nothing=True)
         triple = (x, x, x)
         self.names: dict[str, Any] = {
             "eq": bound(),
@@ -96,6 +96,7 @@ class _Walk:
             "_rate": lambda *_: x,
             "zero": lambda: zero,
             "one": lambda: one,
+            "nothing": lambda: nothing,
         }
         for module in (axes, walk, outputs):
             for name, value in vars(module).items():
@@ -113,19 +114,18 @@ def operations(plan: Plan, quantity: str) -> int:
     program, run = program_of(plan, turned=False, columns=columns), _Walk()
     words: list[int] = program.words.tolist()
     angles = (words[Head.ANGLES_END] - words[Head.ANGLES]) // 4
-    follow = {"jacobian": 2, "velocity": 4, "acceleration": 6}[quantity]
+    follow = {"jacobian": "place"}.get(quantity, quantity)
+    state = getattr(run.call, f"follow_{follow}")(run.state)
     total, at = angles * _SINE_COSINE, int(words[Head.CODE])
     while words[at] != Op.END:
-        total += _cost(run, words[at : at + WIDTH], quantity, follow)
+        total += _cost(run, words[at : at + WIDTH], quantity, state)
         at += WIDTH
     return total
 
 
-def _cost(run: _Walk, instruction: list[int], quantity: str, follow: int) -> int:
-    """What one instruction takes, of the parts of the state that the quantity follows."""
+def _cost(run: _Walk, instruction: list[int], quantity: str, state: tuple[Any, ...]) -> int:
+    """What one instruction takes, of what the quantity follows of a state."""
     op, row, _, how, c = instruction
-    nothing = 3 * (Number(nothing=True),)
-    state = tuple(part if i < follow else nothing for i, part in enumerate(run.state))
     run.written.clear()
     world = run.call.world_axes
     if op <= Op.TURN:

@@ -16,7 +16,7 @@ from urdfkin.recursion.outputs import (
     emit_matrix,
     emit_place,
     emit_velocity,
-    follow_everything,
+    follow_acceleration,
     follow_place,
     follow_velocity,
     keep_axis,
@@ -47,13 +47,13 @@ def local_velocities(task):
 @core
 def accelerations(task):
     """7.129, 7.130 in the world's axes."""
-    return walk(task, world_axes, 3, follow_everything, keep_none, column_none, emit_acceleration)
+    return walk(task, world_axes, 3, follow_acceleration, keep_none, column_none, emit_acceleration)
 
 
 @core
 def local_accelerations(task):
     """7.129, 7.130 in each frame's own axes."""
-    return walk(task, link_axes, 3, follow_everything, keep_none, column_none, emit_acceleration)
+    return walk(task, link_axes, 3, follow_acceleration, keep_none, column_none, emit_acceleration)
 
 
 @core
