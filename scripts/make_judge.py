@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import urdfkin
+from urdfkin.exact.vectors import DIGITS
 from urdfkin.judge import Judgement, Line, judge
-from urdfkin.judge.vectors import DIGITS
 from urdfkin.oracle import version
 
 PAGE = Path(__file__).parents[1] / "docs" / "judge.md"

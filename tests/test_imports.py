@@ -38,7 +38,8 @@ LAYERS = (
     ("catalogue", "sources", "origin", "deep_stack"),
     ("lint",),
     ("oracle_frames", "oracle_layout", "oracle_base", "oracle", "verification"),
-    ("asked", "checks", "call", "prepared", "manipulator", "tables", "robot"),
+    ("exact",),
+    ("asked", "checks", "call", "prepared", "manipulator", "tables", "enclosure", "robot"),
     ("loading", "from_table", "description", "unwrapping", "trajectory", "frame_motion"),
     ("judge", "validation"),
     ("plot", "report", "view"),
@@ -61,7 +62,7 @@ DOORS = {
     "viser": {"view"},
     "jinja2": {"report"},
     "xacrodoc": {"urdf"},
-    "mpmath": {"judge"},
+    "mpmath": {"exact"},
 }
 
 #: Those whose door is a single module.

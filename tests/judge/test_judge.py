@@ -7,10 +7,10 @@ import urdfkin
 from tests.high_precision import mp as independent
 from tests.high_precision import rate, second_rate
 from tests.text.robots import motion
+from urdfkin.exact import recursion as exact_recursion
+from urdfkin.exact.decimals import read_exact
+from urdfkin.exact.vectors import exact, mp
 from urdfkin.judge import Errors, Line, judge
-from urdfkin.judge import recursion as exact_recursion
-from urdfkin.judge.decimals import read_exact
-from urdfkin.judge.vectors import exact, mp
 from urdfkin.recursion import evaluate
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray

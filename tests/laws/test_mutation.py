@@ -12,7 +12,8 @@ import pytest
 import urdfkin
 from tests.laws.subjects import robot_of
 from tests.reading import tree_of
-from urdfkin.judge import judge, recursion
+from urdfkin.exact import recursion
+from urdfkin.judge import judge
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import VECTORS
 from urdfkin.oracle import Oracle

@@ -6,15 +6,15 @@ numbers can be set beside a report's.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from urdfkin.judge import recursion as exact_recursion
-from urdfkin.judge.decimals import ExactJoint, read_exact
-from urdfkin.judge.vectors import Number, exact
+from urdfkin.exact import recursion as exact_recursion
+from urdfkin.exact.decimals import ExactJoint, read_exact
+from urdfkin.exact.vectors import Number, exact
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.reference import Reference
@@ -131,7 +131,7 @@ class _Work:
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
         self.motions = self._motions(read_exact(robot.urdf, robot.tree))
 
-    def _motions(self, joints: Sequence[ExactJoint]) -> list[exact_recursion.Motion]:
+    def _motions(self, joints: Mapping[int, ExactJoint]) -> list[exact_recursion.Motion]:
         rows = zip(self.x.q, self.x.v, self.x.a, strict=True)
         return [
             exact_recursion.move(self.tree, joints, *([exact(number) for number in row] for row in triple))

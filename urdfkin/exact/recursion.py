@@ -7,11 +7,15 @@ a. It goes in the world's axes, as the text does.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
-from urdfkin.judge.decimals import ExactJoint
-from urdfkin.judge.vectors import (
+import numpy as np
+from numpy.typing import NDArray
+
+from urdfkin.exact.decimals import ExactJoint
+from urdfkin.exact.vectors import (
     IDENTITY,
     ZERO,
     Context,
@@ -19,12 +23,16 @@ from urdfkin.judge.vectors import (
     Number,
     Vector,
     about,
+    exact,
     from_quaternion,
     mp,
+    nearest_rotation,
 )
 from urdfkin.kinematics import equations as eq
+from urdfkin.oracle_base import BaseNumbers
 from urdfkin.reference import Reference
-from urdfkin.tree import JointKind, KinematicTree
+from urdfkin.tree import FloatArray, JointKind, KinematicTree
+from urdfkin.verification.bounds import Quantity
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +45,25 @@ class State:
     vel: Vector = ZERO
     alpha: Vector = ZERO
     acc: Vector = ZERO
+
+
+def on_base(
+    base: BaseNumbers, context: Context = mp, nearest: Callable[[Matrix], Matrix] = nearest_rotation
+) -> State:
+    """A root link that moves, from the numbers that its motion was given by.
+
+    Args:
+        base: (4, 4) placement, (6,) velocity and acceleration.
+        context: The kind of number.
+        nearest: What brings the placement's matrix, right to nine digits, to the rotation nearest to it.
+    """
+
+    def vector(x: FloatArray) -> Vector:
+        return exact(x[0], context), exact(x[1], context), exact(x[2], context)
+
+    T, six, six_2 = base.placement, base.velocity, base.acceleration
+    R = nearest((vector(T[0]), vector(T[1]), vector(T[2])))
+    return State(R, *map(vector, (T[:3, 3], six[3:], six[:3], six_2[3:], six_2[:3])))
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,22 +79,22 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """The whole robot at one instant.
+    """The robot at one instant.
 
     Attributes:
-        states: One for each link.
-        columns: For each link, the columns of its Jacobian.
+        states: By link.
+        columns: By link, the columns of its Jacobian.
         nv: Length of v.
     """
 
-    states: tuple[State, ...]
-    columns: tuple[tuple[Column, ...], ...]
+    states: Mapping[int, State]
+    columns: Mapping[int, tuple[Column, ...]]
     nv: int
 
 
 def move(
     tree: KinematicTree,
-    joints: Sequence[ExactJoint],
+    joints: Mapping[int, ExactJoint],
     q: Sequence[Number],
     v: Sequence[Number],
     a: Sequence[Number],
@@ -75,21 +102,22 @@ def move(
     base: State | None = None,
     context: Context = mp,
 ) -> Motion:
-    """The motion of every link for one configuration and its rates.
+    """The motion of the root, and of the link behind each joint, for one configuration and its rates.
 
     Args:
         tree: The robot.
-        joints: What the text says of each joint, in the context's numbers.
+        joints: What the text says of the joints that are wanted, with all before them, in the context's
+            numbers.
         q: Coordinates, likewise.
         v: Rates.
         a: Rates of the rates.
         base: How the root link moves; None where it stands at the world's origin.
         context: The kind of number.
     """
-    states: list[State] = [base or State()]
-    columns: list[tuple[Column, ...]] = [()]
-    for i, joint in enumerate(tree.joints):
-        own, at, rate_at = joints[i], tree.q_index[i], tree.v_index[i]
+    states = {0: base or State()}
+    columns: dict[int, tuple[Column, ...]] = {0: ()}
+    for i, own in joints.items():
+        joint, at, rate_at = tree.joints[i], tree.q_index[i], tree.v_index[i]
         parent = states[joint.parent]
         placed = replace(_carried(parent, eq.rotate(parent.R, own.p)), R=eq.product(parent.R, own.R))
         kind = joint.kind
@@ -108,9 +136,8 @@ def move(
         else:
             moved = _moved_freely(placed, kind, (q[at:], v[rate_at:], a[rate_at:]), context)
             new = _free_columns(moved, kind, rate_at)
-        states.append(moved)
-        columns.append((*columns[joint.parent], *new))
-    return Motion(tuple(states), tuple(columns), tree.nv)
+        states[i + 1], columns[i + 1] = moved, (*columns[joint.parent], *new)
+    return Motion(states, columns, tree.nv)
 
 
 def _carried(s: State, d: Vector) -> State:
@@ -166,6 +193,23 @@ def _free_columns(moved: State, kind: JointKind, at: int) -> tuple[Column, ...]:
 # -- what is asked of a frame ------------------------------------------------------------------------
 
 Six = tuple[Number, ...]
+
+
+def values(motion: Motion, link: int, quantity: Quantity, reference: Reference) -> NDArray[np.object_]:
+    """The numbers of one quantity of one link, in the shape in which `Robot` hands them out."""
+    s = motion.states[link]
+    if quantity is Quantity.PLACEMENT:
+        return _array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
+    if quantity is Quantity.VELOCITY:
+        return _array(velocity(s, reference))
+    if quantity is Quantity.ACCELERATION:
+        return _array(acceleration(s, reference))
+    columns = jacobian if quantity is Quantity.JACOBIAN else jacobian_rate
+    return _array(columns(motion, link, reference)).reshape(motion.nv, 6).T
+
+
+def _array(numbers: Sequence[Any]) -> NDArray[np.object_]:
+    return np.array(numbers, dtype=object)
 
 
 def velocity(s: State, reference: Reference) -> Six:

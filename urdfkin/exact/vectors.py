@@ -1,6 +1,6 @@
 """Numbers of many digits, intervals, and the rotations that are made of angles; vectors are triples of them.
 
-A context of mpmath is the kind of number: `mp` for fifty digits, `iv` for intervals that hold the true value.
+The kind of number is a context: `mp` of mpmath's for fifty digits, `urdfkin.exact.intervals` for intervals.
 """
 
 from __future__ import annotations
@@ -8,20 +8,15 @@ from __future__ import annotations
 from typing import Any
 
 import mpmath
-from mpmath.ctx_iv import MPIntervalContext
 
 from urdfkin.kinematics import equations as eq
 
 #: Digits of the judge's arithmetic. Doubles have 16; fifty leave no doubt about the last of them.
 DIGITS = 50
-#: Digits of the ends of intervals: what is lost on the way from link to link is lost behind a double's.
-INTERVAL_DIGITS = 30
 
-#: Contexts of our own: mpmath's global ones stay as their user set them.
+#: A context of our own: mpmath's global one stays as its user set it.
 mp = mpmath.mp.clone()
 mp.dps = DIGITS
-iv = MPIntervalContext()
-iv.dps = INTERVAL_DIGITS
 
 Context = Any
 Number = Any
@@ -46,7 +41,7 @@ def unit(x: Vector, context: Context) -> Vector:
 
 def about(axis: Vector, angle: Number, context: Context) -> Matrix:
     """R_k(phi), 7.28, for a unit axis."""
-    c, s = context.cos(angle), context.sin(angle)
+    c, s = context.cos_sin(angle)
     columns = (
         eq.plus(
             eq.plus(eq.times(c, e), eq.times((1 - c) * eq.dot(axis, e), axis)), eq.times(s, eq.cross(axis, e))
@@ -59,7 +54,7 @@ def about(axis: Vector, angle: Number, context: Context) -> Matrix:
 
 def from_rpy(rpy: Vector, context: Context) -> Matrix:
     """Rz(yaw) Ry(pitch) Rx(roll)."""
-    x, y, z = ((context.sin(angle), context.cos(angle), 0, 1) for angle in rpy)
+    x, y, z = ((sine, cosine, 0, 1) for cosine, sine in map(context.cos_sin, rpy))
     found: Matrix = eq.product(eq.product(eq.about_z(*z), eq.about_y(*y)), eq.about_x(*x))
     return found
 
@@ -76,12 +71,16 @@ def nearest_rotation(M: Matrix) -> Matrix:
 
     Newton's method, X - X (X^T X - I)/2, which doubles the digits with each step.
     """
-    X: Any = M
     for _ in range(6):
-        defect = tuple(
-            eq.minus(row, e) for row, e in zip(eq.product(eq.transposed(X), X), IDENTITY, strict=True)
+        x, y, z = (
+            eq.minus(row, eq.times(0.5, step)) for row, step in zip(M, eq.product(M, defect(M)), strict=True)
         )
-        step = eq.product(X, defect)
-        X = tuple(tuple(x - s / 2 for x, s in zip(*rows, strict=True)) for rows in zip(X, step, strict=True))
-    nearest: Matrix = X
-    return nearest
+        M = x, y, z
+    return M
+
+
+def defect(M: Matrix) -> Matrix:
+    """M^T M - I, which is nothing for a rotation."""
+    gram = eq.product(eq.transposed(M), M)
+    x, y, z = (eq.minus(row, unit) for row, unit in zip(gram, IDENTITY, strict=True))
+    return x, y, z

@@ -5,12 +5,12 @@ Names and order come from the tree that was read; the text was checked before (`
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 from urdfkin.errors import InputError
-from urdfkin.judge.vectors import (
+from urdfkin.exact.vectors import (
     IDENTITY,
     ZERO,
     Context,
@@ -23,7 +23,7 @@ from urdfkin.judge.vectors import (
     unit,
 )
 from urdfkin.plain_xml import plain_xml
-from urdfkin.tree import JointKind, KinematicTree
+from urdfkin.tree import Joint, JointKind, KinematicTree
 
 #: The version of URDF from which on `quat_xyzw` counts; in older files it is ignored.
 _WITH_QUATERNIONS = (1, 1)
@@ -48,18 +48,22 @@ class ExactJoint:
     offset: Number
 
 
-def read_exact(text: str, tree: KinematicTree, context: Context = mp) -> tuple[ExactJoint, ...]:
-    """The joints of a tree, from the URDF text it was read from.
+def read_exact(
+    text: str, tree: KinematicTree, context: Context = mp, among: Iterable[int] | None = None
+) -> dict[int, ExactJoint]:
+    """The joints of a tree, by their numbers there, from the URDF text it was read from.
 
     Args:
         text: The URDF.
         tree: The same, read; a joint `root_joint` that it was hung from is not in the text.
         context: The kind of number.
+        among: Numbers of the joints that are wanted; None: all.
 
     Raises:
         InputError: the text and the tree are not of the same robot.
     """
-    return tuple(_Text(text, tree.name, context).joints(tree))
+    words = _Text(text, tree.name, context)
+    return {i: words.joint_of(tree.joints[i]) for i in (range(len(tree.joints)) if among is None else among)}
 
 
 class _Text:
@@ -71,17 +75,13 @@ class _Text:
         self.elements = {str(element.get("name")): element for element in root.findall("joint")}
         self.quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _WITH_QUATERNIONS
 
-    def joints(self, tree: KinematicTree) -> Iterator[ExactJoint]:
-        for joint in tree.joints:
-            element = self.elements.get(joint.name)
-            if element is not None:
-                yield self.joint(
-                    element, turns_or_slides=joint.kind.has_axis, follows=joint.mimic is not None
-                )
-            elif joint.kind in (JointKind.FLOATING, JointKind.PLANAR):
-                yield ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)
-            else:
-                raise InputError("a joint is not in the URDF text", where=self.name, found=joint.name)
+    def joint_of(self, joint: Joint) -> ExactJoint:
+        element = self.elements.get(joint.name)
+        if element is not None:
+            return self.joint(element, turns_or_slides=joint.kind.has_axis, follows=joint.mimic is not None)
+        if joint.kind in (JointKind.FLOATING, JointKind.PLANAR):
+            return ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)
+        raise InputError("a joint is not in the URDF text", where=self.name, found=joint.name)
 
     def joint(self, element: Element, *, turns_or_slides: bool, follows: bool) -> ExactJoint:
         axis = self.vector(element.find("axis"), "xyz", "1 0 0")
