@@ -1,4 +1,4 @@
-"""What Pinocchio computes for each quantity of a call, and how far two correct computations may lie apart."""
+"""What each side computes for a quantity of a call, and how far two correct computations may lie apart."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from urdfkin.asked import Rows
 from urdfkin.oracle import Oracle
+from urdfkin.recursion import evaluate
 from urdfkin.recursion.plan import Plan
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
@@ -80,6 +81,19 @@ def _analytical(oracle: Oracle, x: Part, ours: FloatArray) -> tuple[FloatArray, 
     R = oracle.placements(q, frames, base)[..., :3, :3]
     theirs, apart = euler_jacobian(x.representation, R, J_v)
     return theirs, bounds.euler_jacobian_bound(x.plan, size, apart)
+
+
+def urdfkins(quantity: Quantity, x: Part) -> FloatArray:
+    """(n, frames, ...) results as the recursion computes them."""
+    if quantity is Quantity.PLACEMENT:
+        return evaluate.placements(x.plan, x.q, base=x.state)
+    in_references: dict[Quantity, Callable[..., FloatArray]] = {
+        Quantity.VELOCITY: evaluate.velocities,
+        Quantity.JACOBIAN: evaluate.jacobians,
+        Quantity.JACOBIAN_RATE: evaluate.jacobian_rates,
+        Quantity.ACCELERATION: evaluate.accelerations,
+    }
+    return in_references[quantity](x.plan, x.q, *x.rates[: _RATES[quantity]], x.reference, base=x.state)
 
 
 @np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite disagrees
