@@ -8,9 +8,10 @@ takes, is the eigenvector of the largest eigenvalue of K.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urdfkin.tree import FloatArray
 
@@ -51,18 +52,24 @@ def free_flyer_second_rates(base: BaseNumbers) -> FloatArray:
 
 def nearest_quaternion(M: FloatArray) -> FloatArray:
     """(..., 4) unit quaternion, scalar last, of the rotation nearest to (..., 3, 3)."""
-    K = np.empty((*M.shape[:-2], 4, 4))
+    K = davenport(M)
+    q = np.linalg.eigh(K).eigenvectors[..., -1:]
+    # Of a rotation K + I is 4 q q^T: multiplied once more, what LAPACK left of other eigenvectors is gone.
+    q = (K @ q + q)[..., 0]
+    unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return unit
+
+
+def davenport(M: NDArray[Any]) -> NDArray[Any]:
+    """(..., 4, 4) K of (..., 3, 3), floats or other numbers; of a rotation it is 4 q q^T - I."""
+    K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
     trace = np.trace(M, axis1=-2, axis2=-1)
     for i in range(3):
         K[..., i, i] -= trace
         K[..., 3, i] = K[..., i, 3] = M[..., i - 1, i - 2] - M[..., i - 2, i - 1]
     K[..., 3, 3] = trace
-    q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # Of a rotation K + I is 4 q q^T: multiplied once more, what LAPACK left of other eigenvectors is gone.
-    q = (K @ q + q)[..., 0]
-    unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
-    return unit
+    return K
 
 
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:

@@ -51,6 +51,21 @@ def test_validate_writes_every_form_at_once(tmp_path: Path) -> None:
     assert max(map(len, done.text.splitlines())) <= 80
 
 
+def test_the_judge_says_that_the_base_moved_where_it_was_told_to(tmp_path: Path) -> None:
+    data, page = tmp_path / "a.json", tmp_path / "a.html"
+    words = "validate", "polar", "--samples", "1", "--judge", "--judge-samples", "1", "--json", data
+    still = urdfkin(*words)
+    before = json.loads(data.read_text())["robots"][0]["judge"]
+    moving = urdfkin(*words, "--judge-moving-base", "--html", page)
+    after = json.loads(data.read_text())["robots"][0]["judge"]
+    assert (still.code, moving.code) == (0, 0)
+    assert "on 1 sample on a moving base" in moving.text
+    assert "moving base" not in still.text
+    assert "on 1 sample on a moving base" in page.read_text()
+    assert (before["moving_base"], after["moving_base"]) == (False, True)
+    assert before["lines"] != after["lines"]
+
+
 def test_a_report_rendered_later_is_the_one_rendered_at_once(tmp_path: Path) -> None:
     first = [tmp_path / f"first.{ending}" for ending in ("html", "xml", "md")]
     later = [tmp_path / f"later.{ending}" for ending in ("html", "xml", "md")]

@@ -6,15 +6,26 @@ import pytest
 import urdfkin
 from tests.high_precision import mp as independent
 from tests.high_precision import rate, second_rate
+from tests.laws.subjects import robot_of
 from tests.text.robots import motion
+from urdfkin import BaseMotion
+from urdfkin.asked import BaseRows
+from urdfkin.errors import InputError
 from urdfkin.exact import recursion as exact_recursion
 from urdfkin.exact.decimals import read_exact
 from urdfkin.exact.vectors import exact, mp
 from urdfkin.judge import Errors, Line, judge
+from urdfkin.judge.verdict import exact_quaternion
+from urdfkin.kinematics import equations as eq
+from urdfkin.recursion import base as recursion_base
 from urdfkin.recursion import evaluate
 from urdfkin.reference import Reference
+from urdfkin.rotation.euler import SEQUENCES
+from urdfkin.rotation.quaternion import quaternion_of
 from urdfkin.tree import FloatArray
 from urdfkin.verification.bounds import Quantity
+from urdfkin.verification.line_of_nodes import euler_jacobian, quaternion_jacobian
+from urdfkin.verification.sampling import draw_base
 
 #: One of each kind: arms, a hand with followers, humanoids, a quadruped, a mobile base, CAD exports.
 ROBOTS = (
@@ -137,3 +148,148 @@ def test_the_worst_and_the_typical_error_are_each_held_against_their_own(
 def test_urdfkin_is_never_the_worse_of_the_two_by_more_than_a_factor_of_two(name: str) -> None:
     for line in judge(urdfkin.load(name), samples=5).lines:
         assert not line.ours_is_worse, line
+
+
+# -- a base that moves ---------------------------------------------------------------------------------
+
+
+def test_a_moving_base_is_a_floating_joint_that_moves_alike() -> None:
+    # The floating joint's rates are in its own axes: u = R^T vel, o = R^T w, and their rates.
+    base, robot = draw_base(1, np.random.default_rng(3)), robot_of("tree_3")
+    hung = robot_of("tree_3", root_joint="floating")
+    generator = np.random.default_rng(4)
+    q = robot.sample(1, 4)[0]
+    v, a = generator.standard_normal((2, robot.nv))
+    T, six, six_2 = base.placement[0], base.velocity[0], base.acceleration[0]
+    root = exact_recursion.on_base(BaseRows(T, six, six_2))
+    back = eq.transposed(root.R)
+    u, o = eq.rotate(back, root.vel), eq.rotate(back, root.w)
+    u_rate = eq.rotate(back, eq.minus(root.acc, eq.cross(root.w, root.vel)))
+    o_rate = eq.rotate(back, root.alpha)
+    quaternion = exact_quaternion(np.array([root.R], dtype=object), quaternion_of(T[:3, :3])[np.newaxis])[0]
+    own = [[exact(x) for x in row] for row in (q, v, a)]
+    on_base = exact_recursion.move(robot.tree, read_exact(robot.urdf, robot.tree), *own, base=root)
+    free = ([*root.p, *quaternion], [*u, *o], [*u_rate, *o_rate])
+    full = ([*first, *rest] for first, rest in zip(free, own, strict=True))
+    afloat = exact_recursion.move(hung.tree, read_exact(hung.urdf, hung.tree), *full)
+    for link, name in enumerate(robot.tree.links):
+        there = hung.tree.link_index(name)
+        for reference in Reference:
+            for quantity in (Quantity.PLACEMENT, Quantity.VELOCITY, Quantity.ACCELERATION):
+                one = exact_recursion.values(on_base, link, quantity, reference)
+                other = exact_recursion.values(afloat, there, quantity, reference)
+                assert abs(one - other).max() < 1e-40, (name, quantity, reference)
+            one, other = (
+                exact_recursion.values(motion, k, Quantity.JACOBIAN_RATE, reference)
+                for motion, k in ((on_base, link), (afloat, there))
+            )
+            assert abs(one - other[:, 6:]).max(initial=0) < 1e-40, (name, reference)
+
+
+@pytest.mark.parametrize(("name", "root_joint"), [("ur3_gripper", None), ("polar", "planar")])
+def test_it_judges_a_moving_base_too(name: str, root_joint: str | None) -> None:
+    robot = urdfkin.load(name, root_joint=root_joint)
+    still = judge(robot, samples=2)
+    for base in (draw_base(2, np.random.default_rng(1)), BaseMotion(velocity=np.arange(6.0))):
+        moving = judge(robot, samples=2, base=base)
+        assert moving.moving_base
+        assert len(moving.lines) == len(still.lines)
+        assert moving.lines != still.lines
+        for line in moving.lines:
+            assert line.urdfkin.worst < 40.0, line
+            assert line.pinocchio.worst < 40.0, line
+
+
+def test_a_base_that_one_side_takes_for_another_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, base = urdfkin.load("ur5"), draw_base(2, np.random.default_rng(1))
+    original = recursion_base.BaseMotion.state
+
+    def off(self: BaseMotion, batch_shape: tuple[int, ...]) -> FloatArray:
+        return original(self, batch_shape) * (1.0 + 1e-13)
+
+    monkeypatch.setattr(recursion_base.BaseMotion, "state", off)
+    lines = judge(robot, samples=2, base=base).lines
+    assert all(line.ours_is_worse for line in lines if line.quantity is not Quantity.ANALYTICAL_JACOBIAN)
+    assert max(line.pinocchio.worst for line in lines) < 40.0
+
+
+def test_bases_that_are_not_as_many_as_samples_are_refused() -> None:
+    with pytest.raises(InputError, match="base is one, or one for each of 2 samples"):
+        judge(urdfkin.load("polar"), samples=2, base=draw_base(3, np.random.default_rng(1)))
+
+
+# -- analytical Jacobians ------------------------------------------------------------------------------
+
+
+def angles(name: str, R: object) -> list[object]:
+    """The angles of a rotation, as the chapter's text and a URDF's rpy define them, at 50 digits."""
+    x, y, z = (tuple(row) for row in R)  # type: ignore[attr-defined]
+    if name == "ZYZ":  # Rz(phi) Ry(theta) Rz(psi)
+        return [mp.atan2(y[2], x[2]), mp.acos(z[2]), mp.atan2(z[1], -z[0])]
+    return [mp.atan2(z[1], z[2]), -mp.asin(z[0]), mp.atan2(y[0], x[0])]  # xyz: roll, pitch, yaw
+
+
+@pytest.mark.parametrize("name", ["ZYZ", "xyz", "quaternion"])
+def test_the_analytical_jacobian_at_fifty_digits_is_the_difference_quotient_of_its_numbers(name: str) -> None:
+    robot = urdfkin.load("panda")
+    joints, link = read_exact(robot.urdf, robot.tree), robot.tree.frame_link("panda_hand")
+    q, zeros, step = robot.sample(1, 5)[0], [0] * robot.nv, mp.mpf(10) ** -18
+
+    def at(column: int, off: object) -> exact_recursion.Motion:
+        numbers = [exact(x) + (off if i == column else 0) for i, x in enumerate(q)]
+        return exact_recursion.move(robot.tree, joints, numbers, zeros, zeros)
+
+    def pose(column: int, off: object) -> list[object]:
+        state = at(column, off).states[link]
+        if name != "quaternion":
+            return [*state.p, *angles(name, state.R)]
+        return [*state.p, *exact_quaternion(np.array([state.R], dtype=object), near)[0]]
+
+    here = at(0, 0)
+    R = np.array(here.states[link].R, dtype=object)
+    near = quaternion_of(R.astype(float))[np.newaxis]
+    J_v = exact_recursion.values(here, link, Quantity.JACOBIAN, Reference.LOCAL_WORLD_ALIGNED)
+    if name == "quaternion":
+        J = quaternion_jacobian(exact_quaternion(R[np.newaxis], near), J_v[np.newaxis])[0]
+    else:
+        J = euler_jacobian(name, R[np.newaxis], J_v[np.newaxis])[0][0]
+    for column in range(robot.nv):
+        for row, (late, early) in enumerate(zip(pose(column, step), pose(column, -step), strict=True)):
+            assert abs(J[row, column] - (late - early) / (2 * step)) < 1e-28  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("name", [name for name in SEQUENCES if name.islower()])
+def test_about_fixed_axes_the_numbers_are_those_about_turning_ones_last_row_first(name: str) -> None:
+    robot = urdfkin.load("panda", verify=False)
+    fixed, turning = (
+        robot.analytical_jacobian(robot.sample(5, 0), "panda_hand", representation)
+        for representation in (name, name.upper()[::-1])
+    )
+    assert (fixed[:, :3] == turning[:, :3]).all()
+    assert (fixed[:, 3:] == turning[:, :2:-1]).all()
+
+
+def test_an_analytical_jacobian_is_judged_in_every_representation_and_an_error_of_its_own_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = urdfkin.load("ur5")
+
+    def lines() -> dict[str, Line]:
+        return {x.reference: x for x in judge(robot, samples=2).lines if x.quantity is quantity}
+
+    quantity = Quantity.ANALYTICAL_JACOBIAN
+    right, original = lines(), evaluate.jacobians
+
+    def wrong(*args: object, **kwargs: object) -> FloatArray:
+        return original(*args, **kwargs) * (1.0 + 64.0 * np.finfo(np.float64).eps)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(evaluate, "jacobians", wrong)
+    found = lines()
+    assert set(right) == set(found) == {"euler angles", "quaternion"}
+    for name, line in right.items():
+        assert line.urdfkin.worst < 5.0
+        assert line.pinocchio.worst < 5.0
+        assert found[name].ours_is_worse
+        assert found[name].pinocchio == line.pinocchio
+    # Two samples of eleven links of up to six columns, in twelve sequences; singular ones are left out.
+    assert 1000 < right["euler angles"].numbers < 2 * 11 * 6 * 6 * 12

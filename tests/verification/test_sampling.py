@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.verification.sampling import draw, special
+from urdfkin.verification.sampling import draw, draw_base, special
 
 
 @pytest.mark.parametrize("with_special", [True, False])
@@ -26,6 +26,17 @@ def test_special_configurations_come_first_where_they_are_asked_for_and_nowhere_
 def test_every_eighth_sample_has_rates_a_hundred_times_as_large() -> None:
     drawn = draw(urdfkin.load("panda").tree, 400, np.random.default_rng(0), with_special=False)
     for rates in (drawn.v, drawn.a):
+        sizes = np.sqrt((rates**2).mean(axis=-1))
+        assert 80.0 < sizes[::8].mean() < 120.0
+        assert 0.8 < np.delete(sizes, np.s_[::8]).mean() < 1.2
+
+
+def test_a_base_is_placed_and_moves_otherwise_in_every_sample() -> None:
+    base = draw_base(400, np.random.default_rng(0))
+    assert base.batch_shape == (400,)
+    assert np.abs(base.placement[:, :3, 3]).max() <= 2.0
+    assert np.unique(base.placement[:, :3, :3].round(6), axis=0).shape[0] == 400
+    for rates in (base.velocity, base.acceleration):
         sizes = np.sqrt((rates**2).mean(axis=-1))
         assert 80.0 < sizes[::8].mean() < 120.0
         assert 0.8 < np.delete(sizes, np.s_[::8]).mean() < 1.2

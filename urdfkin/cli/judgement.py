@@ -16,7 +16,13 @@ if TYPE_CHECKING:
 
 
 def judge_all(
-    report: ValidationReport, given: Sequence[Robot | str], samples: int, seed: int, **how: Any
+    report: ValidationReport,
+    given: Sequence[Robot | str],
+    samples: int,
+    seed: int,
+    *,
+    moving_base: bool,
+    **how: Any,
 ) -> ValidationReport:
     """The report with a judgement of every robot that was compared.
 
@@ -27,28 +33,35 @@ def judge_all(
         given: Robots, or what names them.
         samples: Configurations for each.
         seed: What they are drawn from.
+        moving_base: Whether the root links move, at random.
         **how: `mimic`, `root_joint` and `xacro_args`, as in `load`.
     """
     found: list[Judgement | None] = []
     try:
         for robot, source in zip(report.robots, given, strict=True):
             if robot.tallies:
-                found.append(_judged(source, samples, seed, how))
+                found.append(_judged(source, samples, seed, moving_base, how))
     except KeyboardInterrupt:
         report = replace(report, interrupted=True)
     return replace(report, judgements=tuple(found))
 
 
-def _judged(source: Robot | str, samples: int, seed: int, how: dict[str, Any]) -> Judgement | None:
+def _judged(
+    source: Robot | str, samples: int, seed: int, moving_base: bool, how: dict[str, Any]
+) -> Judgement | None:
+    import numpy as np  # noqa: PLC0415  keeps --help fast
+
     from urdfkin.judge import judge  # noqa: PLC0415
-    from urdfkin.lint import UrdfWarning  # noqa: PLC0415  keeps --help fast
+    from urdfkin.lint import UrdfWarning  # noqa: PLC0415
     from urdfkin.loading import load  # noqa: PLC0415
+    from urdfkin.verification.sampling import draw_base  # noqa: PLC0415
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)  # said already
             loaded = load(source, **how) if isinstance(source, str) else source
-        return judge(loaded, samples=samples, seed=seed)
+        base = draw_base(samples, np.random.default_rng([seed, 1])) if moving_base else None
+        return judge(loaded, samples=samples, seed=seed, base=base)
     except Exception as error:
         name = source if isinstance(source, str) else source.source
         say(f"urdfkin: {name}: not judged: {type(error).__name__}: {error}", err=True)

@@ -43,6 +43,7 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @xacro_option
 @click.option("--judge", "judged", is_flag=True, help="Say whose last digits are right, at 50 digits.")
 @click.option("--judge-samples", type=Whole(1), default=5, show_default=True, help="For --judge.")
+@click.option("--judge-moving-base", is_flag=True, help="For --judge: the root link moves, at random.")
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as data.")
 @report_options
 @click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case.")
@@ -58,6 +59,7 @@ def command(
     root_joint: str | None,
     judged: bool,
     judge_samples: int,
+    judge_moving_base: bool,
     isolate: bool,
     json_: Path | None,
     html: Path | None,
@@ -92,7 +94,7 @@ def command(
             **how,
         )
         if judged:
-            report = judge_all(report, given, judge_samples, seed, **how)
+            report = judge_all(report, given, judge_samples, seed, moving_base=judge_moving_base, **how)
     document = cast("Document", report.as_dict())
     written = write_reports(document, json_=json_, html=html, junit=junit, markdown=markdown)
     print_report(document, console(), cases=cases)

@@ -6,25 +6,51 @@ numbers can be set beside a report's.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from urdfkin.exact import recursion as exact_recursion
-from urdfkin.exact.decimals import ExactJoint, read_exact
-from urdfkin.exact.vectors import Number, exact
-from urdfkin.recursion import evaluate
-from urdfkin.recursion.base import STILL_STATE
+from urdfkin.asked import BaseRows
+from urdfkin.call import Call
+from urdfkin.checks import bound_of, pinocchios, urdfkins
+from urdfkin.errors import InputError
+from urdfkin.exact.decimals import read_exact
+from urdfkin.exact.recursion import move, on_base, values
+from urdfkin.exact.vectors import exact, mp
+from urdfkin.motion.representation import QUATERNION, analytical_jacobian
+from urdfkin.oracle_base import BaseNumbers, davenport
+from urdfkin.recursion.base import BaseMotion
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
+from urdfkin.rotation.euler import SEQUENCES, euler_of
+from urdfkin.rotation.euler_rates import NEAREST, singularity_distance
+from urdfkin.rotation.quaternion import quaternion_of
 from urdfkin.tree import FloatArray
-from urdfkin.verification import bounds
-from urdfkin.verification.bounds import EPS, LEAST_UNIT, Quantity
+from urdfkin.verification.bounds import (
+    EPS,
+    LEAST_UNIT,
+    Quantity,
+    euler_jacobian_bound,
+    nearest_singularity,
+    quaternion_jacobian_bound,
+    result_k,
+)
+from urdfkin.verification.line_of_nodes import euler_jacobian, quaternion_jacobian
 from urdfkin.verification.magnitudes import magnitudes
 from urdfkin.verification.sampling import Samples, draw
 
+_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+#: What is judged in each reference.
+_IN_REFERENCES = Quantity.VELOCITY, Quantity.JACOBIAN, Quantity.JACOBIAN_RATE, Quantity.ACCELERATION
+_FIFTY_DIGITS = np.vectorize(mp.mpf, otypes=[object])
+#: The numbers of an orientation, by what a line calls them.
+_REPRESENTATIONS = {
+    "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
+    QUATERNION: (QUATERNION,),
+}
 #: urdfkin is called the worse when its typical error is more than this many times Pinocchio's.
 FACTOR = 2.0
 
@@ -48,7 +74,7 @@ class Line:
 
     Attributes:
         quantity: What was judged.
-        reference: Its name, empty for placements.
+        reference: Its name, empty for placements; what describes the orientation, for analytical Jacobians.
         numbers: How many numbers were compared.
         urdfkin: urdfkin's true errors.
         pinocchio: Pinocchio's.
@@ -78,12 +104,14 @@ class Judgement:
         samples: How many configurations were judged.
         seed: What they were drawn from.
         lines: One for each quantity and reference.
+        moving_base: Whether the root link moved.
     """
 
     robot: str
     samples: int
     seed: int
     lines: tuple[Line, ...]
+    moving_base: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -91,6 +119,7 @@ class Judgement:
             "robot": self.robot,
             "samples": self.samples,
             "seed": self.seed,
+            "moving_base": self.moving_base,
             "lines": [
                 {
                     "quantity": line.quantity.value,
@@ -104,120 +133,145 @@ class Judgement:
         }
 
 
-def judge(robot: Robot, *, samples: int = 5, seed: int = 0) -> Judgement:
-    """Evaluate every link's placement, velocity, Jacobian, its rate and acceleration at 50 digits.
+def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | None = None) -> Judgement:
+    """Evaluate every link's placement, velocity, Jacobians, their rate and acceleration at 50 digits.
+
+    Analytical Jacobians are those of the twelve sequences of Euler angles together (about fixed axes they are
+    the same, last row first), and of quaternions; left out is what is nearer to a singularity than
+    `Robot.analytical_jacobian` goes, or has a quaternion whose sign rounding hides. Pinocchio has none of its
+    own: its rotation and Jacobian go into 7.122 as urdfkin's do.
 
     Args:
         robot: A robot that was loaded.
         samples: Configurations, drawn as `validate` draws its first; each takes a good part of a second.
         seed: The same seed gives the same numbers.
+        base: How the root link moves, in all samples or (samples, ...) in each; None if it stands still.
 
     Raises:
         OracleError: Pinocchio does not accept the robot.
+        InputError: bases that are neither one nor as many as samples.
     """
-    work = _Work(robot, draw(robot.tree, samples, np.random.default_rng(seed), with_special=False))
-    return Judgement(robot.name, samples, seed, tuple(work.lines()))
+    work = _Work(robot, draw(robot.tree, samples, np.random.default_rng(seed), with_special=False), base)
+    return Judgement(robot.name, samples, seed, tuple(work.lines()), base is not None)
+
+
+class _Compared(NamedTuple):
+    """Both sides' doubles, the judge's numbers of 50 digits, and the scale of their errors."""
+
+    urdfkin: FloatArray
+    pinocchio: FloatArray
+    true: NDArray[np.object_]
+    scale: FloatArray
 
 
 class _Work:
-    """Both sides' doubles, and the judge's digits, for one batch."""
+    """One batch, as urdfkin, Pinocchio and the judge are asked for it."""
 
-    def __init__(self, robot: Robot, x: Samples) -> None:
-        self.tree, self.x = robot.tree, x
+    def __init__(self, robot: Robot, x: Samples, base: BaseMotion | None) -> None:
+        if base is not None and base.batch_shape not in ((), (len(x.q),)):
+            raise InputError(
+                f"base is one, or one for each of {len(x.q)} samples", found=f"{base.batch_shape}"
+            )
+        self.oracle = robot.oracle(base)
+        self.part = Call(robot, None, _ALIGNED, base, x.q, x.v, x.a).part(slice(0, len(x.q)))
         self.links = range(len(robot.tree.links))
-        self.frames = robot.tree.link_frames
-        self.plan = robot.plan(self.links)
-        self.oracle = robot.oracle(None)
-        self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
-        self.motions = self._motions(read_exact(robot.urdf, robot.tree))
-
-    def _motions(self, joints: Mapping[int, ExactJoint]) -> list[exact_recursion.Motion]:
-        rows = zip(self.x.q, self.x.v, self.x.a, strict=True)
-        return [
-            exact_recursion.move(self.tree, joints, *([exact(number) for number in row] for row in triple))
-            for triple in rows
+        joints, moves = read_exact(robot.urdf, robot.tree), self.part.asked.base
+        self.motions = [
+            move(
+                robot.tree,
+                joints,
+                *([exact(number) for number in row[k]] for row in self.part.asked.inputs),
+                base=None if moves is None else on_base(_one(moves, k)),
+            )
+            for k in range(len(x.q))
         ]
 
     def lines(self) -> Iterator[Line]:
         """Quantity by quantity."""
-        plan, oracle, x, frames = self.plan, self.oracle, self.x, self.frames
-        yield self._line(
-            Quantity.PLACEMENT,
-            None,
-            evaluate.placements(plan, x.q)[:, :, :3],
-            oracle.placements(x.q, frames)[:, :, :3],
-            bounds.placement_bound(self.size).scale[:, :, :3],
-        )
+        yield _line(Quantity.PLACEMENT, "", [self._compared(Quantity.PLACEMENT, _ALIGNED)])
         for reference in Reference:
-            ours = evaluate.velocities(plan, x.q, x.v, reference)
-            theirs = oracle.velocities(x.q, x.v, frames, [reference])[:, :, 0]
-            scale = bounds.velocity_bound(self.size, reference).scale
-            yield self._line(Quantity.VELOCITY, reference, ours, theirs, scale)
-            ours = evaluate.jacobians(plan, x.q, reference)
-            theirs = oracle.jacobians(x.q, frames, [reference])[:, :, 0]
-            scale = bounds.jacobian_bound(plan, self.size, reference).scale
-            yield self._line(Quantity.JACOBIAN, reference, ours, theirs, scale)
-            ours = evaluate.jacobian_rates(plan, x.q, x.v, reference)
-            theirs = oracle.jacobian_rates(x.q, x.v, frames, [reference])[:, :, 0]
-            scale = bounds.jacobian_rate_bound(plan, self.size, reference).scale
-            yield self._line(Quantity.JACOBIAN_RATE, reference, ours, theirs, scale)
-            ours = evaluate.accelerations(plan, x.q, x.v, x.a, reference)
-            theirs = oracle.accelerations(x.q, x.v, x.a, frames, [reference])[:, :, 0]
-            scale = bounds.acceleration_bound(self.size, reference).scale
-            yield self._line(Quantity.ACCELERATION, reference, ours, theirs, scale)
+            for quantity in _IN_REFERENCES:
+                yield _line(quantity, reference.name.lower(), [self._compared(quantity, reference)])
+        for name, representations in _REPRESENTATIONS.items():
+            yield _line(Quantity.ANALYTICAL_JACOBIAN, name, list(self._analytical(representations)))
 
-    def _line(
-        self,
-        quantity: Quantity,
-        reference: Reference | None,
-        ours: FloatArray,
-        theirs: FloatArray,
-        scale: FloatArray,
-    ) -> Line:
-        high, low = self._truth(quantity, reference, ours.shape)
-        counted = np.broadcast_to(scale, ours.shape) > 0.0
-        units = np.maximum(EPS * np.broadcast_to(scale, ours.shape)[counted], LEAST_UNIT)
+    def _compared(self, quantity: Quantity, reference: Reference) -> _Compared:
+        asked = self.part.asked._replace(reference=reference)
+        part = self.part._replace(reference=reference, asked=asked)
+        ours, theirs = urdfkins(quantity, part), pinocchios(quantity, self.oracle, asked)
+        scale = np.broadcast_to(bound_of(quantity, part).scale, ours.shape)
+        return _Compared(ours, theirs, self._true(quantity, reference), scale)
+
+    def _true(self, quantity: Quantity, reference: Reference) -> NDArray[np.object_]:
+        """(n, links, ...) as `urdfkins`."""
+        numbers = [
+            [values(motion, link, quantity, reference) for link in self.links] for motion in self.motions
+        ]
+        return np.array(numbers, dtype=object)
+
+    def _analytical(self, representations: Sequence[str]) -> Iterator[_Compared]:
+        """Representation by representation, each a list of Jacobians."""
+        poses, J_v = self._compared(Quantity.PLACEMENT, _ALIGNED), self._compared(Quantity.JACOBIAN, _ALIGNED)
+        plan, x = self.part.plan, self.part
+        size, nearest = magnitudes(plan, x.q, None, None, x.state), max(NEAREST, nearest_singularity(plan))
+        R, R_theirs = poses.urdfkin[..., :3, :3], poses.pinocchio[..., :3, :3]
+        moving = _moving_columns(J_v.scale)
+        R_true, J_true = map(_FIFTY_DIGITS, (poses.true[..., :3, :3], _columns(J_v.true, moving)))
+        for name in representations:
+            if name == QUATERNION:
+                bound, quat = quaternion_jacobian_bound(plan, size), quaternion_of(R)
+                clear = np.abs(quat[..., 3]) > EPS * result_k(bound, quat.shape[:-1])
+                true = quaternion_jacobian(exact_quaternion(R_true[clear], quat[clear]), J_true[clear])
+            else:
+                clear = singularity_distance(name, euler_of(name, R)) > nearest
+                true, apart = euler_jacobian(name, R_true[clear], J_true[clear])
+                everywhere = np.ones(clear.shape)
+                everywhere[clear] = apart
+                bound = euler_jacobian_bound(plan, size, everywhere)
+            ours = analytical_jacobian(name, R[clear], J_v.urdfkin[clear], 0.0)
+            theirs = analytical_jacobian(name, R_theirs[clear], J_v.pinocchio[clear], 0.0)
+            ours, theirs, scale = (_columns(J, moving[clear]) for J in (ours, theirs, bound.scale[clear]))
+            yield _Compared(ours, theirs, true, scale)
+
+
+def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
+    """(n, links, most) the columns that move each link, filled up with others."""
+    idle = ~(scale > 0.0).any(axis=-2)
+    most = int((~idle).sum(axis=-1).max(initial=0))
+    return np.argsort(idle, axis=-1, kind="stable")[..., :most]
+
+
+def _columns(J: NDArray[Any], which: NDArray[np.intp]) -> NDArray[Any]:
+    """Some columns of (..., rows, nv)."""
+    return np.take_along_axis(J, which[..., np.newaxis, :], axis=-1)
+
+
+def _one(base: BaseNumbers, k: int) -> BaseNumbers:
+    """The base of one sample."""
+    return BaseRows(base.placement[k], base.velocity[k], base.acceleration[k])
+
+
+def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
+    """(m, 4) unit quaternions of rotations (m, 3, 3), of the two that each has those near to others."""
+    K = davenport(R)
+    q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I is 4 q q^T
+    unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
+    return unit
+
+
+def _line(quantity: Quantity, reference: str, compared: Sequence[_Compared]) -> Line:
+    """The errors of both sides in what was compared of one quantity."""
+    sides: tuple[list[FloatArray], list[FloatArray]] = [], []
+    for ours, theirs, true, scale in compared:
+        counted = scale > 0.0
+        units = np.maximum(EPS * scale[counted], LEAST_UNIT)
         # The difference of doubles that are near each other is exact; the rest of the digits follows.
-        mine, other = (np.abs((side - high) - low)[counted] / units for side in (ours, theirs))
-        name = "" if reference is None else reference.name.lower()
-        return Line(quantity, name, int(counted.sum()), _errors(mine), _errors(other))
-
-    def _truth(
-        self, quantity: Quantity, reference: Reference | None, shape: tuple[int, ...]
-    ) -> tuple[FloatArray, FloatArray]:
-        """The exact values as sums of two doubles."""
-        high, low = np.zeros(shape), np.zeros(shape)
-        for k, motion in enumerate(self.motions):
-            for link in self.links:
-                rows = _rows(motion, link, quantity, reference)
-                for index, value in _entries(rows, transpose=len(shape) == 4 and shape[-2] == 6):
-                    high[(k, link, *index)] = nearest = float(value)
-                    low[(k, link, *index)] = float(value - exact(nearest))
-        return high, low
-
-
-def _rows(
-    motion: exact_recursion.Motion, link: int, quantity: Quantity, reference: Reference | None
-) -> Sequence[Any]:
-    state = motion.states[link]
-    if reference is None:
-        return [(*row, place) for row, place in zip(state.R, state.p, strict=True)]
-    if quantity is Quantity.VELOCITY:
-        return exact_recursion.velocity(state, reference)
-    if quantity is Quantity.ACCELERATION:
-        return exact_recursion.acceleration(state, reference)
-    if quantity is Quantity.JACOBIAN:
-        return exact_recursion.jacobian(motion, link, reference)
-    return exact_recursion.jacobian_rate(motion, link, reference)
-
-
-def _entries(rows: Sequence[Any], *, transpose: bool) -> Iterator[tuple[tuple[int, ...], Number]]:
-    for i, row in enumerate(rows):
-        if isinstance(row, tuple):
-            for j, value in enumerate(row):
-                yield ((j, i) if transpose else (i, j)), value
-        else:
-            yield (i,), row
+        high = true[counted].astype(float)
+        low = (true[counted] - high).astype(float)
+        for errors, side in zip(sides, (ours, theirs), strict=True):
+            errors.append(np.abs((side[counted] - high) - low) / units)
+    mine, other = map(np.concatenate, sides)
+    return Line(quantity, reference, len(mine), _errors(mine), _errors(other))
 
 
 def _errors(units: FloatArray) -> Errors:

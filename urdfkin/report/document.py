@@ -139,6 +139,7 @@ class Judgement(TypedDict):
     robot: str
     samples: int
     seed: int
+    moving_base: NotRequired[bool]
     lines: list[Judged]
 
 

@@ -14,6 +14,7 @@ from urdfkin.report.scene import scene
 from urdfkin.report.words import (
     columns,
     counted,
+    judged_on,
     percent,
     pinocchio,
     share_of,
@@ -117,6 +118,7 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
         ],
         "checks": pages.check_rows(robot),
         "judged": pages.judged_rows(robot["judge"]) if robot["judge"] else [],
+        "judged_on": judged_on(robot["judge"]) if robot["judge"] else "",
         "heat_heads": heads,
         "heat": heat,
         "plot": Markup(_plot(robot, index, document)),

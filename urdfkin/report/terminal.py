@@ -13,6 +13,7 @@ from urdfkin.report.words import (
     columns,
     counted,
     in_order,
+    judged_on,
     nearer,
     of_quantity,
     percent,
@@ -185,8 +186,7 @@ def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
         )
     if robot["judge"] is not None:
         out.print(
-            f"{robot['source']}: true errors in eps*scale, at 50 digits, on"
-            f" {counted(robot['judge']['samples'], 'sample')}",
+            f"{robot['source']}: true errors in eps*scale, at 50 digits, on {judged_on(robot['judge'])}",
             style="bold",
         )
         out.print(_judged(robot["judge"]))

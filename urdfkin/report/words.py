@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Literal
 
-from urdfkin.report.document import Check, Document, Judged, Robot, Units
+from urdfkin.report.document import Check, Document, Judged, Judgement, Robot, Units
 from urdfkin.validation.outcome import Verdict
 
 #: Quantities as a reader knows them, in the order of a report.
@@ -108,6 +108,12 @@ def worst_of(robot: Robot, names: Sequence[str]) -> str:
 def nearer(line: Judged) -> str:
     """Whose typical error is the smaller."""
     return "urdfkin" if line["urdfkin"]["typical"] <= line["pinocchio"]["typical"] else "Pinocchio"
+
+
+def judged_on(judgement: Judgement) -> str:
+    """The samples of a judgement, and whether they moved."""
+    moving = " on a moving base" if judgement.get("moving_base") else ""
+    return counted(judgement["samples"], "sample") + moving
 
 
 def share_of(robot: Robot) -> Units:

@@ -10,12 +10,16 @@ n = e_i x R e_k, the middle axis is n / |n| in the first case, and in the second
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
-from urdfkin.tree import FloatArray
+#: Floats, or numbers of the judge's.
+Numbers = NDArray[Any]
 
 
-def euler_jacobian(name: str, R: FloatArray, J_v: FloatArray) -> tuple[FloatArray, FloatArray]:
+def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Numbers]:
     """Rates of position and of three angles, and how far the representation is from its singularity.
 
     Args:
@@ -40,7 +44,7 @@ def euler_jacobian(name: str, R: FloatArray, J_v: FloatArray) -> tuple[FloatArra
     return np.concatenate((J_v[..., :3, :], rows @ J_v[..., 3:, :]), axis=-2), apart[..., 0]
 
 
-def quaternion_jacobian(quat: FloatArray, J_v: FloatArray) -> FloatArray:
+def quaternion_jacobian(quat: Numbers, J_v: Numbers) -> Numbers:
     """Rates of position and of a unit quaternion: half the product of (w, 0) and the quaternion.
 
     Args:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from urdfkin.configuration import neutral
+from urdfkin.recursion.base import BaseMotion
+from urdfkin.rotation.quaternion import rotation_of
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic
 from urdfkin.verification.bounds import EPS
 
@@ -47,6 +49,10 @@ def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
 def _sample_joint(joint: Joint, n: int, rng: np.random.Generator) -> FloatArray:
     if joint.kind is JointKind.PLANAR:
         return np.hstack((rng.uniform(-_ROOM, _ROOM, (n, 2)), rng.uniform(-math.pi, math.pi, (n, 1))))
+    return _sample_floating(n, rng)
+
+
+def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
     quaternion = rng.standard_normal((n, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
     return np.hstack((rng.uniform(-_ROOM, _ROOM, (n, 3)), quaternion))
@@ -108,6 +114,17 @@ def special(tree: KinematicTree) -> FloatArray:
         if joint.nq == 1:
             q[1, at], q[2, at] = ranges[joint.name]
     return q
+
+
+def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
+    """A root link's motion for `n` samples: placed as a floating joint is, with rates as those of `draw`."""
+    placed = _sample_floating(n, rng)
+    placement = np.tile(np.eye(4), (n, 1, 1))
+    placement[:, :3, :3], placement[:, :3, 3] = rotation_of(placed[:, 3:]), placed[:, :3]
+    velocity, acceleration = rng.standard_normal((2, n, 6))
+    velocity[::8] *= 100.0
+    acceleration[::8] *= 100.0
+    return BaseMotion(placement, velocity, acceleration)
 
 
 def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
