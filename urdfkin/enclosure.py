@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 #: Fewer digits than these a double has; more than those nobody waits for.
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
+#: Twice a double's, and a joint may lose one more: a third of one is lost where all axes stand askew.
+ENOUGH_DIGITS = 30
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -131,10 +133,11 @@ def enclose(
     frame: str,
     reference: Reference | str,
     base: BaseMotion | None,
-    digits: int,
+    digits: int | None,
 ) -> Enclosures:
     """What `Robot.enclose` says."""
-    digits = whole_number(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
+    if digits is not None:
+        digits = whole_number(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
     call = Call(robot, (frame,), reference, base, *inputs)
     if call.shape:
         raise InputError(
@@ -144,11 +147,14 @@ def enclose(
         )
     for x, name in zip(inputs, "qva", strict=True):
         robot.checked(x, name)
-    context, link, part = of_digits(digits), call.links[0], call.part(slice(0, 1))
+    link, part = call.links[0], call.part(slice(0, 1))
+    path = robot.tree.path(link)
+    digits = digits or ENOUGH_DIGITS + len(path)
+    context = of_digits(digits)
     numbers = ([exact(x, context) for x in rows[0]] for rows in part.asked.inputs)
     motion = move(
         robot.tree,
-        read_exact(robot.urdf, robot.tree, context, robot.tree.path(link)),
+        read_exact(robot.urdf, robot.tree, context, path),
         *numbers,
         base=None if base is None else on_base(base, context, context.nearest_rotation),
         context=context,
