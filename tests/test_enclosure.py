@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import urdfkin
+from tests.attacks.test_judged_quaternions import quaternions, text
 from tests.laws.everything import by_the_robot
 from tests.laws.subjects import robot_of, state
 from tests.laws.test_mutation import with_a_slip
@@ -86,6 +87,19 @@ def test_every_number_at_fifty_digits_lies_in_its_interval_at_any_precision(name
                 assert holds(one, recursion.values(motion, link, one.quantity, reference)), (digits, one)
             before, widest = widest, max(float(one.width.max(initial=0.0)) for one in quantities(enclosed))
             assert widest <= before
+
+
+def test_quaternions_in_the_file_and_joints_that_the_root_hangs_from_are_enclosed_too() -> None:
+    for robot in (
+        urdfkin.load(text(quaternions(1.7), 'version="1.1"'), verify=False),
+        robot_of("tree_1", root_joint="floating"),
+        robot_of("one_joint", root_joint="planar"),
+    ):
+        x = sample(robot)
+        motion = at_fifty_digits(robot, x, None)
+        for one in quantities(robot.enclose(*x, robot.tip_frame, "local")):
+            link = robot.tree.frame_link(robot.tip_frame)
+            assert holds(one, recursion.values(motion, link, one.quantity, Reference.LOCAL)), one
 
 
 @pytest.mark.parametrize("name", ["panda", "tree_3", "tree_5", "mimic_hand_40_sliding", "deep_with_fixed"])

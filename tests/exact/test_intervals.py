@@ -78,7 +78,7 @@ def test_cosine_and_sine_of_every_double_lie_in_their_intervals(bits: int, angle
         assert high - low <= Fraction(2) ** (3 - bits)
 
 
-@pytest.mark.parametrize("word", ["0.1", "-1.5708", "3.14159265358979", "100.7"])
+@pytest.mark.parametrize("word", ["0.1", "-1.5708", "3.14159265358979", "100.7", "0"])
 def test_cosine_and_sine_of_a_wide_interval_hold_those_of_all_that_is_in_it(word: str) -> None:
     coarse, context = intervals(53), independent.clone()
     x = coarse.mpf(word) + coarse.around(coarse.mpf("0.01"))

@@ -118,6 +118,13 @@ def test_the_same_seed_gives_the_same_judgement() -> None:
     assert first != judge(urdfkin.load("polar"), samples=3, seed=5).as_dict()
 
 
+@pytest.mark.parametrize(("name", "samples"), [("fixed_only", 1), ("single_link", 1), ("one_joint", 0)])
+def test_where_nothing_moves_or_nothing_is_drawn_there_are_the_same_lines(name: str, samples: int) -> None:
+    lines = judge(robot_of(name), samples=samples).lines
+    assert len(lines) == 15
+    assert all(line.numbers == 0 for line in lines if "jacobian" in line.quantity)
+
+
 def test_worse_means_by_more_than_a_factor_of_two() -> None:
     def line(ours: float, theirs: float) -> Line:
         return Line(Quantity.VELOCITY, "local", 1, Errors(ours, ours), Errors(theirs, theirs))

@@ -200,7 +200,7 @@ class _Work:
         part = self.part._replace(reference=reference, asked=asked)
         ours, theirs = urdfkins(quantity, part), pinocchios(quantity, self.oracle, asked)
         scale = np.broadcast_to(bound_of(quantity, part).scale, ours.shape)
-        return _Compared(ours, theirs, self._true(quantity, reference), scale)
+        return _Compared(ours, theirs, self._true(quantity, reference).reshape(ours.shape), scale)
 
     def _true(self, quantity: Quantity, reference: Reference) -> NDArray[np.object_]:
         """(n, links, ...) as `urdfkins`."""

