@@ -13,7 +13,8 @@ from urdfkin.recursion.base import STILL_STATE, BaseMotion
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
 from urdfkin.verification.bounds import EPS, LEAST_UNIT, Quantity, velocity_bound
-from urdfkin.verification.magnitudes import SMALLEST, magnitudes, product
+from urdfkin.kinematics.lengths import SMALLEST, product
+from urdfkin.verification.magnitudes import magnitudes
 
 #: A planar, a floating and a sliding joint between turning ones, and two followers.
 ODD = """<robot name="odd">

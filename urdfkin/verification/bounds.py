@@ -72,10 +72,11 @@ from enum import StrEnum
 
 import numpy as np
 
+from urdfkin.kinematics.lengths import chapter as eq
 from urdfkin.recursion.plan import Column, Plan
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
-from urdfkin.verification.magnitudes import Magnitudes, product
+from urdfkin.verification.magnitudes import Magnitudes
 
 EPS = float(np.finfo(np.float64).eps)
 #: The smallest unit: eps times the smallest normal number, which is the smallest number of all.
@@ -159,7 +160,9 @@ def placement_bound(size: Magnitudes) -> Bound:
 @_BEYOND
 def velocity_bound(size: Magnitudes, reference: Reference) -> Bound:
     """For (n, frames, 6)."""
-    linear = size.vel + product(size.w, size.p) if reference is Reference.WORLD else size.vel
+    linear = size.vel
+    if reference is Reference.WORLD:
+        linear = eq.point_velocity(linear, size.w, size.p)
     return Bound(_six(linear, size.w), roundings(Quantity.VELOCITY, reference, size)[..., None])
 
 
@@ -173,11 +176,10 @@ def acceleration_bound(size: Magnitudes, reference: Reference) -> Bound:
     in 7.130. The d_k, differences of places seen from the frame, round as the sums of 7.77 do, and adding up
     the 4 n parts rounds n + 3 times: both are less than the 2 eps that each joint has for sums.
     """
-    shared = product(size.w, size.vel)
+    shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
     if reference is Reference.WORLD:
-        inward = product(size.w, product(size.w, size.p))
-        linear = linear + shared + product(size.alpha, size.p) + inward
+        linear = eq.point_acceleration(linear + shared, size.alpha, size.w, size.p)
     return Bound(_six(linear, size.alpha), roundings(Quantity.ACCELERATION, reference, size)[..., None])
 
 
@@ -201,8 +203,8 @@ def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 def jacobian_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
     """For (n, frames, 6, nv): the path's length for turning columns, 1 for sliding ones, 0 for idle ones."""
     turning, sliding = column_weights(plan)
-    linear = product(turning, size.p[..., None]) + sliding
-    scale = _six_rows(linear, turning)
+    linear, angular = eq.turning_column(turning, size.p[..., None])
+    scale = _six_rows(linear + sliding, angular)
     return Bound(scale, roundings(Quantity.JACOBIAN, reference, size)[..., None, None])
 
 
@@ -210,14 +212,17 @@ def jacobian_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
 def jacobian_rate_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
     """For (n, frames, 6, nv).
 
-    Turning columns have z-dot x d and z x d-dot, sliding ones z-dot; in the frame's own axes w x column is
-    subtracted, which is as large again.
+    A frame's turning columns are no longer than its path, and their arms change no faster than its origin
+    moves. In LOCAL the rate is that of the numbers in the frame's own axes.
     """
     turning, sliding = column_weights(plan)
-    again = 2.0 if reference is Reference.LOCAL else 1.0
-    lever = again * product(size.w, size.p) + size.vel
-    angular = again * product(turning, size.w[..., None])
-    linear = product(turning, lever[..., None]) + again * product(sliding, size.w[..., None])
+    w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
+    linear, angular = eq.turning_column_rate(turning, eq.axis_rate(w, turning), p, vel)
+    linear = linear + eq.axis_rate(w, sliding)
+    if reference is Reference.LOCAL:
+        column, axis = eq.turning_column(turning, p)
+        linear = eq.rate_in_turning_axes(linear, w, column + sliding)
+        angular = eq.rate_in_turning_axes(angular, w, axis)
     scale = _six_rows(linear, angular)
     return Bound(scale, roundings(Quantity.JACOBIAN_RATE, reference, size)[..., None, None])
 

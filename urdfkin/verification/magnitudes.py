@@ -1,16 +1,11 @@
-"""The recursion in absolute values: how large the terms are that a result is summed from.
+"""The recursion on lengths: how large the terms are that a frame's motion is summed from.
 
-Replacing every vector of 7.127 to 7.130 by its length and every minus by a plus gives numbers that no
-intermediate value can exceed. Rounding errors are proportional to them, not to the result, which may be
-small because large terms cancel.
+The equations of 7.58 and 7.127 to 7.130 run on `urdfkin.kinematics.lengths`, so that no intermediate value
+can exceed what is found here.
 
 One term is Pinocchio's alone: where 7.129 has v_i w_{i-1} x z it has v_i w_i x z. The joint's own share of
 w_i is parallel to z and adds nothing but rounding, v_i^2 |z x z|, which fast joints about an axis askew do
-show: the scale of alpha counts it.
-
-Nothing but zero counts as smaller than `SMALLEST`, the smallest normal number. Below it a product is off by
-half the smallest subnormal number, not by half an eps of itself, and so as much as `SMALLEST` would be; and a
-product that is zero because two small numbers were multiplied may still meet a large one.
+show: the scale of alpha counts it, by giving the equation the w of the link behind the joint.
 """
 
 from __future__ import annotations
@@ -19,11 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from urdfkin.kinematics.lengths import chapter as eq
+from urdfkin.kinematics.lengths import counted, norm, product
 from urdfkin.recursion.plan import Geometry, Motion, Plan, Step
 from urdfkin.tree import FloatArray
 
-SMALLEST = float(np.finfo(np.float64).tiny)
 _UNTURNED = np.eye(3).ravel()
+_Z = 1.0  #: A joint's axis is as long as this.
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +57,8 @@ def magnitudes(
     """
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
-    states = [[_norm(base[:, at : at + 3]) for at in (9, 12, 15, 18, 21)]]
-    lengths = _counted(plan.lengths)
+    states = [[norm(base[:, at : at + 3]) for at in (9, 12, 15, 18, 21)]]
+    lengths = counted(plan.lengths)
     for i in range(len(plan.steps)):
         state = states[plan.parents[i] + 1]
         moved = (
@@ -81,42 +78,28 @@ def magnitudes(
     return Magnitudes(*out)
 
 
-def product(x: FloatArray | float, y: FloatArray | float) -> FloatArray:
-    """`x y` for numbers that are not negative, and no less than `SMALLEST` unless one of them is zero."""
-    xy = np.asarray(np.multiply(x, y))
-    small = xy < SMALLEST
-    if not small.any():
-        return xy
-    return np.where(small & (np.not_equal(x, 0.0) & np.not_equal(y, 0.0)), SMALLEST, xy)
-
-
-def _counted(x: FloatArray) -> FloatArray:
-    """What is not zero counts as `SMALLEST` at least."""
-    return np.where(x == 0.0, 0.0, np.maximum(x, SMALLEST))
-
-
-def _norm(x: FloatArray) -> FloatArray:
-    # hypot neither under- nor overflows where squares would.
-    return _counted(np.hypot.reduce(x, axis=-1))
-
-
 def _carry(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
     p, w, vel, alpha, acc = state
-    turning = product(w, d)
-    return [p + d, w, vel + turning, alpha, acc + product(alpha, d) + product(w, turning)]
+    return [
+        eq.point_position(p, None, d),
+        w,
+        eq.point_velocity(vel, w, d),
+        alpha,
+        eq.point_acceleration(acc, alpha, w, d),
+    ]
 
 
 def _carry_place(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
-    return [state[0] + d, *state[1:]]
+    return [eq.point_position(state[0], None, d), *state[1:]]
 
 
 def _slid(plan: Plan, i: int, q: FloatArray) -> FloatArray:
     """How far a joint slides."""
     kind, at = int(plan.steps[i, Step.KIND]), int(plan.steps[i, Step.Q])
     if kind != Motion.SLIDE:
-        return _norm(q[:, at : at + (2 if kind == Motion.PLANAR else 3)])
+        return norm(q[:, at : at + (2 if kind == Motion.PLANAR else 3)])
     multiplier, constant = np.abs(plan.geometry[i, Geometry.MULTIPLIER :])
-    return product(multiplier, np.abs(q[:, at])) + _counted(constant)
+    return product(multiplier, np.abs(q[:, at])) + counted(constant)
 
 
 def _place(plan: Plan, i: int, state: list[FloatArray], length: float, q: FloatArray) -> list[FloatArray]:
@@ -133,13 +116,16 @@ def _step(
     if kind in (Motion.TURN, Motion.SLIDE):
         multiplier = abs(plan.geometry[i, Geometry.MULTIPLIER])
         rate, rate_2 = (product(multiplier, np.abs(x[:, rate_at])) for x in (v, a))
-        if kind == Motion.TURN:
-            return [p, w + rate, vel, alpha + rate_2 + product(rate, w + rate), acc]
-        return [p, w, vel + rate, alpha, acc + rate_2 + 2.0 * product(rate, w)]
+        if kind == Motion.SLIDE:
+            acc = eq.sliding_acceleration(acc, w, _Z, rate, rate_2)
+            return [p, w, eq.sliding_velocity(vel, _Z, rate), alpha, acc]
+        w = eq.angular_velocity(w, _Z, rate)
+        return [p, w, vel, eq.angular_acceleration(alpha, w, _Z, rate, rate_2), acc]
     slides, turns = (2, 1) if kind == Motion.PLANAR else (3, 3)
     (u, o), (u_rate, o_rate) = (
-        (_norm(x[:, rate_at : rate_at + slides]), _norm(x[:, rate_at + slides : rate_at + slides + turns]))
+        (norm(x[:, rate_at : rate_at + slides]), norm(x[:, rate_at + slides : rate_at + slides + turns]))
         for x in (v, a)
     )
-    turned = alpha + o_rate + product(w + o, o)
-    return [p, w + o, vel + u, turned, acc + u_rate + product(2.0 * w + o, u)]
+    alpha = eq.free_angular_acceleration(alpha, eq.plus(w, o), o, o_rate)
+    acc = eq.free_acceleration(acc, w, o, u, u_rate)
+    return [p, eq.plus(w, o), eq.plus(vel, u), alpha, acc]
