@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).parent.parent / "urdfkin"
 #: Every part of the package, in the order in which they may build on one another: a module imports what
 #: stands in its own row or above it. Imports inside functions count; those for types alone do not.
 LAYERS = (
-    ("errors", "nearest", "numerals", "frame_names", "interpreter", "printable"),
+    ("errors", "nearest", "numerals", "roundings", "frame_names", "interpreter", "printable"),
     ("demands", "forking"),
     (
         "files",

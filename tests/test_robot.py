@@ -12,14 +12,14 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as command
 from tests.robots.odd_urdfs import urdf_of
-from urdfkin import call
+from urdfkin import call, roundings
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.oracle import Oracle
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.rotation import exp_rotation
-from urdfkin.verification import bounds, choosing
+from urdfkin.verification import choosing
 from urdfkin.verification.bounds import Quantity
 from urdfkin.verification.certificate import Comparison
 
@@ -32,7 +32,7 @@ def panda() -> Robot:
 @pytest.fixture
 def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     """A bound so tight that rounding breaks it: the way to a VerificationError without a wrong result."""
-    monkeypatch.setattr(bounds, "ROUNDINGS", 1e-9)
+    monkeypatch.setattr(roundings, "ROUNDINGS", 1e-9)
 
 
 def disagreement(robot: Robot, quantity: str, **base: BaseMotion) -> urdfkin.VerificationError:

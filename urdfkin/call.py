@@ -17,6 +17,7 @@ from urdfkin.errors import InputError, NotFiniteError, RangeError
 from urdfkin.recursion.base import STILL_STATE, BaseMotion
 from urdfkin.recursion.plan import IntArray
 from urdfkin.reference import Reference
+from urdfkin.roundings import EPS
 from urdfkin.tree import FloatArray
 from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Bound, Quantity
@@ -207,7 +208,7 @@ class Call:
             index=self._index(k),
             ours=ours[i, f],
             theirs=theirs[i, f],
-            bound=bounds.EPS * bound.k * bound.scale,
+            bound=EPS * bound.k * bound.scale,
             units=float(bounds.disagreement(ours[i, f], theirs[i, f], bound).max()),
             reproduce=self._replay(quantity, k, self.frames[f]),
         )

@@ -14,7 +14,7 @@ from urdfkin.recursion.plan import Plan
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
 from urdfkin.verification import bounds
-from urdfkin.verification.bounds import EPS, Bound, Quantity, result_k
+from urdfkin.verification.bounds import Bound, Quantity
 from urdfkin.verification.line_of_nodes import euler_jacobian, quaternion_jacobian
 from urdfkin.verification.magnitudes import Magnitudes, magnitudes
 
@@ -72,7 +72,7 @@ def _analytical(oracle: Oracle, x: Part, ours: FloatArray) -> tuple[FloatArray, 
     if x.representation == "quaternion":
         quat = oracle.quaternions(q, frames, base)
         bound = bounds.quaternion_jacobian_bound(x.plan, size)
-        theirs, hidden = quaternion_jacobian(quat, J_v), 1.5 * EPS * result_k(bound, quat.shape[:-1])
+        theirs, hidden = quaternion_jacobian(quat, J_v), bounds.hidden_scalar(bound, quat.shape[:-1])
         # Of q and -q the one with qw >= 0 counts; where rounding hides the sign of qw, either does.
         with_other = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
         turned = with_other & (np.abs(quat[..., 3]) <= hidden)

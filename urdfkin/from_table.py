@@ -13,8 +13,8 @@ from urdfkin.dh.to_tree import link_names
 from urdfkin.frame_names import LinkFrame
 from urdfkin.loading import load
 from urdfkin.robot import Robot
+from urdfkin.roundings import EPS, ROW, of_rows, of_rows_read_back
 from urdfkin.tree import FloatArray
-from urdfkin.verification import bounds
 from urdfkin.verification.choosing import Verify
 from urdfkin.verification.tables import TableError
 
@@ -49,11 +49,10 @@ def _demand_the_tables(robot: Robot, table: DHTable) -> None:
     own = table.coupling.select(robot.tree, q)
     theirs = robot.oracle(None).placements(q, [LinkFrame.of(link_names(table)[-1])])[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
-    # Pinocchio's side and the way through roll, pitch and yaw round as often as the table, or three times so;
-    # and they make rotations of what a base or tool may be to six digits only.
-    metres, defect = table.rounding(own), _defect(table)
-    turn = 4.0 * bounds.EPS * (8.0 + 8.0 * len(table.rows)) + defect
-    allowed = 4.0 * metres + defect * metres / (8.0 * bounds.EPS)
+    # Base and tool may be rotations to six digits only, and Pinocchio's side makes rotations of them.
+    rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)
+    turn = EPS * of_rows_read_back(rows) + defect
+    allowed = metres * (of_rows_read_back(rows) / of_rows(rows) + defect / (EPS * ROW))
     if (off[..., 3].max(axis=-1) > allowed).any() or (off[..., :3] > turn).any():
         raise TableError(
             "the URDF that was made of a table is not the table's",

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike
 from urdfkin.call import NotVerifiedWarning
 from urdfkin.chain import FrameChain, chain
 from urdfkin.demands import choice, word, words
-from urdfkin.dh.elements import EPS
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
 from urdfkin.oracle import version
+from urdfkin.roundings import EPS, of_joints
 from urdfkin.tree import FloatArray
 from urdfkin.verification.choosing import checked_choice
 from urdfkin.verification.sampling import draw
@@ -182,7 +182,7 @@ def verified_tree(
     )
     tree = robot.tree
     tilt = max(sum(tree.joints[i].tilt for i in tree.path(leaf)) for leaf in tree.leaves())
-    if units > parameters.roundings + 2.0 * tilt / EPS:
+    if units > parameters.roundings + of_joints(0, tilt):
         raise TableError(
             f"the tree parameters of {robot.name} disagree", where=f"Pinocchio {version()}", found=line
         )

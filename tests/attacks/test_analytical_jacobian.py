@@ -20,8 +20,9 @@ from urdfkin.recursion.base import BaseMotion
 from urdfkin.robot import Robot
 from urdfkin.rotation.euler import SEQUENCES, rotation_from_euler
 from urdfkin.rotation.quaternion import quaternion_of
+from urdfkin.roundings import EPS
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import EPS, Quantity
+from urdfkin.verification.bounds import Quantity
 from urdfkin.verification.line_of_nodes import euler_jacobian, quaternion_jacobian
 
 REPRESENTATIONS = (*SEQUENCES, "quaternion")

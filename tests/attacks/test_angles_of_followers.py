@@ -11,8 +11,8 @@ from urdfkin.origin import Origin
 from urdfkin.recursion.evaluate import placements
 from urdfkin.recursion.plan import make_plan
 from urdfkin.robot import Robot
+from urdfkin.roundings import EPS
 from urdfkin.tree import freed
-from urdfkin.verification.bounds import EPS
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 

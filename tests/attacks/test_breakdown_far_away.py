@@ -11,8 +11,9 @@ from urdfkin.recursion import breakdown
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.recursion.breakdown import AccelerationBreakdown
 from urdfkin.robot import Robot
+from urdfkin.roundings import EPS
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import EPS, Quantity
+from urdfkin.verification.bounds import Quantity
 
 REFERENCES = ("local", "world", "local_world_aligned")
 

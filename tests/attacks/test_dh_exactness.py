@@ -14,9 +14,9 @@ from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
 from urdfkin.chain import chain
 from urdfkin.dh import DHTable, dh_table, export
-from urdfkin.dh.elements import EPS
 from urdfkin.dh.hint import noisy_cells
 from urdfkin.errors import InputError
+from urdfkin.roundings import EPS
 from urdfkin.tables import verified
 from urdfkin.tree import JointKind, KinematicTree, Mimic
 from urdfkin.urdf.writer import to_urdf

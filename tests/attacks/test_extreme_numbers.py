@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 import urdfkin
 from urdfkin.errors import RangeError
+from urdfkin.kinematics.lengths import product
 from urdfkin.recursion.base import STILL_STATE, BaseMotion
 from urdfkin.robot import Robot
+from urdfkin.roundings import EPS, LEAST_UNIT, SMALLEST
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import EPS, LEAST_UNIT, Quantity, velocity_bound
-from urdfkin.kinematics.lengths import SMALLEST, product
+from urdfkin.verification.bounds import Quantity, velocity_bound
 from urdfkin.verification.magnitudes import magnitudes
 
 #: A planar, a floating and a sliding joint between turning ones, and two followers.

@@ -17,11 +17,10 @@ from urdfkin.oracle_base import free_flyer, free_flyer_rates, nearest_quaternion
 from urdfkin.recursion import base as recursion_base
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.rotation import exp_rotation, nearest_rotation
+from urdfkin.roundings import EPS, ROUNDINGS
 from urdfkin.tree import FloatArray
-from urdfkin.verification import bounds
 from urdfkin.verification.magnitudes import magnitudes
 
-EPS = bounds.EPS
 ARM = (
     '<robot name="arm"><link name="a"/><link name="b"/><joint name="j" type="continuous"><parent link="a"/>'
     '<child link="b"/><origin xyz="0.3 0.2 0.1" rpy="1 2 3"/><axis xyz="0.6 0 0.8"/></joint></robot>'
@@ -68,7 +67,7 @@ def test_both_sides_take_the_nearest_rotation_to_rounding() -> None:
         by_pinocchio = pin.Quaternion(nearest_quaternion(M)).toRotationMatrix()
         for found, R in ((ours, nearest_rotation(M)), (theirs, by_pinocchio)):
             found.append(float(np.linalg.norm((R.astype(object) - truth).astype(np.float64), 2)) / EPS)
-    # Far below what `bounds` derives: 3.2 for urdfkin, 11 for Pinocchio.
+    # Far below what `roundings` derives: 3.2 for urdfkin, 11 for Pinocchio.
     assert max(ours) < 1.5
     assert max(theirs) < 8.0
 
@@ -130,7 +129,7 @@ def test_only_a_base_that_is_turned_counts_as_a_joint() -> None:
     moved[:3, 3] = 1.0, 2.0, 3.0
     turned = BaseMotion(at(exp_rotation([0.0, 0.0, 1.0])))
     counts = [
-        magnitudes(plan, q, None, None, state).joints.tolist()
+        (magnitudes(plan, q, None, None, state).roundings / ROUNDINGS).tolist()
         for state in (STILL_STATE, BaseMotion(moved).state(()), turned.state(()))
     ]
     assert counts == [[[1.0, 2.0]], [[1.0, 2.0]], [[2.0, 3.0]]]

@@ -8,9 +8,10 @@ from urdfkin.catalogue import catalogue
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.reference import Reference
+from urdfkin.roundings import EPS
 from urdfkin.tree import FloatArray
 from urdfkin.verification import bounds
-from urdfkin.verification.bounds import EPS, Bound
+from urdfkin.verification.bounds import Bound
 from urdfkin.verification.magnitudes import magnitudes
 
 

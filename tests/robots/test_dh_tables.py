@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from urdfkin.catalogue import examples
-from urdfkin.dh.elements import EPS
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.noise import left_out
 from urdfkin.loading import load
+from urdfkin.roundings import EPS
 from urdfkin.tables import verified
 
 #: Tables of each robot that is checked in the fast subset.

@@ -12,8 +12,8 @@ import pytest
 import urdfkin
 from urdfkin.lint import Severity, check
 from urdfkin.robot import Robot
+from urdfkin.roundings import EPS
 from urdfkin.tree import FloatArray, KinematicTree, freed, with_tilts
-from urdfkin.verification.bounds import EPS
 
 KINDS = {"revolute": "R", "continuous": "RUB", "prismatic": "P"}
 AXES = np.eye(3)

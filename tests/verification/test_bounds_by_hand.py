@@ -6,9 +6,10 @@ import pytest
 import urdfkin
 from urdfkin.recursion.plan import Plan
 from urdfkin.reference import Reference
+from urdfkin.roundings import EPS, of_joints
 from urdfkin.tree import FloatArray
 from urdfkin.verification import bounds
-from urdfkin.verification.bounds import EPS, Bound
+from urdfkin.verification.bounds import Bound
 from urdfkin.verification.magnitudes import Magnitudes
 
 #: A turning joint, one that slides twice as far as the coordinate before it says.
@@ -24,7 +25,7 @@ LOCAL, WORLD, ALIGNED = Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_
 
 
 def sizes(tilt: float = 0.0) -> Magnitudes:
-    return Magnitudes(*(np.array([[x]]) for x in (P, W, VEL, ALPHA, ACC, JOINTS, tilt)))
+    return Magnitudes(*(np.array([[x]]) for x in (P, W, VEL, ALPHA, ACC, of_joints(JOINTS, tilt))))
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ import urdfkin
 from tests.laws.subjects import NAMES, robot_of, state
 from urdfkin.recursion.base import STILL_STATE, BaseMotion
 from urdfkin.recursion.evaluate import accelerations, placements, velocities
+from urdfkin.roundings import EPS, ROUNDINGS
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import EPS
 from urdfkin.verification.magnitudes import Magnitudes, magnitudes
 
 ARM = """<robot name="r">
@@ -48,7 +48,7 @@ def test_nothing_exceeds_its_size(subject: str, sizes: tuple[float, float], movi
     assert not exceed(length(acc[..., 3:]), size.alpha)
     places = magnitudes(plan, q, None, None, base)
     assert (places.p == size.p).all()
-    assert (places.joints == size.joints).all()
+    assert (places.roundings == size.roundings).all()
 
 
 def of_the_arm(q: list[float], v: list[float], a: list[float]) -> Magnitudes:
@@ -64,7 +64,7 @@ def test_where_all_terms_point_the_same_way_the_sizes_are_reached() -> None:
     assert size.vel == 2.0 * 2.0 + 5.0 * 1.75
     assert size.alpha == 2.0 * 2.0 + 3.0 * (2.0 + 3.0)  # Pinocchio's v w x z, before it vanishes
     assert size.acc == (4.0 + 4.0) * 2.0 + (size.alpha + 25.0) * 1.75
-    assert size.joints == 5
+    assert size.roundings == 5 * ROUNDINGS
 
 
 def test_slides_and_second_rates_count_as_7_130_has_them() -> None:

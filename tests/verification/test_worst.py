@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from urdfkin.roundings import EPS, SMALLEST
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import EPS, Bound, disagreement
-from urdfkin.kinematics.lengths import SMALLEST
+from urdfkin.verification.bounds import Bound, disagreement
 from urdfkin.verification.worst import worst_of_each
 
 ODD = (0.0, -0.0, 5e-324, 1e-310, SMALLEST, 1.0, 1.0 + EPS, -1.0, 1e300, 1.7e308, -1.7e308)

@@ -17,7 +17,7 @@ from typing import TypeVar
 import numpy as np
 
 from urdfkin.chain import ChainJoint, FrameChain
-from urdfkin.dh.elements import EPS, as_step, between_axes
+from urdfkin.dh.elements import as_step, between_axes
 from urdfkin.dh.noise import Noise, noises, tilt_of
 from urdfkin.dh.normals import (
     NEARLY_PARALLEL,
@@ -30,6 +30,7 @@ from urdfkin.dh.normals import (
 from urdfkin.dh.row import Convention, DHRow, convention_of
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.roundings import ENTRY, EPS
 from urdfkin.tree import FloatArray
 
 #: x is turned round when |theta| exceeds a right angle by more than this (rad): 1.5708 and 1.571 do not.
@@ -241,7 +242,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, 
 def _clean_rotation(T: FloatArray) -> None:
     """Entries of a rotation that are rounding noise become zero; lengths have their own scale."""
     R = T[:3, :3]
-    R[np.abs(R) <= 2.0 * EPS] = 0.0
+    R[np.abs(R) <= ENTRY * EPS] = 0.0
 
 
 def _lifted(A: FloatArray, carry: float) -> FloatArray:

@@ -15,9 +15,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.roundings import ANGLE, EPS
 from urdfkin.tree import FloatArray
-
-EPS = float(np.finfo(np.float64).eps)
 
 
 def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:
@@ -53,11 +52,11 @@ def as_step(T: FloatArray) -> tuple[float, float] | None:
         (0.5, 3.141592653589793)
     """
     crossed = (T[0, 1], T[0, 2], T[1, 0], T[2, 0])
-    if max(map(abs, crossed)) > 4.0 * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
+    if max(map(abs, crossed)) > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
         return None
     alpha = math.atan2(T[2, 1], T[2, 2])
     twelfth = nearest_twelfth(alpha)
-    return float(T[0, 3]), wrapped(twelfth if abs(alpha - twelfth) <= 4.0 * EPS else alpha) + 0.0
+    return float(T[0, 3]), wrapped(twelfth if abs(alpha - twelfth) <= ANGLE * EPS else alpha) + 0.0
 
 
 def wrapped(angle: float) -> float:
@@ -68,7 +67,7 @@ def wrapped(angle: float) -> float:
         (True, True)
     """
     turned = math.remainder(angle, 2.0 * math.pi)
-    return math.pi if turned <= -math.pi * (1.0 - 2e-16) else turned
+    return math.pi if turned <= -math.pi * (1.0 - EPS) else turned
 
 
 def nearest_twelfth(angle: float) -> float:

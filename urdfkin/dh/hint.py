@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from urdfkin.dh.elements import EPS, nearest_twelfth
+from urdfkin.dh.elements import nearest_twelfth
 from urdfkin.dh.table import DHTable
+from urdfkin.roundings import ANGLE, EPS
 
 #: Radians off a multiple of 15 degrees, and metres for each metre of span, that look like such rounding.
 LARGEST = 1e-4
@@ -23,7 +24,7 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
     for row in table.rows:
         for name, angle in (("alpha", row.alpha), ("theta", row.theta), ("beta", row.beta)):
             off = abs(angle - nearest_twelfth(angle))
-            if 4.0 * EPS < off <= LARGEST:
+            if ANGLE * EPS < off <= LARGEST:
                 found.append((row.joint, name, off))
         for name, length in (("a", row.a), ("d", row.d)):
             if 0.0 < abs(length) <= LARGEST * table.span:

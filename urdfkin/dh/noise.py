@@ -1,21 +1,10 @@
 """What of a chain's constants is rounding: a tilt or an offset below this is none.
 
-Two correct programs that read one URDF do not get the same constant pose between two joint axes. To first
-order in eps, and in the worst case, for each URDF joint whose constant is folded into the pose,
-
-| | urdfkin | another reader |
-|---|---|---|
-| its roll, pitch and yaw as a matrix: products of sines; through a quaternion, doubled | 2.5 | 6.0 |
-| the product with it: three terms round three times, 3 u sqrt(3) (u = eps/2) | 2.6 | 2.6 |
-
-which is 13.7 eps, and 2.5 eps more for each of the two axes (divided by their lengths; Rodrigues' formula).
-`urdfkin.verification.bounds` counts the same roundings for a whole robot.
-
-What wrote the file was a program as well. A double that goes through text keeps fifteen digits (DBL_DIG), so
-an angle up to pi is off by half a unit of the fifteenth, 5e-15 rad or 22.5 eps, before anybody reads it; roll
-and pitch tilt an axis, yaw does not: 45 eps. So angles of fourteen or fifteen digits (1.5707963267949 is 15
-eps off a right angle, 3.14159265358979 as much) are round. One of twelve digits, 900 eps off and more, is
-not: what makes that one round is `snap`, which says what it moves.
+Two correct programs that read one URDF do not get the same constant pose between two joint axes, and what
+wrote the file was a program as well, which may have kept fifteen digits of each angle. `urdfkin.roundings`
+counts both. So angles of fourteen or fifteen digits (1.5707963267949 is 15 eps off a right angle,
+3.14159265358979 as much) are round. One of twelve digits, 900 eps off and more, is not: what makes that one
+round is `snap`, which says what it moves.
 
 A tilt below this is zero in a table: no row is spent on it, and no foot stands at its inverse. It is counted
 by `left_out`, by which a table may then differ.
@@ -27,13 +16,8 @@ import math
 from dataclasses import dataclass
 
 from urdfkin.chain import FrameChain
-from urdfkin.dh.elements import EPS
+from urdfkin.roundings import AXES, CONSTANT, EPS, SUMMED, WRITTEN
 from urdfkin.tree import FloatArray
-
-#: Roundings in eps, derived above: of a joint's constant and of two axes by two readers, and in the file.
-CONSTANT, AXES, WRITTEN = 13.7, 5.0, 45.0
-#: Lengths are summed along the whole way, and their last digits are lost where the way is longest.
-SUMMED = 4.0
 
 
 @dataclass(frozen=True, slots=True)

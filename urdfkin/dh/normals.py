@@ -18,8 +18,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from urdfkin.dh.elements import EPS, between_axes, wrapped
-from urdfkin.dh.noise import SUMMED, Noise, noise_of, tilt_of
+from urdfkin.dh.elements import between_axes, wrapped
+from urdfkin.dh.noise import Noise, noise_of, tilt_of
+from urdfkin.roundings import ANGLE, DIGITS, EPS, SUMMED
 from urdfkin.tree import FloatArray
 
 #: Below this tilt (rad) a pair is nearly parallel: the feet would magnify errors in the URDF a hundredfold.
@@ -159,11 +160,11 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
     if abs(length) <= max(SUMMED * EPS * reach, noise):
         return 0.0
     short = float(f"{length:.12g}")
-    return short if abs(length - short) <= 2.0 * EPS * reach else float(length)
+    return short if abs(length - short) <= DIGITS * EPS * reach else float(length)
 
 
 def cleaned_angle(angle: float) -> float:
     """An angle in (-pi, pi]; one that differs from a multiple of pi/12 by rounding only becomes it."""
     angle = wrapped(angle)
     twelfth = round(angle * 12.0 / math.pi) * math.pi / 12.0
-    return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= 4.0 * EPS else angle
+    return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle

@@ -16,12 +16,13 @@ import numpy as np
 
 from urdfkin.chain import ChainJoint, FrameChain, chain, steps_between
 from urdfkin.demands import real_number
-from urdfkin.dh.elements import EPS, nearest_twelfth, wrapped
+from urdfkin.dh.elements import nearest_twelfth, wrapped
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.statement import SnapChange, SnapStatement
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.rotation.euler import coordinate_rotation
+from urdfkin.roundings import EPS, TURN
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
 #: Half of 15 degrees is where the next multiple begins; a tolerance must stay clear of it.
@@ -119,7 +120,7 @@ def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree,
         angle = float(rotation_angle(T[:3, :3], joint.T_parent_joint[:3, :3]))
         if angle > 0.0:
             joints[i] = replace(joint, T_parent_joint=T)
-        if angle > 8.0 * EPS:
+        if angle > TURN * EPS:
             moved[joint.name] = angle
     return replace(tree, joints=tuple(joints)), moved
 
@@ -140,7 +141,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
     tilt = math.atan2(sine, R[2, 2])
-    if sine <= max(math.sin(tolerance), 8.0 * EPS):
+    if sine <= max(math.sin(tolerance), TURN * EPS):
         phi = 0.0
         psi = math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])
         if R[2, 2] < 0.0:
@@ -150,7 +151,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
     pose = np.array(A)
     pose[:3, :3] = _product(((2, phi), (0, tilt), (2, psi)), tolerance)
     angle = float(rotation_angle(pose[:3, :3], R))
-    return pose, (angle if angle > 8.0 * EPS else 0.0)
+    return pose, (angle if angle > TURN * EPS else 0.0)
 
 
 def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
@@ -158,7 +159,7 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
     R = np.eye(3)
     for axis, angle in turns:
         twelfth = nearest_twelfth(angle)
-        is_round = abs(angle - twelfth) <= max(tolerance, 8.0 * EPS)
+        is_round = abs(angle - twelfth) <= max(tolerance, TURN * EPS)
         turn = coordinate_rotation(axis, np.asarray(twelfth if is_round else angle))
         if is_round:
             turn[np.abs(turn) < EPS] = 0.0  # the cosine of a right angle

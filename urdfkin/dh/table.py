@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.coupling import Coupling, coupling_of
-from urdfkin.dh.elements import EPS
 from urdfkin.dh.row import Convention, DHRow, convention_of
 from urdfkin.dh.statement import SnapStatement
 from urdfkin.errors import InputError
 from urdfkin.reference import Reference
+from urdfkin.roundings import EPS, of_rows
 from urdfkin.tree import FloatArray, KinematicTree, frozen
 
 if TYPE_CHECKING:
@@ -102,14 +102,13 @@ class DHTable:
     def rounding(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
         """(...,) metres: what rounding may do to `placement(q)`; divided by `span`, radians.
 
-        Each row is a product of two matrices and an angle sum: about ten roundings of eps times the lever
-        arm, and half an eps of the angle itself. Cells cleaned to round numbers cost up to four eps each.
+        What the rows round (`urdfkin.roundings`), and their angles, times the lever arm.
         """
         values = np.abs(self.coupling.values(q))
         turns = np.array([row.kind.turns for row in self.rows], dtype=bool)
         angle = values[..., turns].sum(axis=-1)
         lever = self.span + values[..., ~turns].sum(axis=-1) + float(np.linalg.norm(self.base[:3, 3]))
-        return np.asarray(EPS * (8.0 + 8.0 * len(self.rows) + angle) * lever)
+        return np.asarray(EPS * (of_rows(len(self.rows)) + angle) * lever)
 
     def tolerance(self, q: ArrayLike | Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
         """(...,) metres and (...,) radians: how far `placement(q)` may be from the URDF's.
@@ -117,7 +116,7 @@ class DHTable:
         That is rounding for an exact table; what snapping declares is added.
         """
         metres = self.rounding(q)
-        radians = EPS * (8.0 + 8.0 * len(self.rows)) + np.zeros_like(metres)
+        radians = EPS * of_rows(len(self.rows)) + np.zeros_like(metres)
         if self.snap is None:
             return metres, radians
         values = self.coupling.values(q)

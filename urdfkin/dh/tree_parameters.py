@@ -23,12 +23,13 @@ import numpy as np
 
 from urdfkin.chain import motion_about_z
 from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
-from urdfkin.dh.elements import EPS, along_axis, between_axes
+from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.dh.lengths import demand_squares
 from urdfkin.dh.noise import Noise, noise_of, tilt_of
 from urdfkin.dh.normals import NearParallel, Step, cleaned_angle, cleaned_length, step_between
 from urdfkin.errors import InputError
 from urdfkin.rotation import axis_aligning
+from urdfkin.roundings import EPS, of_rows
 from urdfkin.tree import FloatArray, JointKind, KinematicTree, frozen
 
 _SIGMA = {
@@ -105,9 +106,12 @@ class TreeParameters:
 
     @property
     def roundings(self) -> float:
-        """How many eps of the reach rounding may make: eight for each joint of the deepest link, and more."""
+        """How many eps of the reach rounding may make: of the deepest link's rows, and of its own frame.
+
+        What Pinocchio rounds is not added: this is less than could conspire, and more than ever did.
+        """
         deepest = max((len(self._way(j)) for j in range(len(self.rows))), default=0)
-        return 8.0 * (2.0 + deepest) + self.left_out / EPS
+        return of_rows(1 + deepest) + self.left_out / EPS
 
     def reach(self, q: FloatArray) -> FloatArray:
         """(..., joints) metres: the way from the root to each link at `q`, the URDF's or the table's."""

@@ -28,10 +28,9 @@ from urdfkin.robot import Robot
 from urdfkin.rotation.euler import SEQUENCES, euler_of
 from urdfkin.rotation.euler_rates import NEAREST, singularity_distance
 from urdfkin.rotation.quaternion import quaternion_of
+from urdfkin.roundings import EPS, LEAST_UNIT
 from urdfkin.tree import FloatArray
 from urdfkin.verification.bounds import (
-    EPS,
-    LEAST_UNIT,
     Quantity,
     euler_jacobian_bound,
     nearest_singularity,

@@ -1,7 +1,7 @@
 """The equations on lengths: how large the terms are that a result is summed from.
 
-Instead of a vector stands its length, or a bound of it: a minus becomes a plus, a cross product the product of
-two lengths, and a rotation changes nothing. What an equation gives then, no term, no partial sum and no
+Instead of a vector stands its length, or a bound of it: a minus becomes a plus, a cross product the product
+of two lengths, and a rotation changes nothing. What an equation gives then, no term, no partial sum and no
 result of the equation itself can exceed. Rounding errors are proportional to it, not to the result, which
 may be small because large terms cancel.
 
@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.kinematics.arithmetic import bound
+from urdfkin.roundings import SMALLEST
 
 FloatArray = NDArray[np.float64]
-SMALLEST = float(np.finfo(np.float64).tiny)
 
 
 def product(x: FloatArray | float, y: FloatArray | float) -> FloatArray:

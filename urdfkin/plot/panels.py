@@ -10,8 +10,8 @@ import numpy as np
 from urdfkin.frame_motion import FrameMotion
 from urdfkin.recursion.breakdown import KINDS
 from urdfkin.rotation import log_rotation
+from urdfkin.roundings import EPS
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import EPS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,66 +1,22 @@
-"""How far two correct computations may differ: the one place where tolerances come from.
+"""How far two correct computations may differ: the roundings that they count, times the size of their terms.
 
 A result is accepted when every number differs from Pinocchio's by at most
 
-    k * eps * scale,      eps = 2^-52,      k = ROUNDINGS * factors * joints.
+    k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
 
 *scale* is the size of the terms that the number is summed from, in its own unit (`magnitudes`): two
 computations that add the same terms in another order differ in proportion to the terms, not to their sum.
 
-*k* counts roundings, to first order in eps, in the Euclidean norm. A joint multiplies the rotation so far
-by its constant rotation and by its own turn, so that a rotated vector is off by at most, for each joint:
-
-| | urdfkin | Pinocchio |
-|---|---|---|
-| the product with the constant: three terms round three times, 3 u sqrt(3) (u = eps/2) | 2.6 | 2.6 |
-| the turn: two terms, 2 u sqrt(2), and its sine and cosine, 1 | 2.5 | 2.5 |
-| the constant as read from roll, pitch, yaw: products of sines; through a quaternion, doubled | 2.5 | 6.0 |
-| the axis: divided by its length; Rodrigues' formula where it is no coordinate axis | 0.5 | 2.0 |
-| | 8.1 | 13.1 |
-
-Pinocchio takes an axis within 1e-12 of a coordinate axis for that one. With Q the turn by the tilt t that
-brings one axis to the other, |Q R Q^T - R| <= 2 |Q - 1| <= 2 t: a vector turned by the joint, or slid along
-its axis, is off by 2 t at most, and so is each factor behind it. Rodrigues' formula is not needed there: its
-2.0 hold a tilt up to eps. A larger one is a finding (URDF514) and adds 2 t / eps to the roundings of each
-factor, for the frames behind that joint and for no others.
-
-A follower's angle counts nothing: urdfkin and the oracle compute fl(fl(m q) + c) with the same doubles m and
-c (rules that follow rules are multiplied out from the leader's end, by both), which IEEE 754 defines to the
-last bit, and neither fuses the two operations. What is left is sine and cosine, above, whose argument is
-reduced without loss however large it is. So a slip in a follower's angle shows as it is, at 1e12 rad too.
-
-Products below the smallest normal number lose bits one by one. Such a product is off by 2^-1075, half the
-smallest subnormal number, which is (eps/2) times the smallest normal number: counting every size that is not
-zero as that large at least (`magnitudes`) puts it among the roundings counted here, whatever it is multiplied
-with afterwards. The least unit is then eps times it, 2^-1074.
-
-Rotations do not stretch what was wrong before, so the error grows with the number of joints and no faster.
-Adding the joint's term to the sum and its cross product cost 2 eps at most on each side; counting one joint
-more than there is covers the frame's own offset and the first of these sums, and the rest is in rounding
-8.1 + 13.1 = 21.2 up to ROUNDINGS = 24. The two may err in opposite directions, hence the sum.
-
-A base that is turned counts as one joint more (`magnitudes`); one that is not rounds nothing. Both sides
-bring the user's matrix M, right to nine digits, to the rotation nearest to it, each in its own way, so that
-how far M is from a rotation does not enter:
-
-| | urdfkin | Pinocchio |
-|---|---|---|
-| M^T M - I: nine sums of three products, 9 u in the Frobenius norm, of which the step takes half | 2.3 | |
-| the difference M - M (M^T M - I)/2, u sqrt(3), and what the step leaves, u/8 | 0.9 | |
-| K: sums of two or three numbers, 12 u; eigenvalues 4 apart; a quaternion's turn counts twice | | 3.0 |
-| the eigenvector once more through K + I: four products, 16 u, likewise; the quotient by its norm | | 5.0 |
-| the quaternion's matrix | | 3.0 |
-| a base's velocity and acceleration, brought into its axes: two crosses and two sums | | 6.0 |
-| | 3.2 | 17.0 |
-
-20.2 is within ROUNDINGS. Found were 0.6 and 5.1 for the rotation (1,500 matrices, against 50 digits).
+*k* counts roundings, to first order in eps (`urdfkin.roundings`): so many for each joint on the path, each of
+which turns what is behind it. Rotations do not stretch what was wrong before, so the error grows with the
+number of joints and no faster.
 
 A quantity is multilinear in rotated vectors, each a *factor* that may be off by as much: a position has one
 in each term (R d), a velocity two (w and d), an acceleration three (w, w, d, or v z, w, d), a Jacobian's
 linear rows two (z and d), its rate's three (w, z and d); seeing it in the frame's own axes is one factor
 more, seeing it from the world's origin crosses it with p and is one more.
 
-The bound is a worst case; rounding seldom conspires. What is measured is a fraction of an eps for each
+Rounding seldom conspires as it would have to. What is measured is a fraction of an eps for each
 joint, and reports give the disagreement itself, in multiples of eps * scale, so that it can be compared
 across robots.
 """
@@ -75,15 +31,9 @@ import numpy as np
 from urdfkin.kinematics.lengths import chapter as eq
 from urdfkin.recursion.plan import Column, Plan
 from urdfkin.reference import Reference
+from urdfkin.roundings import EPS, LEAST_UNIT, of_joints
 from urdfkin.tree import FloatArray
 from urdfkin.verification.magnitudes import Magnitudes
-
-EPS = float(np.finfo(np.float64).eps)
-#: The smallest unit: eps times the smallest normal number, which is the smallest number of all.
-LEAST_UNIT = float(np.finfo(np.float64).smallest_subnormal)
-#: Roundings for each joint and each factor, both computations together; derived above.
-ROUNDINGS = 24.0
-
 
 #: A scale beyond the range of doubles is inf; `disagreement` accepts nothing there.
 _BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
@@ -140,12 +90,7 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 def roundings(quantity: Quantity, reference: Reference, size: Magnitudes) -> FloatArray:
     """`k` for each result: its factors, times what each may be off by."""
     extra = 0 if reference is Reference.LOCAL_WORLD_ALIGNED or quantity is Quantity.PLACEMENT else 1
-    return (_FACTORS[quantity] + extra) * _of_a_factor(size)
-
-
-def _of_a_factor(size: Magnitudes) -> FloatArray:
-    """How many roundings a rotated vector may be off by, both computations together."""
-    return ROUNDINGS * size.joints + 2.0 * size.tilt / EPS
+    return (_FACTORS[quantity] + extra) * size.roundings
 
 
 def placement_bound(size: Magnitudes) -> Bound:
@@ -245,7 +190,7 @@ def euler_jacobian_bound(plan: Plan, size: Magnitudes, apart: FloatArray) -> Bou
         size: Of the frames.
         apart: (n, frames) s of Pinocchio's rotation.
     """
-    s = apart - EPS * _of_a_factor(size)
+    s = apart - EPS * size.roundings
     s = np.where(s > 0.0, s, 0.0)  # where rounding hides the singularity nothing is accepted
     bound = jacobian_bound(plan, size, Reference.LOCAL_WORLD_ALIGNED)
     with np.errstate(divide="ignore"):
@@ -264,9 +209,14 @@ def quaternion_jacobian_bound(plan: Plan, size: Magnitudes) -> Bound:
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
 
+def hidden_scalar(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
+    """Below what |qw| rounding hides its sign: k eps is 2 delta, so that this is 3, and q is off by 2.3."""
+    return 1.5 * EPS * result_k(bound, leading)
+
+
 def nearest_singularity(plan: Plan) -> float:
     """From where on (rad) rounding leaves Euler rates a digit: four times what R may be off by."""
-    return 4.0 * float((EPS * ROUNDINGS * (plan.depth + 1) + 2.0 * plan.tilts).max(initial=0.0))
+    return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:

@@ -17,6 +17,7 @@ import numpy as np
 from urdfkin.kinematics.lengths import chapter as eq
 from urdfkin.kinematics.lengths import counted, norm, product
 from urdfkin.recursion.plan import Geometry, Motion, Plan, Step
+from urdfkin.roundings import of_joints
 from urdfkin.tree import FloatArray
 
 _UNTURNED = np.eye(3).ravel()
@@ -33,9 +34,8 @@ class Magnitudes:
         vel: (n, frames) m/s.
         alpha: (n, frames) rad/s^2.
         acc: (n, frames) m/s^2.
-        joints: (n, frames) how many joints' worth of rounding lies on the path: one for each URDF joint, one
-            for a base that is turned, and one more.
-        tilt: (n, frames) rad: by how much Pinocchio's axes on the path are off the file's, added up.
+        roundings: (n, frames) of a factor: of each URDF joint on the path, of a base that is turned, and of
+            one joint more.
     """
 
     p: FloatArray
@@ -43,8 +43,7 @@ class Magnitudes:
     vel: FloatArray
     alpha: FloatArray
     acc: FloatArray
-    joints: FloatArray
-    tilt: FloatArray
+    roundings: FloatArray
 
 
 @np.errstate(over="ignore", under="ignore", invalid="ignore")
@@ -53,7 +52,7 @@ def magnitudes(
 ) -> Magnitudes:
     """For flat batches q (n, nq), v and a (n, nv) or None, and a base state (1 or n, 24).
 
-    Without v, only p and joints are those of the frames: what depends on places alone needs no more.
+    Without v, only p and roundings are those of the frames: what depends on places alone needs no more.
     """
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
@@ -68,13 +67,13 @@ def magnitudes(
         )
         states.append(moved)
     carry = _carry if v is not None else _carry_place
-    out = np.empty((7, len(q), len(plan.frames)))
+    out = np.empty((6, len(q), len(plan.frames)))
     for f, (step, place) in enumerate(plan.frames):
         carried = carry(states[step + 1], lengths[len(plan.steps) + f])
         for row, values in zip(out, carried, strict=False):
             row[:, place] = values  # what is the same for all configurations is one number
-    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # such a base rounds like a joint: see `bounds`
-    out[5], out[6] = plan.depth + 1 + turned[:, np.newaxis], plan.tilts
+    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # such a base rounds like a joint
+    out[5] = of_joints(plan.depth + 1 + turned[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from urdfkin.configuration import neutral
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.rotation.quaternion import rotation_of
+from urdfkin.roundings import EPS, FOLLOWER
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic
-from urdfkin.verification.bounds import EPS
 
 #: A coordinate whose bounds are wider than this, or missing, is drawn from this range: rad or m.
 WIDEST = 10.0
@@ -88,9 +88,11 @@ def _kept(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float,
         return math.inf, -math.inf
     ends = sorted((end - rule.offset) / rule.multiplier for end in (limit.lower, limit.upper))
     # Inwards by what the follower's own value may be rounded by.
-    room = 4.0 * EPS * (max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)) / abs(rule.multiplier)
+    room = (
+        FOLLOWER * EPS * (max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)) / abs(rule.multiplier)
+    )
     if not math.isfinite(room):  # a follower with a single bound
-        room = 4.0 * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
+        room = FOLLOWER * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
     return (
         lower if keeps(lower) else max(lower, ends[0] + room),
         upper if keeps(upper) else min(upper, ends[1] - room),

@@ -8,7 +8,9 @@ Pinocchio knows frames in the world; a table's numbers are relative to its base,
     alpha= R_b^T (alpha_t - alpha_b - w_b x (w_t - w_b))
     acc  = R_b^T (a_t - a_b - alpha_b x r - w_b x (w_b x r) - 2 w_b x (v_t - v_b - w_b x r))
 
-which are 7.124 and 7.125 solved for the motion seen from the moving frame. The bound is what rounding can do
+which are 7.124 and 7.125 solved for the motion seen from the moving frame. They stand here a second time, and
+not as `urdfkin.kinematics.equations` has them: a table is computed by that text, and this is what it is held
+against. The bound is what rounding can do
 to either side, plus what a snapped table declares.
 
 Rounding is measured by the robot: by the ways from the root to both ends, with what slides, and in each
@@ -32,11 +34,10 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.oracle import Oracle
 from urdfkin.reference import Reference
+from urdfkin.roundings import EPS, of_joints, of_rows
 from urdfkin.tree import FloatArray, KinematicTree
-from urdfkin.verification.bounds import ROUNDINGS
 from urdfkin.verification.sampling import Samples
 
-_EPS = float(np.finfo(np.float64).eps)
 _ALIGNED = [Reference.LOCAL_WORLD_ALIGNED]
 #: No length of a table with Hayati rows exceeds so many times the robot's reach (docs/dh.md).
 PROMISED = 10.0
@@ -148,7 +149,7 @@ def _loss(table: DHTable) -> str:
     tilt = math.asin(min(tilts, default=1.0))
     snap = f"take --snap {10.0 ** math.ceil(math.log10(tilt)):.0e}, or " if tilt <= LARGEST_TOLERANCE else ""
     return (
-        f"{cell} of {joint} is {length:.3g} m, and eps times that is {_EPS * length * 1e3:.2g} mm;"
+        f"{cell} of {joint} is {length:.3g} m, and eps times that is {EPS * length * 1e3:.2g} mm;"
         f" {snap}take Hayati rows"
     )
 
@@ -183,7 +184,7 @@ def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, floa
     }
     units, shares = dict[str, float](), dict[str, float]()
     for name, halves in pairs.items():
-        units[name] = max(_worst(x, scale * _EPS) for x, scale, _ in halves)
+        units[name] = max(_worst(x, scale * EPS) for x, scale, _ in halves)
         shares[name] = max(_worst(x, (scale.T * size.rounding).T + allowed) for x, scale, allowed in halves)
     return units, shares
 
@@ -283,12 +284,10 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 weights[joint.kind.turns][names.index(leader)] += factor
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
-    # An axis that Pinocchio takes for another turns each factor by twice the tilt (`verification.bounds`), of
-    # which the acceleration seen from the base has four.
-    left = left_out(chain(tree, table.tip_frame, table.base_frame)) + 8.0 * tilt
-    # A joint costs what it does anywhere, in Pinocchio and in our reading of the chain that rows are made of
-    # (`bounds.ROUNDINGS`); a row's own turns and products 8 more, its angle aside.
-    rounding = _EPS * (8.0 + ROUNDINGS * joints + 8.0 * len(table.rows) + angles) + left
+    # A joint costs what it does anywhere, in Pinocchio and in our reading of the chain that rows are made of,
+    # and a row what it does. The acceleration seen from the base has four factors that a tilt turns.
+    counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
+    rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 

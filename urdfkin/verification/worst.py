@@ -10,8 +10,8 @@ import math
 import numpy as np
 
 from urdfkin.recursion.compiling import ROWS, SCRATCH, helper, kernel
+from urdfkin.roundings import EPS, LEAST_UNIT
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import EPS, LEAST_UNIT
 
 
 def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:

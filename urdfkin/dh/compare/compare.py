@@ -14,11 +14,11 @@ from urdfkin.dh.compare.fit import CELLS, Model, columns, fit_cells, hidden_cell
 from urdfkin.dh.compare.freedoms import fit_freedoms
 from urdfkin.dh.compare.result import CellDifference, Comparison, TakenUp
 from urdfkin.dh.convert import to_standard
-from urdfkin.dh.elements import EPS
 from urdfkin.dh.row import Convention
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
+from urdfkin.roundings import EPS, of_a_fit
 from urdfkin.tree import FloatArray, JointKind
 
 #: Metres at the tip up to which a table agrees: half as much again as rounding to 0.1 mm in a cell or two.
@@ -139,7 +139,7 @@ def _best_fit(
         metres, radians = _apart(model, values, wanted)
         return metres + scale * radians
 
-    if size(written) <= 100.0 * EPS * scale:
+    if size(written) <= EPS * of_a_fit(0) * scale:
         return written
     best, best_size = written, size(written)
     for start in _starts(chain, standard, written):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from urdfkin.dh.elements import EPS
 from urdfkin.dh.table import DHTable
+from urdfkin.roundings import EPS, of_a_fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ class Comparison:
     @property
     def rounding(self) -> float:
         """Radians, and metres for each metre of the robot's reach, that count as rounding."""
-        return 100.0 * EPS * (1.0 + len(self.reference.rows))
+        return EPS * of_a_fit(len(self.reference.rows))
 
     @property
     def exact(self) -> bool:

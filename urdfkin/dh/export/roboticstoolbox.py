@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from urdfkin.dh.elements import EPS
 from urdfkin.dh.export.code import header, is_coupled, numbers, plain
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.snapping import LARGEST_TOLERANCE
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
+from urdfkin.roundings import EPS
 
 
 def write(table: DHTable, units: Units) -> str:
