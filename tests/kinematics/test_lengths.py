@@ -1,0 +1,112 @@
+"""The equations on lengths bound the same equations on vectors, and nothing but zero vanishes."""
+
+import inspect
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.strategies import rotations, trees
+from urdfkin.kinematics import equations
+from urdfkin.kinematics.arithmetic import VECTORS
+from urdfkin.kinematics.arrays import chapter as on_vectors
+from urdfkin.kinematics.lengths import chapter as on_lengths
+from urdfkin.kinematics.lengths import counted, norm, product
+from urdfkin.recursion.base import STILL_STATE
+from urdfkin.recursion.evaluate import accelerations, placements, velocities
+from urdfkin.recursion.plan import make_plan
+from urdfkin.roundings import EPS, SMALLEST
+from urdfkin.tree import FloatArray, KinematicTree
+from urdfkin.verification.magnitudes import magnitudes
+from urdfkin.verification.sampling import draw
+
+#: Every equation of motion; a rotation made of a sine and a cosine has no length.
+EQUATIONS = sorted(
+    name
+    for name, value in vars(equations).items()
+    if isinstance(value, FunctionType)
+    and name not in VECTORS
+    and not name.startswith("about_")
+    and name != "rotation_of_quaternion"
+)
+numbers = st.one_of(st.floats(-1e3, 1e3), st.sampled_from([0.0, 1e-200, -1e-308, 5e-324, 1e60]))
+vectors = st.tuples(numbers, numbers, numbers).map(np.array)
+sizes = st.one_of(st.just(0.0), st.floats(5e-324, 1e100))
+
+
+def parameters(name: str) -> list[str]:
+    return list(inspect.signature(getattr(equations, name)).parameters)
+
+
+def numbers_of(name: str) -> set[str]:
+    """Which parameters are numbers: a joint's rates, and the two of 7.64."""
+    return {"d", "a"} if name == "interorigin_vector" else {"v", "a"}
+
+
+def both(result: Any) -> tuple[Any, ...]:
+    return result if isinstance(result, tuple) else (result,)
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+@given(data=st.data())
+@settings(max_examples=60, deadline=None)
+def test_no_result_of_an_equation_is_longer_than_it_is_on_lengths(name: str, data: st.DataObject) -> None:
+    given: dict[str, Any] = {
+        x: data.draw(rotations if x == "R" else numbers if x in numbers_of(name) else vectors)
+        for x in parameters(name)
+    }
+    lengths = {
+        x: None if x == "R" else counted(np.asarray(value)) if np.ndim(value) == 0 else norm(value)
+        for x, value in given.items()
+    }
+    with np.errstate(under="ignore"):
+        found = both(getattr(on_vectors, name)(**given))
+        bounds = both(getattr(on_lengths, name)(**lengths))
+    for vector, bound in zip(found, bounds, strict=True):
+        assert np.hypot.reduce(vector) <= bound * (1.0 + 8.0 * EPS)
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+@given(data=st.data())
+@settings(max_examples=30, deadline=None)
+def test_what_is_longer_makes_nothing_shorter(name: str, data: st.DataObject) -> None:
+    pairs = {x: sorted((data.draw(sizes), data.draw(sizes))) for x in parameters(name)}
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        shorter, longer = (
+            both(getattr(on_lengths, name)(**{x: counted(np.asarray(pair[i])) for x, pair in pairs.items()}))
+            for i in (0, 1)
+        )
+    assert all(a <= b for a, b in zip(shorter, longer, strict=True))
+
+
+@given(sizes, sizes)
+def test_a_product_is_no_less_than_the_smallest_normal_number_unless_a_factor_is_zero(
+    x: float, y: float
+) -> None:
+    with np.errstate(over="ignore", under="ignore"):
+        xy = float(product(x, y))
+        assert xy == max(x * y, SMALLEST) if x and y else xy == 0.0
+
+
+@given(trees(max_joints=6), st.integers(0, 2**32), st.sampled_from([1.0, 1e-3, 1e3, 1e-170]))
+@settings(max_examples=40, deadline=None)
+def test_no_motion_of_any_link_of_any_tree_exceeds_its_size(
+    tree: KinematicTree, seed: int, speed: float
+) -> None:
+    plan = make_plan(tree, range(len(tree.links)))
+    samples = draw(tree, 5, np.random.default_rng(seed), with_special=True)
+    q, v, a = samples.q, speed * samples.v, speed * samples.a
+    size = magnitudes(plan, q, v, a, STILL_STATE)
+    vel, acc = velocities(plan, q, v), accelerations(plan, q, v, a)
+
+    def exceeds(found: FloatArray, size: FloatArray) -> bool:
+        return bool((np.hypot.reduce(found, axis=-1) > size * (1.0 + 100.0 * EPS)).any())
+
+    assert not exceeds(placements(plan, q)[..., :3, 3], size.p)
+    assert not exceeds(vel[..., :3], size.vel)
+    assert not exceeds(vel[..., 3:], size.w)
+    assert not exceeds(acc[..., :3], size.acc)
+    assert not exceeds(acc[..., 3:], size.alpha)
