@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import copy
+import ctypes
 import os
 import pickle
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
@@ -19,6 +23,8 @@ from tests.laws.subjects import robot_of, state
 from urdfkin import Reference
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 from urdfkin.prepared import PreparedFrame
+from urdfkin.recursion.single import arrays_are_known, one_configuration, single
+from urdfkin.recursion.task import Task
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
 
@@ -281,3 +287,97 @@ def test_it_goes_to_another_process(tmp_path: Any) -> None:
         capture_output=True, text=True, check=False, env=os.environ,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_functions_take_their_own_number_of_arguments_and_no_other(panda: Robot) -> None:
+    q, fast = panda.neutral(), panda.prepare(FRAME)
+    fast.jacobian(q)
+    compute, task = single("jacobian", panda.plan([panda.tree.frame_link(FRAME)]), fast.reference)
+    for arguments in ((), (q,), (q, None, None), (q, q, None), (None, None), (q, q), (None, q)):
+        assert compute(*arguments) is None
+    assert task[Task.COUNT] == 0
+    assert compute(q, None) is not None
+    assert task[Task.COUNT] == 1
+
+
+def test_arrays_lie_in_memory_as_compiled_code_reads_them() -> None:
+    assert arrays_are_known()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_arguments_and_results_are_held_as_often_as_they_are_used(panda: Robot, method: str) -> None:
+    inputs = [x[0] for x in state(panda, 1, 7)][: METHODS[method]]
+    fast = getattr(panda.prepare(FRAME), method)
+    out, wrong = fast(*inputs), np.zeros(5)
+    things = (*inputs, out, wrong)
+    before = [sys.getrefcount(thing) for thing in things]
+    for _ in range(100):
+        fast(*inputs, out=out)
+        assert sys.getrefcount(fast(*inputs)) == sys.getrefcount(np.empty(3))
+        with pytest.raises(InputError):
+            fast(*inputs, out=wrong)
+    assert [sys.getrefcount(thing) for thing in things] == before
+
+
+def test_while_one_thread_is_at_work_another_gets_the_same_by_the_robots_way(panda: Robot) -> None:
+    q, fast = panda.sample(1, 8)[0], panda.prepare(FRAME)
+    expected = fast.jacobian(q)
+    task = fast._jacobian.__self__[0]  # type: ignore[attr-defined]
+    task[Task.BUSY] = 1
+    try:
+        assert fast._jacobian(q, None) is None
+        assert not differing(fast.jacobian(q), expected)
+    finally:
+        task[Task.BUSY] = 0
+    assert not differing(fast._jacobian(q, None), expected)
+
+
+def test_threads_that_share_one_get_their_own_results() -> None:
+    robot = urdfkin.load("panda", verify=False)
+    fast, qs = robot.prepare(FRAME), robot.sample(4, 9)
+    expected = robot.jacobian(qs, FRAME, threads=1)
+    results = np.zeros((4, 200, 6, robot.nv))
+
+    def work(k: int) -> None:
+        for out in results[k]:
+            fast.jacobian(qs[k], out=out)
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(work, range(4)))
+    assert not differing(results, np.repeat(expected[:, np.newaxis], 200, axis=1))
+    assert robot.certificate().lines[0].unchecked == 4 + 800
+
+
+def test_threads_that_share_one_without_the_interpreters_lock_get_right_results_or_none() -> None:
+    robot = urdfkin.load("panda", verify=False)
+    fast, qs = robot.prepare(FRAME), robot.sample(2, 10)
+    expected = robot.jacobian(qs, FRAME, threads=1)
+    fast.jacobian(qs[0])
+    bound = fast._jacobian.__self__  # type: ignore[attr-defined]
+    word, calls, begun = ctypes.c_int64, 20_000, threading.Barrier(2)
+    compute = ctypes.CFUNCTYPE(word, word, word, word)(one_configuration.address)
+
+    @numba.njit(nogil=True)
+    def ask(bound: int, arguments: int, to: int, out: FloatArray, right: FloatArray) -> tuple[int, int]:
+        done = wrong = 0
+        for _ in range(calls):
+            if compute(bound, arguments, 2) == to:
+                done += 1
+                wrong += not (out == right).all()
+                out[:] = 0.0
+        return done, wrong
+
+    def work(k: int) -> tuple[int, int]:
+        q, out = qs[k], np.empty((6, robot.nv))
+        arguments = (word * 2)(id(q), id(out))
+        begun.wait()
+        done, wrong = ask(id(bound), ctypes.addressof(arguments), id(out), out, expected[k])
+        return done, wrong
+
+    begun_with = int(bound[0][Task.COUNT])
+    ask.compile("UniTuple(int64, 2)(int64, int64, int64, float64[:, ::1], float64[:, ::1])")
+    with ThreadPoolExecutor(2) as pool:
+        (first, wrong), (second, also_wrong) = pool.map(work, range(2))
+    assert (wrong, also_wrong) == (0, 0)
+    assert bound[0][Task.COUNT] - begun_with == first + second
+    assert min(first, second) > 0

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from urdfkin.enclosure import Enclosures
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-_ARRAY, _FLOAT64 = np.ndarray, np.dtype(np.float64)
 #: More than these no array can hold, on any machine.
 _MOST_NUMBERS = (2**63 - 1) // 8
 
@@ -223,8 +222,12 @@ class Robot(Manipulator, Tables):
             UnknownNameError: no such frame.
             VerificationError: Pinocchio computes something else.
         """
-        if base is None and threads is None and (fast := self._fast(frame, _ALIGNED, q, verify)) is not None:
-            return fast.placement(q, out)
+        if (
+            (base is None and threads is None)
+            and (fast := self._fast(frame, _ALIGNED, verify))
+            and (one := fast._placement(q, out)) is not None
+        ):
+            return one
         call = Call(self, (frame,), _ALIGNED, base, q)
         to = call.flat(out, 4, 4)
         poses = call.compute(evaluate.placements, call.plan, call.q, base=call.state, out=to, threads=threads)
@@ -245,8 +248,12 @@ class Robot(Manipulator, Tables):
         threads: int | None = None,
     ) -> FloatArray:
         """(..., 6) [linear; angular] m/s, rad/s: eq. 7.127, 7.128. Arguments and errors as `placement`."""
-        if base is None and threads is None and (fast := self._fast(frame, reference, q, verify)) is not None:
-            return fast.velocity(q, v, out)
+        if (
+            (base is None and threads is None)
+            and (fast := self._fast(frame, reference, verify))
+            and (one := fast._velocity(q, v, out)) is not None
+        ):
+            return one
         call = Call(self, (frame,), reference, base, q, v)
         walk, to = (call.plan, call.q, *call.rates, call.reference), call.flat(out, 6)
         sixes = call.compute(evaluate.velocities, *walk, base=call.state, out=to, threads=threads)
@@ -269,8 +276,12 @@ class Robot(Manipulator, Tables):
 
         Column i is the frame's velocity [linear; angular] for a unit rate of `rate_names[i]` alone.
         """
-        if base is None and threads is None and (fast := self._fast(frame, reference, q, verify)) is not None:
-            return fast.jacobian(q, out)
+        if (
+            (base is None and threads is None)
+            and (fast := self._fast(frame, reference, verify))
+            and (one := fast._jacobian(q, out)) is not None
+        ):
+            return one
         call = Call(self, (frame,), reference, base, q)
         walk, to = (call.plan, call.q, call.reference), call.flat(out, 6, self.nv)
         Js = call.compute(evaluate.jacobians, *walk, base=call.state, out=to, threads=threads)
@@ -295,8 +306,12 @@ class Robot(Manipulator, Tables):
 
         Gravity is not in it. Arguments and errors as `placement`.
         """
-        if base is None and threads is None and (fast := self._fast(frame, reference, q, verify)) is not None:
-            return fast.acceleration(q, v, a, out)
+        if (
+            (base is None and threads is None)
+            and (fast := self._fast(frame, reference, verify))
+            and (one := fast._acceleration(q, v, a, out)) is not None
+        ):
+            return one
         call = Call(self, (frame,), reference, base, q, v, a)
         walk, to = (call.plan, call.q, *call.rates, call.reference), call.flat(out, 6)
         sixes = call.compute(evaluate.accelerations, *walk, base=call.state, out=to, threads=threads)
@@ -397,18 +412,12 @@ class Robot(Manipulator, Tables):
             )
         return self._oracles[moving]
 
-    def _fast(
-        self, frame: str, reference: Reference | str, q: object, verify: Verify | None
-    ) -> PreparedFrame | None:
+    def _fast(self, frame: str, reference: Reference | str, verify: Verify | None) -> PreparedFrame | None:
         """The short way for a single configuration that nobody checks; None where it is not for this call."""
         if verify is not False and (verify is not None or self.verify is not False):
             return None
-        if type(q) is not _ARRAY or q.ndim != 1 or type(frame) is not str:
-            return None
-        if q.dtype is not _FLOAT64 and q.dtype != _FLOAT64:  # from another process it is another object
-            return None
-        if reference is _ALIGNED and (prepared := self._prepared.get(frame)) is not None:
-            return prepared
+        if reference is _ALIGNED and type(frame) is str and (fast := self._prepared.get(frame)) is not None:
+            return fast
         return self.prepare(frame, reference)
 
     def cannot_verify(self, base: BaseMotion | None = None) -> str | None:

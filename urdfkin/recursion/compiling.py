@@ -24,9 +24,6 @@ from urdfkin.kinematics import equations
 from urdfkin.recursion.kept_kernels import KeptKernel
 from urdfkin.recursion.parts import PartCompiler
 
-#: What Numba raises of its own where a kernel does not take an argument.
-NoKernelError: type[Exception] = numba.core.errors.NumbaError
-
 _config: Any = numba.config  # settings that numba sets at run time
 
 #: How everything here is compiled. Nothing is reordered, and what is fused says so itself (`numbers`):
@@ -66,19 +63,9 @@ def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 compiled = jitted(**_PART)
 
 # Inputs may be read-only; a writable array converts without a copy. One signature, compiled once.
-PLAN = types.Array(types.int64, 1, "C", readonly=True)
-#: A plan bound to scratch memory, for one configuration at a time.
-BOUND = types.Array(types.int64, 1, "C")
 NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 SCRATCH = types.Array(types.float64, 1, "C")
-INT = types.int64
-
-
-def output(axes: int) -> Any:
-    """A kernel's output with so many axes."""
-    return types.Array(types.float64, axes, "C")
-
 
 #: One kernel after the other, as Numba compiles them anyway. A fork waits for the one that is being compiled:
 #: in the child nobody would finish it.
@@ -123,16 +110,16 @@ class Kernel:
 
 
 class Core(Kernel):
-    """A function of one address, with C's calling convention: kernels call it, and Python by ctypes.
+    """A function of addresses, with C's calling convention: kernels call it, and Python by ctypes.
 
     Python calls it without the interpreter's lock.
     """
 
-    def __init__(self, function: Callable[[int], int]) -> None:
-        super().__init__(function, (types.int64,), nogil=True)
+    def __init__(self, function: Callable[..., int]) -> None:
+        super().__init__(function, (types.int64,) * function.__code__.co_argcount, nogil=True)
 
     def _compile(self) -> Any:
-        core: Any = CFunc(self._function, ((types.int64,), types.int64), {}, COMPILED)
+        core: Any = CFunc(self._function, (self._arguments, types.int64), {}, COMPILED)
         if (folder := cache_folder()) is not None:
             core._cache = KeptKernel(self._function, folder)
         with compiling_allowed():
@@ -149,7 +136,7 @@ class Core(Kernel):
         return int(self.compiled.ctypes(*arguments))
 
 
-def core(function: Callable[[int], int]) -> Core:
+def core(function: Callable[..., int]) -> Core:
     """Decorator: compile when first called, keep the result on disk."""
     return Core(function)
 
@@ -173,6 +160,6 @@ def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]]
 def cache_folder() -> Path | None:
     """Where compiled kernels are kept; None if no folder can be written."""
     root = Path(_config.CACHE_DIR) if _config.CACHE_DIR else None
-    versions = numba.__version__, llvmlite.__version__, sys.implementation.cache_tag
+    versions = numba.__version__, llvmlite.__version__, sys.implementation.cache_tag + sys.abiflags
     sources = [*Path(__file__).parent.glob("*.py"), *Path(equations.__file__).parent.glob("*.py")]
     return kept_folder("kernels", sorted(sources), *versions, root=root)

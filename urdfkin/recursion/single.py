@@ -1,11 +1,21 @@
-"""Kernels for one configuration: they hand over nothing but its arrays, and keep the interpreter's lock.
+"""One configuration after the other: a function that Python calls as it calls its own built-in ones.
 
-A task that is at work for another thread is left alone: the caller then goes another way.
+Numba's way into compiled code takes as long as the walk itself: it asks each argument for its type and
+unpacks every array. CPython hands a built-in function the addresses of its arguments and asks nothing. This
+one looks at the few words of each array that it needs, which lie where CPython and NumPy promise them to C
+code, and keeps the interpreter's lock for the microsecond. What it does not take as it is, it leaves alone,
+and says so.
+
+A task is taken in one step that no thread comes between, with the lock or without. One that is at work for
+another thread is left alone too: the caller then goes another way.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import ctypes
+from collections.abc import Callable
+from functools import cache
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -13,16 +23,32 @@ from numba import types
 from numba.extending import intrinsic
 
 from urdfkin.recursion import cores
-from urdfkin.recursion.compiling import BOUND, NUMBERS, Core, Kernel, compiled, kernel, output
+from urdfkin.recursion.compiling import Core, compiled, core
 from urdfkin.recursion.plan import IntArray, Plan
 from urdfkin.recursion.program import program_of
-from urdfkin.recursion.registers import WHOLE_NUMBERS, address_of, whole_numbers_at
+from urdfkin.recursion.registers import WHOLE_NUMBERS, whole_numbers_at
 from urdfkin.recursion.task import Task, scratch
 from urdfkin.reference import Reference
+from urdfkin.tree import FloatArray
 
 _CORE, _BUSY, _COUNT = int(Task.CORE), int(Task.BUSY), int(Task.COUNT)
-_Q, _V, _A, _OUT, _N = int(Task.Q), int(Task.V), int(Task.A), int(Task.OUT), int(Task.N)
-_NQ, _NV, _ROWS, _COLUMNS = int(Task.NQ), int(Task.NV), int(Task.ROWS), int(Task.COLUMNS)
+_Q, _OUT, _NQ, _NV, _ORDERS = int(Task.Q), int(Task.OUT), int(Task.NQ), int(Task.NV), int(Task.ORDERS)
+_AXES, _ROWS, _COLUMNS = int(Task.AXES), int(Task.ROWS), int(Task.COLUMNS)
+
+#: Words, of eight bytes, of a Python object: its type, what is its own, and the items of a tuple.
+_OWN = object.__basicsize__ // 8
+_TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
+#: Of NumPy's arrays (PyArrayObject_fields; the numbers of axes and of flags fill half a word), and of their
+#: kinds of number (PyArray_Descr): one word with the byte order and NumPy's number for the kind.
+_DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
+_KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
+_HALF, _BYTE = 0xFFFFFFFF, 0xFF
+#: C-contiguous and aligned; and writable.
+_READABLE, _WRITABLE = 0x101, 0x501
+
+_keep = types.ExternalFunction("Py_IncRef", types.void(types.int64))
+_drop = types.ExternalFunction("Py_DecRef", types.void(types.int64))
+_made = types.ExternalFunction("PyObject_CallOneArg", types.int64(types.int64, types.int64))
 
 
 @intrinsic
@@ -59,80 +85,132 @@ def _give_back(context: Any, numbers: Any, place: Any) -> Any:
 
 
 @compiled
-def _apart(x, out):
-    """Whether two contiguous arrays of doubles have no memory in common."""
-    first, to = address_of(x), address_of(out)
-    return first + 8 * x.size <= to or to + 8 * out.size <= first
+def _doubles(given, ndarray, flags, axes, rows, columns):
+    """Where an array's doubles lie; 0 where it is another kind of thing, or of another shape."""
+    x = whole_numbers_at(given)
+    if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
+        return 0
+    kind, shape = whole_numbers_at(x[_KIND])[_KIND_AND_ORDER], whole_numbers_at(x[_SHAPE])
+    if kind >> 32 != _DOUBLE or kind >> 16 & _BYTE != _NATIVE:
+        return 0
+    return x[_DATA] if shape[0] == rows and (axes == 1 or shape[1] == columns) else 0
+
+
+@core
+def one_configuration(bound, arguments, count):
+    """q, or q and v, or q, v and a, then where to write or None: the result, or None where it was not taken.
+
+    Args:
+        bound: Address of the tuple it was bound to: a task, what arrays are, None, what makes an array, of
+            which shape, and what the task needs.
+        arguments: Address of theirs.
+        count: How many they are.
+    """
+    items, given = whole_numbers_at(bound), whole_numbers_at(arguments)
+    address, ndarray, none = whole_numbers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
+    orders = whole_numbers_at(address)[_ORDERS]
+    if count == orders + 1:
+        out = given[orders]
+        if out == none:
+            out = _made(items[_ITEMS + 3], items[_ITEMS + 4])
+        else:
+            _keep(out)
+        if out == 0 or _done(address, given, out, ndarray):
+            return out
+        _drop(out)
+    _keep(none)
+    return none
 
 
 @compiled
-def _done(bound, q, v, a, out):
-    """Have the core compute; 1 where that went well."""
-    address = address_of(bound)
+def _done(address, given, to, ndarray):
+    """Have the core compute into an array; whether it did."""
     task = whole_numbers_at(address)
-    if _taken(task, _BUSY):
-        return 0
-    task[_Q], task[_V], task[_A], task[_OUT] = address_of(q), address_of(v), address_of(a), address_of(out)
-    good = int(_call(task[_CORE], address) == 0)
+    orders, rows, columns, width = task[_ORDERS], task[_ROWS], task[_COLUMNS], task[_NQ]
+    out = _doubles(to, ndarray, _WRITABLE, task[_AXES], rows, columns)
+    good = out != 0
+    for i in range(orders):
+        x = _doubles(given[i], ndarray, _READABLE, 1, width, 1) if good else 0
+        apart = x + 8 * width <= out or out + 8 * rows * columns <= x
+        good, width = x != 0 and apart, task[_NV]
+    if not good or _taken(task, _BUSY):
+        return False
+    for i in range(orders):
+        task[_Q + i] = whole_numbers_at(given[i])[_DATA]
+    task[_OUT] = out
+    good = _call(task[_CORE], address) == 0
     task[_COUNT] += good
     _give_back(task, _BUSY)
     return good
 
 
-@kernel(BOUND, NUMBERS, output(2), nogil=False)
-def matrix(bound, q, out):
-    """A placement or a Jacobian: 1, or 0 where the arrays cannot be taken or numbers are not finite.
+class _Method(ctypes.Structure):
+    """CPython's PyMethodDef."""
 
-    Shapes: q (nq,), out (4, 4) or (6, nv), memory of its own.
-    """
-    good = q.shape[0] == bound[_NQ] and out.shape[0] == bound[_ROWS] and out.shape[1] == bound[_COLUMNS]
-    return _done(bound, q, q, q, out) if good and _apart(q, out) else 0
-
-
-@kernel(BOUND, NUMBERS, NUMBERS, NUMBERS, output(1), nogil=False)
-def six(bound, q, v, a, out):
-    """A velocity or an acceleration, likewise.
-
-    Shapes: q (nq,), v and a (nv,), out (6,), memory of its own.
-    """
-    good = q.shape[0] == bound[_NQ] and v.shape[0] == bound[_NV] and a.shape[0] == bound[_NV]
-    good = good and out.shape[0] == 6 and _apart(q, out) and _apart(v, out) and _apart(a, out)
-    return _done(bound, q, v, a, out) if good else 0
+    _fields_ = (
+        ("name", ctypes.c_char_p),
+        ("address", ctypes.c_void_p),
+        ("convention", ctypes.c_int),
+        ("text", ctypes.c_char_p),
+    )
 
 
-class Single(NamedTuple):
-    """What computes one quantity of one frame in one configuration.
-
-    Attributes:
-        kernel: `matrix` or `six`, compiled; its first argument is the task.
-        task: Good while `kept` is.
-        kept: What the task holds addresses of.
-    """
-
-    kernel: Any
-    task: IntArray
-    kept: tuple[object, ...]
+_FASTCALL = 0x80
+_FUNCTION = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.POINTER(_Method), ctypes.py_object, ctypes.c_void_p)
 
 
-#: For each quantity: its core, that for LOCAL, the kernel that calls them, and whether it has columns.
-_HOW: dict[str, tuple[Core, Core, Kernel, bool]] = {
-    "placement": (cores.placements, cores.placements, matrix, False),
-    "velocity": (cores.velocities, cores.local_velocities, six, False),
-    "jacobian": (cores.jacobians, cores.jacobians, matrix, True),
-    "acceleration": (cores.accelerations, cores.local_accelerations, six, False),
+def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
+    """The code at an address as a function, which keeps alive what it is bound to."""
+    method = _Method(name.encode(), address, _FASTCALL, None)
+    new = _FUNCTION(("PyCFunction_NewEx", ctypes.pythonapi))
+    function: Callable[..., FloatArray | None] = new(ctypes.byref(method), (*bound, method), None)
+    return function
+
+
+@cache
+def arrays_are_known() -> bool:
+    """Whether arrays are laid out as C code expects them; another NumPy's are left to NumPy."""
+    x = np.zeros((2, 3))
+    if np.ndarray.__basicsize__ < 8 * (_FLAGS + 1) or np.dtype.__basicsize__ < 8 * (_KIND_AND_ORDER + 1):
+        return False
+    word = ctypes.POINTER(ctypes.c_int64)
+    own, kind = (ctypes.cast(id(part), word) for part in (x, x.dtype))
+    return (
+        (own[_TYPE], own[_DATA], own[_NDIM] & _HALF) == (id(np.ndarray), x.ctypes.data, 2)
+        and ctypes.cast(own[_SHAPE], word)[:2] == [2, 3]
+        and (own[_KIND], own[_FLAGS] & _WRITABLE) == (id(x.dtype), _WRITABLE)
+        and (kind[_KIND_AND_ORDER] >> 32, kind[_KIND_AND_ORDER] >> 16 & _BYTE) == (x.dtype.num, _NATIVE)
+    )
+
+
+#: For each quantity: its core, that for LOCAL, how many of q, v and a they take, and whether it has columns.
+_HOW: dict[str, tuple[Core, Core, int, bool]] = {
+    "placement": (cores.placements, cores.placements, 1, False),
+    "velocity": (cores.velocities, cores.local_velocities, 2, False),
+    "jacobian": (cores.jacobians, cores.jacobians, 1, True),
+    "acceleration": (cores.accelerations, cores.local_accelerations, 3, False),
 }
 
 
-def single(quantity: str, plan: Plan, reference: Reference) -> Single:
-    """Compile, or read from disk, what computes a quantity of a plan's only frame; its base stands still."""
-    core, local_core, kernel, columns = _HOW[quantity]
+def single(
+    quantity: str, plan: Plan, reference: Reference
+) -> tuple[Callable[..., FloatArray | None], IntArray]:
+    """What computes a quantity of a plan's only frame, compiled or read from disk; its base stands still.
+
+    Returns:
+        The function, (q, ..., out or None) -> result or None where it was not taken, and its task, which
+        counts results.
+    """
+    core, local_core, orders, columns = _HOW[quantity]
     local = reference is Reference.LOCAL
     turned = quantity == "placement" or local
     program = program_of(plan, turned=turned, columns=columns)
     memory, task = scratch(program), np.zeros(len(Task), dtype=np.int64)
     task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
     task[Task.SCRATCH], task[Task.REFERENCE], task[Task.N] = memory.ctypes.data, reference, 1
-    task[Task.CORE] = (local_core if local else core).address
+    task[Task.CORE], task[Task.ORDERS] = (local_core if local else core).address, orders
     task[Task.NQ], task[Task.NV] = plan.nq, plan.nv
-    task[Task.ROWS], task[Task.COLUMNS] = (6, plan.nv) if columns else (4, 4)
-    return Single(kernel.compiled, task, (program, memory))
+    shape = {"placement": (4, 4), "jacobian": (6, plan.nv)}.get(quantity, (6,))
+    task[Task.AXES], task[Task.ROWS], task[Task.COLUMNS] = len(shape), *(*shape, 1)[:2]
+    bound = task, np.ndarray, None, np.empty, shape, program, memory
+    return _built_in(quantity, one_configuration.address, *bound), task

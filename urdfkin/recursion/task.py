@@ -38,6 +38,8 @@ class Task(IntEnum):
     CORE = auto()
     NQ = auto()
     NV = auto()
+    ORDERS = auto()
+    AXES = auto()
     ROWS = auto()
     COLUMNS = auto()
     BUSY = auto()
