@@ -101,9 +101,12 @@ class Call:
             raise InputError("the batch shapes of q, v, a and base do not fit", found=found) from None
 
     def _flat_input(self, array: FloatArray) -> FloatArray:
+        """(n, width); a single row for many configurations stays one in memory."""
         width = array.shape[-1]
         if array.shape[:-1] == self.shape:
             return np.ascontiguousarray(array.reshape(self.n, width))
+        if array.size == width:
+            return np.broadcast_to(np.ascontiguousarray(array).reshape(width), (self.n, width))
         return np.ascontiguousarray(np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width))
 
     @property

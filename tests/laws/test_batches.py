@@ -1,5 +1,6 @@
 """A batch is its samples, whatever its shape, its memory and the thread that computes it."""
 
+import tracemalloc
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -10,8 +11,10 @@ from hypothesis import strategies as st
 
 from tests.laws.subjects import NAMES, robot_of, state
 from urdfkin import load
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.recursion.base import BaseMotion
+from urdfkin.recursion.registers import LANES
+from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
 
@@ -212,3 +215,49 @@ def test_threads_get_what_a_single_one_gets() -> None:
             assert (x == y).all()
     lines = {str(line.quantity): line.checked for line in fresh.certificate().lines}
     assert set(lines.values()) == {sum(len(q) for q, _, _ in batches)}
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("single", ["q", "v", "a", "qv", "qa", "va"])
+def test_one_configuration_for_many_rates_is_as_if_it_had_been_repeated(single: str, threads: int) -> None:
+    robot, n = robot_of("mimic_hand_40_sliding"), 5 * LANES + 3
+    full = dict(zip("qva", state(robot, n, 9), strict=True))
+    repeated = {name: np.repeat(x[:1], n, axis=0) if name in single else x for name, x in full.items()}
+    once = {name: x[0] if name in single else x for name, x in full.items()}
+    frames, chosen = robot.link_names, {"verify": False, "threads": threads}
+    for reference in Reference:
+        ways = [
+            [
+                robot.velocity(x["q"], x["v"], robot.tip_frame, reference, **chosen),
+                robot.jacobian_rate(x["q"], x["v"], robot.tip_frame, reference, **chosen),
+                robot.accelerations(x["q"], x["v"], x["a"], frames, reference, **chosen),
+            ]
+            for x in (once, repeated)
+        ]
+        # The first two know nothing of a, and do not grow with it.
+        for one, other in zip(*ways, strict=True):
+            assert agree(np.broadcast_to(one, other.shape), other)
+
+
+def test_one_configuration_for_a_million_rates_is_not_copied_a_million_times() -> None:
+    robot, n = load("panda", verify=False), 100_000
+    q, v, a = state(robot, n, 10)
+    out = np.empty((n, 6))
+    robot.acceleration(q[0], v, a, robot.tip_frame, out=out, threads=1)
+    tracemalloc.start()
+    try:
+        robot.acceleration(q[0], v, a, robot.tip_frame, out=out, threads=2)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < q.nbytes / 20
+
+
+def test_a_bad_number_in_the_one_configuration_is_found_and_its_joint_named() -> None:
+    robot = load("panda", verify=False)
+    q, v, a = state(robot, 2 * LANES, 11)
+    q[0, 3] = np.nan
+    with pytest.raises(NotFiniteError, match="panda_joint4: q must be finite"):
+        robot.acceleration(q[0], v, a, robot.tip_frame)
+    with pytest.raises(NotFiniteError, match="panda_joint4: a must be finite"):
+        robot.acceleration(q[1], v, q[0], robot.tip_frame)

@@ -1,6 +1,7 @@
 """Arrays in, arrays out: the compiled walks behind plain functions.
 
 Inputs are flat batches, (n, nq) and (n, nv), already checked; `urdfkin.robot` checks, reshapes and verifies.
+One row that was broadcast to n is read again for each configuration, and never copied.
 A core is loaded when it is first needed, so that a first use compiles only what it needs.
 """
 
@@ -21,6 +22,8 @@ from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+_PLACES = Task.BASE, Task.Q, Task.V, Task.A
+_STRIDES = Task.STRIDE_BASE, Task.STRIDE_Q, Task.STRIDE_V, Task.STRIDE_A
 
 
 def placements(
@@ -151,22 +154,27 @@ def _run(
         RangeError: a result is not, although the inputs are.
     """
     moving = base is not STILL_STATE
+    inputs = [x[:1] if _is_the_same_for_all(x) else x for x in inputs]
+    strides = [0 if len(x) == 1 else x.shape[1] for x in (base, *inputs)]
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
         memory, task = scratch(program), np.zeros(len(Task), dtype=np.int64)
         task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
         task[Task.SCRATCH], task[Task.OUT] = memory.ctypes.data, part.ctypes.data
         task[Task.REFERENCE], task[Task.N] = reference, len(part)
-        for place, x in zip((Task.BASE, Task.Q, Task.V, Task.A), parts, strict=False):
-            task[place] = x.ctypes.data
-        if moving:
-            task[Task.STRIDE] = 0 if len(parts[0]) == 1 else parts[0].shape[1]
-        else:
+        for place, of_place, x, stride in zip(_PLACES, _STRIDES, parts, strides, strict=False):
+            task[place], task[of_place] = x.ctypes.data, stride
+        if not moving:
             task[Task.BASE] = 0
         return core(task.ctypes.data)
 
     if in_blocks(compute, [base, *inputs], out, threads) or plan.is_large or _is_large(base):
         _demand_finite([base, *inputs], out)
+
+
+def _is_the_same_for_all(x: FloatArray) -> bool:
+    """Whether rows are one row that was broadcast."""
+    return len(x) > 1 and x.strides[0] == 0
 
 
 def _is_large(base: FloatArray) -> bool:

@@ -82,17 +82,6 @@ def same(context: Any, x: Any) -> Any:
 
 
 @intrinsic
-def address_of(context: Any, array: Any) -> Any:
-    """Where an array's numbers lie."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        return builder.ptrtoint(data, ir.IntType(64))
-
-    return types.int64(array), generate
-
-
-@intrinsic
 def numbers_of(context: Any, array: Any) -> Any:
     """The numbers of an array without its shape: no test for a negative index for each of them."""
 

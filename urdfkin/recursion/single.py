@@ -209,7 +209,7 @@ def single(
     task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
     task[Task.SCRATCH], task[Task.REFERENCE], task[Task.N] = memory.ctypes.data, reference, 1
     task[Task.CORE], task[Task.ORDERS] = (local_core if local else core).address, orders
-    task[Task.NQ], task[Task.NV] = plan.nq, plan.nv
+    task[Task.NQ], task[Task.NV] = plan.nq, plan.nv  # strides are 0: there is no next configuration
     shape = {"placement": (4, 4), "jacobian": (6, plan.nv)}.get(quantity, (6,))
     task[Task.AXES], task[Task.ROWS], task[Task.COLUMNS] = len(shape), *(*shape, 1)[:2]
     bound = task, np.ndarray, None, np.empty, shape, program, memory

@@ -31,8 +31,11 @@ class Task(IntEnum):
     A = auto()
     #: The base's state (rows of 24 numbers); 0 where it stands still at the world's origin.
     BASE = auto()
-    #: From the base's state in one configuration to that in the next; 0 where it is the same for all.
-    STRIDE = auto()
+    #: From the numbers of one configuration to those of the next; 0 where they are the same for all.
+    STRIDE_Q = auto()
+    STRIDE_V = auto()
+    STRIDE_A = auto()
+    STRIDE_BASE = auto()
     OUT = auto()
 
     CORE = auto()

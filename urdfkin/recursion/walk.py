@@ -32,7 +32,10 @@ from urdfkin.recursion.task import Task
 
 # Enumerations are Python's; compiled code takes plain numbers.
 _PROGRAM, _CONSTANTS, _SCRATCH, _OUT = map(int, (Task.PROGRAM, Task.CONSTANTS, Task.SCRATCH, Task.OUT))
-_N, _Q, _V, _A, _BASE, _STRIDE = map(int, (Task.N, Task.Q, Task.V, Task.A, Task.BASE, Task.STRIDE))
+_N, _Q, _V, _A, _BASE = map(int, (Task.N, Task.Q, Task.V, Task.A, Task.BASE))
+_STRIDE_Q, _STRIDE_V, _STRIDE_A, _STRIDE_BASE = map(
+    int, (Task.STRIDE_Q, Task.STRIDE_V, Task.STRIDE_A, Task.STRIDE_BASE)
+)
 _REFERENCE = int(Task.REFERENCE)
 _CODE, _NQ, _NV, _ROW_Q, _ROW_V, _ROW_A, _ROW_BASE = map(
     int, (Head.CODE, Head.NQ, Head.NV, Head.Q, Head.V, Head.A, Head.BASE)
@@ -220,13 +223,13 @@ def _resumed(s, row, state):
 
 
 @compiled
-def _read(m, x, b, width, blocks, begin, end, s, row):
-    """The blocks of eight numbers that the walk needs of rows `b` to `b + m` of x."""
+def _read(m, x, b, width, stride, blocks, begin, end, s, row):
+    """The blocks of eight numbers that the walk needs of rows `b` to `b + m` of x, or of the only one."""
     for i in range(begin, end):
         at = blocks[i]
         wide = width - at
-        read_rows(m, x, b * width + at, width, 8 if wide > 8 else wide, s, row + at)
-    fetch(x, (b + m) * width, m * width)
+        read_rows(m if stride else 1, x, b * stride + at, stride, 8 if wide > 8 else wide, s, row + at)
+    fetch(x, (b + m) * stride, m * stride)
 
 
 @compiled
@@ -236,7 +239,7 @@ def _start(axes, m, s, task, row, b):
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
     p = w = vel = alpha = acc = nil, nil, nil
     if task[_BASE] != 0:
-        base, stride = numbers_at(task[_BASE]), task[_STRIDE]
+        base, stride = numbers_at(task[_BASE]), task[_STRIDE_BASE]
         read_rows(m if stride else 1, base, b * stride, stride, STATE_ROWS, s, row)
         R, p = (vector(s, row), vector(s, row + 3), vector(s, row + 6)), vector(s, row + 9)
         w, vel = seen_after(axes, R, vector(s, row + 12)), seen_after(axes, R, vector(s, row + 15))
@@ -298,24 +301,31 @@ def _over_joint(axes, op, state, s, x, v, a, z, g, c):
 @compiled
 def _read_inputs(m, task, program, s, b, orders):
     """Coordinates, and as many of their rates as are wanted."""
-    nq, nv, edge = program[_NQ], program[_NV], program[_BLOCKS_V]
-    _read(m, numbers_at(task[_Q]), b, nq, program, program[_BLOCKS_Q], edge, s, program[_ROW_Q])
+    q, nq, nv = numbers_at(task[_Q]), program[_NQ], program[_NV]
+    edge, end = program[_BLOCKS_V], program[_BLOCKS_END]
+    _read(m, q, b, nq, task[_STRIDE_Q], program, program[_BLOCKS_Q], edge, s, program[_ROW_Q])
     if orders > 1:
-        _read(m, numbers_at(task[_V]), b, nv, program, edge, program[_BLOCKS_END], s, program[_ROW_V])
+        v = numbers_at(task[_V])
+        _read(m, v, b, nv, task[_STRIDE_V], program, edge, end, s, program[_ROW_V])
     if orders > 2:
-        _read(m, numbers_at(task[_A]), b, nv, program, edge, program[_BLOCKS_END], s, program[_ROW_A])
+        a = numbers_at(task[_A])
+        _read(m, a, b, nv, task[_STRIDE_A], program, edge, end, s, program[_ROW_A])
 
 
 @compiled
 def _ordinary(m, task, program, b, orders):
     """Whether all inputs of a block are, those that the walk does not need as well."""
-    nq, nv = program[_NQ], program[_NV]
-    good = ordinary(numbers_at(task[_Q]), b * nq, m * nq)
+    good = _rows_are_ordinary(m, numbers_at(task[_Q]), b, program[_NQ], task[_STRIDE_Q])
     if orders > 1:
-        good = good and ordinary(numbers_at(task[_V]), b * nv, m * nv)
+        good = good and _rows_are_ordinary(m, numbers_at(task[_V]), b, program[_NV], task[_STRIDE_V])
     if orders > 2:
-        good = good and ordinary(numbers_at(task[_A]), b * nv, m * nv)
+        good = good and _rows_are_ordinary(m, numbers_at(task[_A]), b, program[_NV], task[_STRIDE_A])
     return good
+
+
+@compiled
+def _rows_are_ordinary(m, x, b, width, stride):
+    return ordinary(x, b * stride, (m if stride else 1) * width)
 
 
 @compiled
