@@ -201,14 +201,14 @@ class Call:
         if not (np.isfinite(bound.scale).all() and np.isfinite(theirs[i, f]).all()):
             raise RangeError(
                 f"the {quantity} of {self.frames[f]} leaves the range of double precision",
-                where=f"sample {list(self._index(k))}" if self.shape else None,
+                where=f"sample {list(self.index(k))}" if self.shape else None,
                 remedy="give smaller numbers",
             )
         return comparison, VerificationError(
             quantity,
             self.frames[f],
             x.representation or self.reference.name,
-            index=self._index(k),
+            index=self.index(k),
             ours=ours[i, f],
             theirs=theirs[i, f],
             bound=EPS * bound.k * bound.scale,
@@ -216,7 +216,7 @@ class Call:
             reproduce=self._replay(quantity, k, self.frames[f]),
         )
 
-    def _index(self, k: int) -> tuple[int, ...]:
+    def index(self, k: int) -> tuple[int, ...]:
         """Flat sample `k` as an index into the caller's batch."""
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 

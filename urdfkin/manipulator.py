@@ -13,11 +13,17 @@ from numpy.typing import ArrayLike
 
 from urdfkin.call import Call
 from urdfkin.demands import real_number, word
-from urdfkin.errors import RangeError
-from urdfkin.motion.representation import analytical_jacobian
+from urdfkin.errors import RangeError, RepresentationSingularityError
+from urdfkin.motion.representation import QUATERNION, analytical_jacobian
 from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import BaseMotion
-from urdfkin.recursion.breakdown import AccelerationBreakdown, acceleration_breakdown
+from urdfkin.recursion.batch import in_parts
+from urdfkin.recursion.breakdown import (
+    KINDS,
+    AccelerationBreakdown,
+    acceleration_breakdown,
+    moving_joints,
+)
 from urdfkin.reference import Reference
 from urdfkin.rotation.euler_rates import NEAREST
 from urdfkin.tree import FloatArray
@@ -210,7 +216,9 @@ class Manipulator:
         *,
         nearest: float = NEAREST,
         base: BaseMotion | None = None,
+        out: FloatArray | None = None,
         verify: Verify | None = None,
+        threads: int | None = None,
     ) -> FloatArray:
         """The manipulator Jacobian J = C^-1 J_v (7.122): derivatives of position and orientation by q.
 
@@ -225,7 +233,9 @@ class Manipulator:
                 "quaternion".
             nearest: How near the representational singularity may be, radians.
             base: How the root link stands; None if at the world's origin.
-            verify: Whether Pinocchio checks this call; None leaves it to the robot.
+            out: C-contiguous float64 array of the result's shape to write into.
+            verify: As in `Robot.placement`.
+            threads: As in `Robot.placement`.
 
         Returns:
             (..., 6, nv), or (..., 7, nv) for a quaternion.
@@ -241,17 +251,32 @@ class Manipulator:
         robot = _robot(self)
         representation, nearest = word(representation, "representation"), real_number(nearest, "nearest")
         call = Call(robot, (frame,), _ALIGNED, base, q, representation=representation, nearest=nearest)
-        poses = call.compute(evaluate.placements, call.plan, call.q, base=call.state)
-        J_v = call.compute(evaluate.jacobians, call.plan, call.q, base=call.state)
         if call.wanted(verify):
             nearest = max(nearest, nearest_singularity(call.plan))
-        R = call.one(poses, None)[..., :3, :3]
-        with np.errstate(over="ignore", invalid="ignore"):
-            J = analytical_jacobian(representation, R, call.one(J_v, None), nearest)
+        rows = 7 if representation == QUATERNION else 6
+        to = call.flat(out, rows, robot.nv)
+        J = np.empty((call.n, 1, rows, robot.nv)) if to is None else to
+        walk = {"base": call.state, "threads": threads}
+        Rs = call.compute(evaluate.placements, call.plan, call.q, **walk)[..., :3, :3]
+        Js_v = call.compute(evaluate.jacobians, call.plan, call.q, out=J if rows == 6 else None, **walk)
+        near: list[tuple[float, int]] = []
+
+        def compute(part: slice) -> None:
+            try:
+                with np.errstate(over="ignore", invalid="ignore"):
+                    J[part] = analytical_jacobian(representation, Rs[part], Js_v[part], nearest)
+            except RepresentationSingularityError as error:
+                near.append((error.distance, part.start + error.sample[0]))
+
+        in_parts(compute, call.n, threads)
+        if near:
+            distance, k = min(near)
+            raise RepresentationSingularityError(representation, distance, call.index(k))
         if not np.isfinite(J).all():
             raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
-        call.verify(Quantity.ANALYTICAL_JACOBIAN, J, verify)
-        return J
+        handed_out = call.one(J, out)
+        call.verify(Quantity.ANALYTICAL_JACOBIAN, handed_out, verify)
+        return handed_out
 
     def acceleration_breakdown(
         self,
@@ -262,17 +287,21 @@ class Manipulator:
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
+        out: FloatArray | None = None,
         verify: Verify | None = None,
+        threads: int | None = None,
     ) -> AccelerationBreakdown:
         """`acceleration`, as a sum over joints and kinds: transverse, centripetal, Coriolis, sliding.
 
-        The sum is checked against Pinocchio's acceleration. Arguments and errors as `jacobian_rate`.
+        The sum is checked against Pinocchio's acceleration. Arguments and errors as `jacobian_rate`; `out` is
+        for the terms, (..., joints, 4, 6).
 
         Returns:
             The parts, with the caller's batch shape in front.
         """
         robot = _robot(self)
         call = Call(robot, (frame,), reference, base, q, v, a)
+        to = call.flat(out, len(moving_joints(robot.tree, call.links[0])), len(KINDS), 6)
         parts = call.compute(
             acceleration_breakdown,
             robot.tree,
@@ -281,8 +310,10 @@ class Manipulator:
             *call.rates,
             call.reference,
             call.state,
+            out=None if to is None else to[:, 0],
+            threads=threads,
         )
-        breakdown = AccelerationBreakdown(parts.joints, call.every(parts.base), call.every(parts.terms))
+        breakdown = AccelerationBreakdown(parts.joints, call.every(parts.base), call.every(parts.terms, out))
         call.verify(Quantity.ACCELERATION_BREAKDOWN, breakdown.total, verify)
         return breakdown
 

@@ -3,6 +3,7 @@
 import tracemalloc
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,11 +12,14 @@ from hypothesis import strategies as st
 
 from tests.laws.subjects import NAMES, robot_of, state
 from urdfkin import load
-from urdfkin.errors import InputError, NotFiniteError
+from urdfkin.errors import InputError, NotFiniteError, RangeError, RepresentationSingularityError
 from urdfkin.recursion.base import BaseMotion
+from urdfkin.recursion.batch import PART
 from urdfkin.recursion.registers import LANES
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
+from urdfkin.rotation.euler import euler_of
+from urdfkin.rotation.euler_rates import singularity_distance
 from urdfkin.tree import FloatArray
 
 Compute = Callable[[Robot, FloatArray, FloatArray, FloatArray], FloatArray]
@@ -224,13 +228,12 @@ def test_one_configuration_for_many_rates_is_as_if_it_had_been_repeated(single: 
     full = dict(zip("qva", state(robot, n, 9), strict=True))
     repeated = {name: np.repeat(x[:1], n, axis=0) if name in single else x for name, x in full.items()}
     once = {name: x[0] if name in single else x for name, x in full.items()}
-    frames, chosen = robot.link_names, {"verify": False, "threads": threads}
     for reference in Reference:
         ways = [
             [
-                robot.velocity(x["q"], x["v"], robot.tip_frame, reference, **chosen),
-                robot.jacobian_rate(x["q"], x["v"], robot.tip_frame, reference, **chosen),
-                robot.accelerations(x["q"], x["v"], x["a"], frames, reference, **chosen),
+                robot.velocity(x["q"], x["v"], robot.tip_frame, reference, threads=threads),
+                robot.jacobian_rate(x["q"], x["v"], robot.tip_frame, reference, threads=threads),
+                robot.accelerations(x["q"], x["v"], x["a"], None, reference, threads=threads),
             ]
             for x in (once, repeated)
         ]
@@ -239,7 +242,7 @@ def test_one_configuration_for_many_rates_is_as_if_it_had_been_repeated(single: 
             assert agree(np.broadcast_to(one, other.shape), other)
 
 
-def test_one_configuration_for_a_million_rates_is_not_copied_a_million_times() -> None:
+def test_one_configuration_for_many_rates_is_not_copied_for_each() -> None:
     robot, n = load("panda", verify=False), 100_000
     q, v, a = state(robot, n, 10)
     out = np.empty((n, 6))
@@ -261,3 +264,56 @@ def test_a_bad_number_in_the_one_configuration_is_found_and_its_joint_named() ->
         robot.acceleration(q[0], v, a, robot.tip_frame)
     with pytest.raises(NotFiniteError, match="panda_joint4: a must be finite"):
         robot.acceleration(q[1], v, q[0], robot.tip_frame)
+
+
+@pytest.mark.parametrize("representation", ["ZYZ", "xyz", "quaternion"])
+def test_an_analytical_jacobian_is_the_same_by_parts_threads_and_into_an_array(representation: str) -> None:
+    robot, frame, n = load("ur5", verify=False), "tool0", 2 * PART + 5
+    q, _, _ = state(robot, n, 12)
+    one = robot.analytical_jacobian(q[:PART], frame, representation, nearest=0.0, threads=1)
+    out = np.full((n, *one.shape[1:]), np.nan)
+    assert robot.analytical_jacobian(q, frame, representation, nearest=0.0, out=out, threads=2) is out
+    assert agree(out[:PART], one)
+    for k in (0, PART - 1, PART, n - 1):
+        assert agree(robot.analytical_jacobian(q[k], frame, representation, nearest=0.0), out[k])
+    refused = np.full((n, 6 + (representation != "quaternion"), 6), np.nan)
+    with pytest.raises(InputError, match="out must be a writable"):
+        robot.analytical_jacobian(q, frame, representation, out=refused)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_the_nearest_to_a_singularity_is_told_whichever_part_it_is_in(threads: int) -> None:
+    robot = load("ur5", verify=False)
+    q, _, _ = state(robot, 3 * PART, 15)
+    distances = singularity_distance("ZYZ", euler_of("ZYZ", robot.placement(q, "tool0")[:, :3, :3]))
+    with pytest.raises(RepresentationSingularityError) as caught:
+        robot.analytical_jacobian(q.reshape(3, PART, 6), "tool0", nearest=1.6, threads=threads)
+    assert caught.value.sample == divmod(int(distances.argmin()), PART)
+    assert caught.value.distance == distances.min()
+
+
+@pytest.mark.parametrize("reference", list(Reference))
+def test_a_breakdown_is_the_same_by_parts_threads_and_into_an_array(reference: Reference) -> None:
+    robot, n = robot_of("planar_and_floating_in_the_middle"), 2 * PART + 5
+    q, v, a = state(robot, n, 13)
+    base = BaseMotion(velocity=np.linspace(-1.0, 1.0, 6 * n).reshape(n, 6))
+    ask = partial(robot.acceleration_breakdown, frame=robot.tip_frame, reference=reference, verify=False)
+    serial = ask(q, v, a, base=base, threads=1)
+    out = np.full_like(serial.terms, np.nan)
+    threaded = ask(q, v, a, base=base, threads=2, out=out)
+    assert threaded.terms is out
+    for k in (0, PART - 1, PART, n - 1):
+        alone = ask(q[k], v[k], a[k], base=BaseMotion(velocity=base.velocity[k]))
+        for parts in (serial, threaded):
+            assert agree(parts.terms[k], alone.terms)
+            assert agree(parts.base[k], alone.base)
+    with pytest.raises(InputError, match="out must be a writable"):
+        ask(q, v, a, out=out[:-1])
+
+
+def test_a_breakdown_whose_part_overflows_says_in_which_samples() -> None:
+    robot = load("ur5", verify=False)
+    q, v, a = state(robot, 2 * PART, 14)
+    v[PART + 3] = 1e200
+    with pytest.raises(RangeError, match=f"samples {PART} to {2 * PART - 1}: "):
+        robot.acceleration_breakdown(q, v, a, "tool0", threads=2)

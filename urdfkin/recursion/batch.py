@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from itertools import pairwise
 
@@ -17,6 +17,9 @@ from urdfkin.tree import FloatArray
 
 #: A batch is spread over threads by itself only from here on: a thread costs some ten microseconds.
 _WORTH_THREADS = 4096
+
+#: As many rows are computed at a time where NumPy does it: what it keeps meanwhile fits a cache.
+PART = 2048
 
 #: Computes rows of inputs into rows of an output, (inputs, out); 0, or 1 where an input is not ordinary.
 Compute = Callable[[Sequence[FloatArray], FloatArray], int]
@@ -53,6 +56,35 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
         return compute(inputs, out)
     work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
     return max([future.result() for future in work])  # waits for all of them
+
+
+def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
+    """Have NumPy compute `n` rows part by part: what it needs meanwhile does not grow with `n`.
+
+    Args:
+        compute: Computes some rows. An empty batch is one empty part.
+        n: How many rows.
+        threads: As `in_blocks`.
+
+    Raises:
+        InputError: `threads` is no whole number from 1 on.
+    """
+    threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
+    parts = [slice(i, min(i + PART, n)) for i in range(0, max(n, 1), PART)]
+    count = min(threads, len(parts), _processors())
+    shares = [parts[k::count] for k in range(count)]
+
+    def compute_all(share: Sequence[slice]) -> None:
+        for part in share:
+            compute(part)
+
+    if len(shares) == 1:
+        return compute_all(parts)
+    work = [_pool().submit(compute_all, share) for share in shares]
+    wait(work)  # nobody writes any more when an error is told
+    for future in work:
+        future.result()
+    return None
 
 
 def _parts(n: int, threads: int) -> list[tuple[int, int]]:

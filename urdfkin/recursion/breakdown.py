@@ -17,6 +17,7 @@ that turn with it: its sliding velocity s then adds o x s, with o its own angula
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -26,8 +27,9 @@ import numpy as np
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.kinematics.arrays import chapter as eq
 from urdfkin.recursion.base import STILL_STATE
+from urdfkin.recursion.batch import in_parts
 from urdfkin.recursion.evaluate import placements, velocities
-from urdfkin.recursion.plan import make_plan
+from urdfkin.recursion.plan import Plan, make_plan
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree
 
@@ -78,7 +80,6 @@ class _Moves(NamedTuple):
     turn: FloatArray
 
 
-@np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite is refused at the end
 def acceleration_breakdown(
     tree: KinematicTree,
     link: int,
@@ -87,6 +88,9 @@ def acceleration_breakdown(
     a: FloatArray,
     reference: Reference = Reference.LOCAL_WORLD_ALIGNED,
     base: FloatArray = STILL_STATE,
+    *,
+    out: FloatArray | None = None,
+    threads: int | None = None,
 ) -> AccelerationBreakdown:
     """The contributions to the classical acceleration of a link's frame.
 
@@ -98,6 +102,8 @@ def acceleration_breakdown(
         a: (n, nv).
         reference: For which point and in which axes.
         base: (1 or n, 24) state of the base, see `BaseMotion.state`.
+        out: (n, joints, 4, 6) to write the terms into.
+        threads: How many compute at most; None for `batch.default_threads`.
 
     Returns:
         Contributions with one leading axis n.
@@ -108,32 +114,70 @@ def acceleration_breakdown(
     """
     if not np.isfinite(a).all():  # the walks below, which look at their inputs themselves, take q and v
         raise NotFiniteError("q, v and a must be finite")
-    path = [i for i in tree.path(link) if tree.joints[i].kind.nv]
+    path = moving_joints(tree, link)
     plan = make_plan(tree, [0, link, *(i + 1 for i in path), *(tree.joints[i].parent for i in path)])
-    Ts, velocity = placements(plan, q, base=base), velocities(plan, q, v, base=base)
+    n = len(q)
+    terms = np.empty((n, len(path), len(KINDS), 6)) if out is None else out
+    of_base = np.empty((n, 6))
+
+    def compute(part: slice) -> None:
+        state = base if len(base) == 1 else base[part]
+        try:
+            of_base[part] = _contributions(
+                tree, path, plan, q[part], v[part], a[part], reference, state, terms[part]
+            )
+        except RangeError as error:
+            if part == slice(0, n):
+                raise
+            where = f"samples {part.start} to {part.stop - 1}"
+            raise RangeError(error.what, where=where, remedy=error.remedy) from error
+
+    in_parts(compute, n, threads)
+    return AccelerationBreakdown(tuple(tree.joints[i].name for i in path), of_base, terms)
+
+
+def moving_joints(tree: KinematicTree, link: int) -> list[int]:
+    """The joints that contribute, from the base to the link."""
+    return [i for i in tree.path(link) if tree.joints[i].kind.nv]
+
+
+@np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite is refused at the end
+def _contributions(
+    tree: KinematicTree,
+    path: Sequence[int],
+    plan: Plan,
+    q: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+    reference: Reference,
+    base: FloatArray,
+    terms: FloatArray,
+) -> FloatArray:
+    """Fill in the terms; what the base contributes."""
+    Ts = placements(plan, q, base=base, threads=1)
+    velocity = velocities(plan, q, v, base=base, threads=1)
     end = _NOWHERE
     if reference is not Reference.WORLD:
         # The same walk with the world's origin at the frame: what it rounds is as small as the robot, and
         # what the new start is off by is the same for all.
         base = _moved(base, -Ts[:, 1, :3, 3])
-        Ts = placements(plan, q, base=base)
+        Ts = placements(plan, q, base=base, threads=1)
         end = Ts[:, 1, :3, 3]
-    terms = np.empty((len(q), len(path), len(KINDS), 6))
     for k, i in enumerate(path):
         R, d = Ts[:, 2 + k, :3, :3], end - Ts[:, 2 + k, :3, 3]
         w_before = velocity[:, 2 + len(path) + k, 3:]
         joint, at = tree.joints[i], tree.v_index[i]
         terms[:, k] = _terms(_moves(joint, v[:, at:], R), _moves(joint, a[:, at:], R), w_before, d)
-    base_part = _rigid(base, end - Ts[:, 0, :3, 3])
+    of_base = _rigid(base, end - Ts[:, 0, :3, 3])
     if reference is Reference.LOCAL:
         back = Ts[:, 1, :3, :3].swapaxes(-1, -2)
-        base_part = _turned(back, base_part)
-        terms = _turned(back[:, np.newaxis, np.newaxis], terms)
-    if not (np.isfinite(base_part).all() and np.isfinite(terms).all()):
+        of_base = _turned(back, of_base)
+        terms[...] = _turned(back[:, np.newaxis, np.newaxis], terms)
+    if not (np.isfinite(of_base).all() and np.isfinite(terms).all()):
         raise RangeError(
             "a part of the acceleration leaves the range of double precision", remedy="give smaller numbers"
         )
-    return AccelerationBreakdown(tuple(tree.joints[i].name for i in path), base_part, terms)
+    return of_base
 
 
 def _moved(base: FloatArray, by: FloatArray) -> FloatArray:
