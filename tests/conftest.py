@@ -1,7 +1,19 @@
-"""Processes that tests start run the code under test, whatever folder they start in."""
+"""What holds for every test: how properties are searched, and that processes run the code under test.
+
+Properties are tried on the same examples in every run, so that a verdict depends on the commit alone.
+`pytest --hypothesis-profile=search` tries new ones.
+"""
 
 import os
 from pathlib import Path
 
+from hypothesis import HealthCheck, settings
+
 _ROOT = str(Path(__file__).parents[1])
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (_ROOT, os.environ.get("PYTHONPATH"))))
+
+# No deadline: a busy machine is no counterexample. Trees are built from many draws, and are large.
+_UNHURRIED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+settings.register_profile("same", _UNHURRIED, derandomize=True)
+settings.register_profile("search", _UNHURRIED, derandomize=False, print_blob=True)
+settings.load_profile("same")

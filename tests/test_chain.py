@@ -45,7 +45,7 @@ def walker() -> KinematicTree:
 
 
 @given(trees())
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_every_path_of_a_tree_is_placed_as_pinocchio_places_it(tree: KinematicTree) -> None:
     oracle = TreeOracle(tree)
     q = configurations(tree.nq, 4)
@@ -74,7 +74,7 @@ def test_a_joint_passed_backwards_has_its_axis_reversed_and_keeps_its_sign(walke
 
 
 @given(trees(min_joints=1))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_a_chain_and_its_reverse_undo_each_other(tree: KinematicTree) -> None:
     there, back = chain(tree, "tip", "l0"), chain(tree, "l0", "tip")
     q = configurations(tree.nq, 4)
@@ -112,7 +112,7 @@ def test_interorigin_vectors_add_up_from_the_first_joint_to_the_tip(walker: Kine
 
 
 @given(trees())
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_the_lengths_bound_the_distance_between_origins(tree: KinematicTree) -> None:
     for path in (chain(tree, "tip"), chain(tree, "l0", "tip")):
         distances = [np.linalg.norm(A[:3, 3]) for A in path.constants]

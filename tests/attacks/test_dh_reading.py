@@ -237,7 +237,7 @@ _PLACES = _places(_GOOD)
 
 
 @given(st.lists(st.tuples(st.sampled_from(_PLACES), _ANYTHING), min_size=1, max_size=3))
-@settings(max_examples=600, deadline=None)
+@settings(max_examples=600)
 def test_anything_at_any_place_is_a_table_or_an_error_of_ours(
     changes: list[tuple[tuple[Any, ...], Any]],
 ) -> None:
@@ -258,7 +258,7 @@ def test_anything_at_any_place_is_a_table_or_an_error_of_ours(
 
 
 @given(st.text(max_size=60), st.sampled_from([".toml", ".json", ".csv"]))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_any_text_is_a_table_or_an_error_of_ours(text: str, suffix: str) -> None:
     for whole in (
         text,

@@ -35,7 +35,7 @@ def chain_of_followers(rules: list[tuple[int, float, float]]) -> str:
 numbers = st.floats(-2.0, 2.0).filter(lambda x: x == 0.0 or abs(x) > 1e-3)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(data=st.data(), n=st.integers(1, 5))
 def test_chains_of_followers_end_at_the_same_joint_with_the_same_rule(data: st.DataObject, n: int) -> None:
     rules = [(data.draw(st.integers(0, i)), data.draw(numbers), data.draw(numbers)) for i in range(n)]

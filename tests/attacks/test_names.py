@@ -171,7 +171,7 @@ def meant(name: str, links: list[str], joints: list[str]) -> int | str:
     return "unknown"
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     links=st.lists(st.sampled_from(POOL), min_size=1, max_size=5, unique=True),
     data=st.data(),

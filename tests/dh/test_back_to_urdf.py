@@ -49,7 +49,7 @@ def taken_for_a_coordinate_axis(tree: KinematicTree) -> bool:
 
 
 @given(trees(min_joints=1, mimics=False), st.sampled_from(["standard", "modified"]))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_urdf_to_table_to_urdf_is_one_robot_to_pinocchio(tree: KinematicTree, convention: str) -> None:
     assume(not taken_for_a_coordinate_axis(tree))
     table = dh_table(tree, "tip", convention=convention)

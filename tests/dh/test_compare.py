@@ -79,7 +79,7 @@ def test_sliding_joints_are_fitted_as_well(kinds: str) -> None:
 
 
 @given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_table_agrees_with_the_chain_it_came_from(tree: KinematicTree, seed: int) -> None:
     path = chain(tree, "tip")
     assume(path.reach > 1e-3)

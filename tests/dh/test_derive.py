@@ -50,7 +50,7 @@ def residual(table: DHTable, path: FrameChain, q: FloatArray) -> tuple[float, fl
     st.sampled_from(["tip", "flange"]),
     st.sampled_from(["last", "first", "each"]),
 )
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 def test_the_table_places_the_tip_where_the_chain_does(
     tree: KinematicTree, convention: str, last: str, offset: str
 ) -> None:
@@ -63,7 +63,7 @@ def test_the_table_places_the_tip_where_the_chain_does(
 
 @pytest.mark.slow
 @given(trees(), st.sampled_from(CONVENTIONS), st.booleans())
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=1500)
 def test_on_many_more_chains_the_table_is_exact_and_short(
     tree: KinematicTree, convention: str, backwards: bool
 ) -> None:
@@ -75,7 +75,7 @@ def test_on_many_more_chains_the_table_is_exact_and_short(
 
 
 @given(trees(), st.sampled_from(CONVENTIONS))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_the_table_of_a_reversed_path_is_as_exact(tree: KinematicTree, convention: str) -> None:
     path = chain(tree, "l0", "tip")
     table = dh_table(tree, "l0", "tip", convention)
@@ -83,7 +83,7 @@ def test_the_table_of_a_reversed_path_is_as_exact(tree: KinematicTree, conventio
 
 
 @given(trees(), st.sampled_from(CONVENTIONS))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_the_table_agrees_with_pinocchio(tree: KinematicTree, convention: str) -> None:
     table = dh_table(tree, "tip", convention=convention)
     q = configurations(tree.nq, 4)
@@ -98,7 +98,7 @@ def test_the_table_agrees_with_pinocchio(tree: KinematicTree, convention: str) -
 
 
 @given(trees(), st.sampled_from(CONVENTIONS), st.booleans())
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 def test_no_row_is_longer_than_ten_times_the_reach(
     tree: KinematicTree, convention: str, backwards: bool
 ) -> None:
@@ -109,7 +109,7 @@ def test_no_row_is_longer_than_ten_times_the_reach(
 
 
 @given(trees(min_joints=1))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_the_same_chain_gives_the_same_table_to_the_bit(tree: KinematicTree) -> None:
     first, second = dh_table(tree, "tip"), dh_table(replace(tree), "tip")
     assert first.rows == second.rows
@@ -157,7 +157,7 @@ def mp_shift(axis: int, length: mpmath.mpf) -> mpmath.matrix:
 
 
 @given(trees(min_joints=1, max_joints=5), st.sampled_from(CONVENTIONS))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_in_sixty_digits_the_cells_are_right_to_a_few_units_in_the_last_place(
     tree: KinematicTree, convention: str
 ) -> None:
@@ -183,7 +183,7 @@ def test_a_pair_of_any_tilt_is_exact_and_short(power: int, convention: str) -> N
 
 
 @given(st.floats(-3, 3), st.floats(-3, 3), st.integers(3, 15), st.floats(-0.5, 0.5), st.floats(0.05, 0.5))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_tiny_tilt_changes_the_lengths_of_a_parallel_pair_by_as_little(
     direction: float, turn: float, power: int, offset: float, a: float
 ) -> None:
@@ -321,7 +321,7 @@ def test_a_path_without_joints_is_a_table_without_rows() -> None:
 
 @example(kinds="PPP")
 @given(st.text("RP", min_size=1, max_size=5))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_sliding_joints_may_stand_anywhere(kinds: str) -> None:
     steps = [
         shift(0.1 * i, 0.2, 0.05) @ rotation("xyz"[i % 3], math.pi / 2 * (i % 2)) for i in range(len(kinds))

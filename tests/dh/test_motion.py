@@ -19,7 +19,7 @@ EPS = float(np.finfo(np.float64).eps)
 
 
 @given(trees(min_joints=1), st.sampled_from(["standard", "modified"]))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_jacobian_and_acceleration_agree_with_pinocchio(tree: KinematicTree, convention: str) -> None:
     path, table, oracle = chain(tree, "tip"), dh_table(tree, "tip", convention=convention), TreeOracle(tree)
     columns = list(path.coupling.v_index(tree))

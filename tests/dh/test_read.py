@@ -23,7 +23,7 @@ ROWS = [[0.0, "pi/2", 0.3, 0.0, "R"], [0.4, 0.0, 0.0, -1.0, "P"]]
 
 
 @given(trees(), st.sampled_from(["standard", "modified"]), st.sampled_from(["toml", "json", "csv"]))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_a_written_table_reads_back_to_the_bit(tree: KinematicTree, convention: str, form: str) -> None:
     table = dh_table(tree, "tip", convention=convention)
     again = table_from_text(export(table, form), f".{form}")

@@ -36,7 +36,7 @@ def same_cells(first: DHTable, second: DHTable) -> bool:
 
 
 @given(trees(), conventions, st.sampled_from(["tip", "flange"]))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_one_convention_to_the_other_and_back_is_the_same_table(
     tree: KinematicTree, convention: str, last: str
 ) -> None:
@@ -51,7 +51,7 @@ def test_one_convention_to_the_other_and_back_is_the_same_table(
 
 
 @given(trees(), conventions)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_table_as_a_tree_places_the_tip_alike_in_pinocchio(tree: KinematicTree, convention: str) -> None:
     table = dh_table(tree, "tip", convention=convention)
     robot = table.to_tree()
@@ -66,7 +66,7 @@ def test_a_table_as_a_tree_places_the_tip_alike_in_pinocchio(tree: KinematicTree
 
 
 @given(trees(mimics=False), conventions)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_table_from_the_tree_of_a_table_is_as_exact(tree: KinematicTree, convention: str) -> None:
     table = dh_table(tree, "tip", convention=convention)
     again = dh_table(table.to_tree(), "tip", convention=convention)

@@ -52,7 +52,7 @@ def worst(table: DHTable, tree: KinematicTree, q: FloatArray) -> tuple[FloatArra
     st.sampled_from([1e-9, 3.7e-6, 1e-4, 2e-3]),
     st.sampled_from(["standard", "modified"]),
 )
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_no_configuration_moves_the_tip_by_more_than_declared(
     seed: int, noise: float, convention: str
 ) -> None:
@@ -67,7 +67,7 @@ def test_no_configuration_moves_the_tip_by_more_than_declared(
 
 
 @given(trees(min_joints=1), st.sampled_from([1e-6, 1e-3, 0.05]))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_snapping_any_chain_keeps_its_word(tree: KinematicTree, tolerance: float) -> None:
     table = dh_table(tree, "tip", snap=tolerance)
     q = configurations(tree.nq, 20)
@@ -81,7 +81,7 @@ def test_snapping_any_chain_keeps_its_word(tree: KinematicTree, tolerance: float
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_the_declared_bound_is_not_idle(seed: int) -> None:
     tree = nearly_round(seed, 1e-4, slides=False)
     snap = dh_table(tree, "tip", snap=3e-4).snap
@@ -92,7 +92,7 @@ def test_the_declared_bound_is_not_idle(seed: int) -> None:
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_angles_that_are_nearly_round_become_round(seed: int) -> None:
     table = dh_table(nearly_round(seed, 1e-6), "tip", snap=1e-4)
     for row in table.rows:

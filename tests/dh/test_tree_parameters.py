@@ -36,7 +36,7 @@ def branching(draw: st.DrawFn) -> KinematicTree:
 
 
 @given(st.one_of(branching(), trees(min_joints=1)))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_every_link_is_placed_as_pinocchio_places_it(tree: KinematicTree) -> None:
     table, q, oracle = tree_parameters(tree), configurations(tree.nq, 4), TreeOracle(tree)
     found = table.placements(q)
@@ -48,7 +48,7 @@ def test_every_link_is_placed_as_pinocchio_places_it(tree: KinematicTree) -> Non
 
 
 @given(branching())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_no_length_exceeds_ten_times_the_reach(tree: KinematicTree) -> None:
     reach = sum(math.hypot(*joint.T_parent_joint[:3, 3]) for joint in tree.joints)
     for row in tree_parameters(tree).rows:
@@ -56,7 +56,7 @@ def test_no_length_exceeds_ten_times_the_reach(tree: KinematicTree) -> None:
 
 
 @given(branching())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_gamma_and_b_are_zero_on_the_first_moving_child(tree: KinematicTree) -> None:
     met = {-1}
     for row in tree_parameters(tree).rows:

@@ -70,7 +70,7 @@ def test_any_leading_shape_comes_back(quantity: str, shape: tuple[int, ...]) -> 
     assert shaped.dtype == np.float64
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(st.data())
 def test_q_v_a_and_base_broadcast_as_numpy_does(data: st.DataObject) -> None:
     robot = load("panda", verify=False)

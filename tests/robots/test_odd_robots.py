@@ -103,7 +103,7 @@ def test_every_call_is_checked_and_the_certificate_counts_it(name: str) -> None:
     }
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15)
 @given(st.integers(1000, 10**6))
 def test_any_tree_agrees(seed: int) -> None:
     text = random_tree(seed)
@@ -111,7 +111,7 @@ def test_any_tree_agrees(seed: int) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=500, deadline=None, derandomize=True)
+@settings(max_examples=500)
 @given(st.integers(1000, 10**9))
 def test_any_of_many_trees_agrees(seed: int) -> None:
     text = random_tree(seed)

@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 
 from tests.reading import tree_of
 from tests.strategies import rotation, rotations, trees
@@ -21,7 +21,6 @@ from urdfkin.urdf.writer import to_urdf
 pytestmark = pytest.mark.slow
 
 EPS = float(np.finfo(float).eps)
-SLOW = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 
 
 def assert_same(found: KinematicTree, given_tree: KinematicTree) -> None:
@@ -33,7 +32,6 @@ def assert_same(found: KinematicTree, given_tree: KinematicTree) -> None:
         np.testing.assert_allclose(a.axis, b.axis, rtol=0, atol=2 * EPS)
 
 
-@SLOW
 @given(trees())
 def test_a_written_tree_reads_back_as_itself(tree: KinematicTree) -> None:
     text = to_urdf(tree).encode()
@@ -42,7 +40,6 @@ def test_a_written_tree_reads_back_as_itself(tree: KinematicTree) -> None:
     assert_same(tree_of(text), tree)
 
 
-@SLOW
 @given(trees())
 def test_writing_twice_changes_nothing_but_the_last_digits_of_angles(tree: KinematicTree) -> None:
     once = tree_of(to_urdf(tree).encode())
@@ -50,7 +47,7 @@ def test_writing_twice_changes_nothing_but_the_last_digits_of_angles(tree: Kinem
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=30)
 @given(trees(max_joints=6))
 def test_pinocchio_agrees_on_every_written_tree(tree: KinematicTree) -> None:
     text = to_urdf(tree)

@@ -41,7 +41,7 @@ def cases(draw: st.DrawFn) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     return ours, theirs, scale.reshape(own), draw(st.integers(0, len(shape)))
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(cases())
 def test_it_is_the_definition_to_the_last_bit(case: tuple[FloatArray, FloatArray, FloatArray, int]) -> None:
     ours, theirs, scale, axes = case
@@ -52,7 +52,7 @@ def test_it_is_the_definition_to_the_last_bit(case: tuple[FloatArray, FloatArray
     np.testing.assert_array_equal(found, expected)
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1))
 def test_it_is_the_definition_for_results_as_they_come(seed: int) -> None:
     generator = np.random.default_rng(seed)
