@@ -10,7 +10,7 @@ import importlib
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,7 @@ def _expand(path: Path, arguments: dict[str, str], search: Mapping[str, str], gr
     _tame(path, search, ground)
     importlib.import_module("xml.dom.expatbuilder")  # which minidom imports when it first reads a file
     confine(ground.holds)
-    document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, resolve_packages=False)
+    document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, walk_up=False, resolve_packages=False)
     urdf: str = document.to_urdf_string()
     return urdf
 
@@ -85,7 +85,7 @@ def _tame(path: Path, search: Mapping[str, str], ground: Ground) -> None:
 
     xacro.safe_eval = value_of
     substitution_args._eval = value_of_arguments  # $(eval ...)
-    xacrodoc.packages._finder = _Finder(path, search, ground)
+    xacrodoc.packages.get_path = _finder(path, search, ground)
     try:
         xacro.eval_text(_PROBE, symbols)
     except xacro.XacroException as error:
@@ -100,23 +100,19 @@ def _tables(symbols: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     yield from (value for value in symbols.values() if isinstance(value, dict))
 
 
-class _Finder:
-    """Finds packages for xacro's $(find name)."""
+def _finder(path: Path, search: Mapping[str, str], ground: Ground) -> Callable[[str], str]:
+    """What finds packages for xacro's $(find name)."""
 
-    def __init__(self, path: Path, search: Mapping[str, str], ground: Ground) -> None:
-        self._path, self._search, self._ground = path, search, ground
+    def is_package(folder: Path) -> bool:
+        """A folder outside is one only if it says so: else $(find etc) would be one."""
+        return ground.holds(str(folder)) or (folder / "package.xml").is_file()
 
-    def get_path(self, name: str) -> str:
-        folder = find_package(name, self._path, self._search, self._is_package)
+    def get_path(name: str) -> str:
+        folder = find_package(name, path, search, is_package)
         if folder is None:
             raise LookupError(f"package {name!r} is not found")
-        if not self._ground.holds(str(folder)):
-            self._ground.roots.append(str(folder.resolve()))
+        if not ground.holds(str(folder)):
+            ground.roots.append(str(folder.resolve()))
         return str(folder)
 
-    def _is_package(self, folder: Path) -> bool:
-        """A folder outside is one only if it says so: else $(find etc) would be one."""
-        return self._ground.holds(str(folder)) or (folder / "package.xml").is_file()
-
-    def walk_up_from(self, path: object, priority: int = 0) -> None:
-        """Done by `find_package` already."""
+    return get_path
