@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -204,8 +202,3 @@ def _standard_input() -> str:
         return read_standard_input().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SourceError("cannot be read", where="-", found=f"no UTF-8 text ({error})") from None
-
-
-def command_line() -> str:
-    """The command as it was typed, for reports."""
-    return shlex.join(["urdfkin", *sys.argv[1:]])
