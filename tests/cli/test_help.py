@@ -1,10 +1,10 @@
 """Help is quick, complete and true: its examples are run."""
 
 import glob
+import os
 import shlex
 import subprocess
 import sys
-import time
 from importlib import import_module, metadata
 from pathlib import Path
 
@@ -107,15 +107,16 @@ def test_a_commands_help_imports_neither_numpy_nor_pinocchio(command: str) -> No
 
 
 def test_help_is_there_at_once() -> None:
-    # 0.06 s was measured; the bound leaves room for a loaded machine.
-    best = min(_seconds() for _ in range(3))
-    assert best < 0.6
+    # 0.06 s was measured; a processor that others use too is slower, but counts no more than its own time.
+    assert min(_seconds() for _ in range(3)) < 0.6
 
 
 def _seconds() -> float:
-    begin = time.perf_counter()
+    """What the process took of the processor."""
+    begin = os.times()
     assert process("--help").code == 0
-    return time.perf_counter() - begin
+    end = os.times()
+    return end.children_user + end.children_system - begin.children_user - begin.children_system
 
 
 def test_the_version_names_pinocchios_too() -> None:
