@@ -1,0 +1,23 @@
+"""The Jacobian at a pose given by joint names, and what one of its columns means.
+
+Learn: joints by name, units, the order of rows and columns, that the answer was checked already.
+"""
+
+import numpy as np
+
+import urdfkin
+
+robot = urdfkin.load("panda")  # a name that `urdfkin robots` lists, a path, or URDF text
+pose = {"panda_joint2": -0.5, "panda_joint4": -2.0, "panda_joint6": 1.5}  # radians
+q = robot.neutral()
+for joint, angle in pose.items():
+    q[robot.coordinate_names.index(joint)] = angle
+
+J = robot.jacobian(q, "panda_hand_tcp")  # (6, nv), rows [linear; angular], eq. 7.85
+np.set_printoptions(precision=3, suppress=True)
+print(f"columns: {', '.join(robot.rate_names)}")
+print(J)
+
+column = J[:, robot.rate_names.index("panda_joint4")]
+print(f"1 rad/s of the elbow alone: {column[:3]} m/s and {column[3:]} rad/s")
+print(robot.certificate())

@@ -1,0 +1,19 @@
+"""The Denavit-Hartenberg table of a URDF, as a datasheet prints it.
+
+Learn: `snap` takes a URDF's 1.5708 for the right angle it means, and every table is held against Pinocchio.
+"""
+
+import numpy as np
+
+import urdfkin
+from urdfkin.dh import export
+
+robot = urdfkin.load("ur5")
+table = robot.dh("tool0", "base", snap=1e-6)
+print(export(table, "markdown"))
+
+q = np.full(6, 0.3)
+print("the tip by the table, metres:", table.placement(q)[:3, 3].round(6))
+for convention in ("standard", "modified"):
+    rows = robot.dh("tool0", "base", convention, snap=1e-6).rows
+    print(f"{convention:>8}: a = {[round(row.a, 5) for row in rows]}")

@@ -1,0 +1,27 @@
+"""Your own URDF, guarded in CI: strict findings first, then every quantity of every frame against Pinocchio.
+
+Learn: `check` for the text, `validate` for the numbers; the commands of the same names do it without Python.
+"""
+
+import urdfkin
+from urdfkin.diagnostics import Severity
+
+URDF = """<robot name="mine">
+  <link name="base"/><link name="arm"/>
+  <joint name="hinge" type="revolute">
+    <parent link="base"/><child link="arm"/>
+    <origin xyz="0 0 0.5" rpy="0 1.5708 0"/><axis xyz="0 0 2"/>
+    <limit lower="-1" upper="1" effort="10" velocity="1"/>
+  </joint>
+</robot>"""
+
+findings = urdfkin.check(URDF)
+for finding in findings:
+    print(finding)
+errors = [finding for finding in findings if finding.severity is Severity.ERROR]
+
+report = urdfkin.validate(URDF, samples=100)
+robot = report.robots[0]
+print(f"{robot.name}: {robot.results} results checked, {robot.failed} outside their bound")
+if errors or not report.passed:
+    raise SystemExit(1)  # which fails the job

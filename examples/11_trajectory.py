@@ -1,0 +1,27 @@
+"""A frame along a trajectory: how fast, how strongly accelerated, how near to a singularity, and where.
+
+Learn: motions from rest to rest, one call for a frame's whole motion, and Pinocchio's opinion beside it.
+"""
+
+import numpy as np
+
+import urdfkin
+from urdfkin.frame_motion import frame_motion
+from urdfkin.trajectory import line
+
+robot = urdfkin.load("ur5")
+start = np.array([0.0, -1.5, 1.2, -1.0, -1.5, 0.0])
+end = np.array([1.5, -0.8, 0.6, -1.2, -1.0, 0.5])
+motion = line(robot, start, end, duration=2.0, samples=101)
+tool = frame_motion(robot, motion.q, motion.v, motion.a, "tool0")
+
+speed = np.linalg.norm(tool.velocity[:, :3], axis=1)
+magnitude = np.linalg.norm(tool.acceleration[:, :3], axis=1)
+smallest = tool.singular_values[:, -1]
+for what, values, best, unit in (
+    ("fastest", speed, speed.argmax(), "m/s"),
+    ("most accelerated", magnitude, magnitude.argmax(), "m/s^2"),
+    ("nearest to a singularity", smallest, smallest.argmin(), "(smallest singular value)"),
+):
+    print(f"{what:<25} at {motion.t[best]:.2f} s: {values[best]:.3f} {unit}")
+print("Pinocchio agrees with every sample:", tool.agrees)
