@@ -6,4 +6,5 @@ set -e
 ruff format --check .
 ruff check .
 mypy
+python scripts/changelog_gate.py
 exec pytest -n 2 "$@"

@@ -1,0 +1,97 @@
+"""A branch that changes the package says so in the changelog; a checkout that cannot tell is let through."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from scripts.changelog_gate import main
+
+pytestmark = pytest.mark.skipif(shutil.which("git") is None, reason="an archive is tested where git is not")
+
+
+def git(folder: Path, *words: str) -> None:
+    who = ("-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgSign=false")
+    subprocess.run(["git", *who, *words], cwd=folder, check=True, capture_output=True)
+
+
+def commit(folder: Path, message: str, **files: str) -> None:
+    for name, text in files.items():
+        path = folder / {"module": "urdfkin/module.py", "page": "CHANGELOG.md", "docs": "docs/dh.md"}[name]
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+    git(folder, "add", "-A")
+    git(folder, "commit", "-m", message)
+
+
+@pytest.fixture
+def branch(tmp_path: Path) -> Path:
+    """A repository on a branch that has just left main."""
+    folder = tmp_path / "here"
+    folder.mkdir()
+    git(folder, "init", "-b", "main")
+    commit(folder, "Begin", module="one = 1\n" * 9, page="- one\n", docs="# Tables\n")
+    git(folder, "switch", "-c", "branch")
+    return folder
+
+
+def test_a_change_of_the_package_alone_fails_and_is_named(
+    branch: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    commit(branch, "Change", module="two = 2\n")
+    assert main(branch) == 1
+    assert "urdfkin/module.py changed" in capsys.readouterr().out
+
+
+def test_a_line_in_the_changelog_in_any_commit_of_the_branch_is_enough(branch: Path) -> None:
+    commit(branch, "Change", module="two = 2\n")
+    commit(branch, "Say so", page="- two\n- one\n")
+    assert main(branch) == 0
+
+
+def test_what_no_user_notices_is_argued_in_a_commit(branch: Path) -> None:
+    commit(branch, "Say it shorter\n\nNo-changelog: the same results", module="two = 2\n")
+    assert main(branch) == 0
+
+
+def test_an_empty_argument_is_none(branch: Path) -> None:
+    commit(branch, "Say it shorter\n\nNo-changelog:", module="two = 2\n")
+    assert main(branch) == 1
+
+
+def test_pages_and_moves_need_no_line(branch: Path) -> None:
+    git(branch, "mv", "urdfkin/module.py", "urdfkin/other name.py")
+    commit(branch, "Move", docs="# Denavit-Hartenberg tables\n")
+    assert main(branch) == 0
+
+
+def test_what_is_deleted_is_a_change(branch: Path) -> None:
+    git(branch, "rm", "urdfkin/module.py")
+    git(branch, "commit", "-m", "Delete")
+    assert main(branch) == 1
+
+
+def test_what_main_did_meanwhile_is_not_the_branchs(branch: Path) -> None:
+    commit(branch, "Write", docs="# Denavit-Hartenberg tables\n")
+    git(branch, "switch", "main")
+    commit(branch, "Change", module="two = 2\n")
+    git(branch, "switch", "branch")
+    assert main(branch) == 0
+
+
+@pytest.mark.parametrize("kind", ["main", "shallow", "archive"])
+def test_where_nothing_can_be_compared_the_gate_says_so_and_passes(
+    branch: Path, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    commit(branch, "Change", module="two = 2\n")
+    place = branch
+    if kind == "main":
+        git(branch, "switch", "main")
+    elif kind == "shallow":
+        place = tmp_path / "shallow"
+        git(tmp_path, "clone", "--depth", "1", "--branch", "branch", branch.as_uri(), str(place))
+    else:
+        shutil.rmtree(branch / ".git")
+    assert main(place) == 0
+    assert capsys.readouterr().out.startswith("changelog not checked: ")
