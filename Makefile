@@ -1,0 +1,38 @@
+# The loop of whoever changes urdfkin; CONTRIBUTING.md says when to run what.
+PATH := $(CURDIR)/.venv/bin:$(PATH)
+.PHONY: help setup format check fast test search docs bench
+
+help:  ## this list
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 10
+
+setup:  ## .venv with urdfkin and all that its tests need
+	sh -c '. scripts/environment.sh; make_environment "[test]"' scripts/setup
+
+format:  ## write Python as it is written here
+	ruff format .
+	ruff check --fix .
+
+check:  ## format, lint, types, changelog
+	ruff format --check .
+	ruff check .
+	mypy
+	python scripts/changelog_gate.py
+
+fast:  ## the quick tests: a minute on two quiet cores
+	pytest -q -n 2 -m "not slow and not browser"
+
+test: check  ## everything that must pass
+	pytest -q -n 2
+
+search:  ## the quick tests, their properties on examples that were never tried
+	pytest -q -n 2 -m "not slow and not browser" --hypothesis-profile=search
+
+docs:  ## the pages that are generated from the code
+	python scripts/make_equations.py
+	python scripts/make_findings.py
+	python scripts/make_reports.py
+	python scripts/make_performance.py
+	python scripts/make_tour.py
+
+bench:  ## beside Pinocchio, in seconds
+	python scripts/benchmark.py --quick
