@@ -103,6 +103,7 @@ def test_a_slip_drawn_by_a_seed_is_noticed_or_argued(mutant: Mutant) -> None:
         assert outcome.word != "survived", f"{mutant.place}: {mutant.what}"
 
 
+@pytest.mark.slow
 def test_what_is_argued_can_still_be_made_and_stands_on_the_page_once() -> None:
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     lines = [line for line in page.splitlines() if line.startswith("- `urdfkin.")]

@@ -274,6 +274,7 @@ def test_a_copy_works_after_what_it_was_made_from_is_gone() -> None:
         assert not differing(other.jacobian(q), expected)
 
 
+@pytest.mark.slow
 def test_it_goes_to_another_process(tmp_path: Any) -> None:
     robot = urdfkin.load("panda", verify=False)
     q, fast = robot.sample(1, 6)[0], robot.prepare(FRAME)

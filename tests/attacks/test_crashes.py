@@ -62,6 +62,7 @@ def test_what_is_raised_on_purpose_has_its_code(
     assert _run(error) == code
 
 
+@pytest.mark.slow
 def test_nobody_who_reads_the_output_is_no_success() -> None:
     done = process("robots", stdin=b"")
     assert done.code == 0
@@ -76,6 +77,7 @@ def test_nobody_who_reads_the_output_is_no_success() -> None:
     assert ended.stderr.split()[-1] in ("0", "141")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("broken", ["write", "render"])
 def test_when_one_form_fails_the_others_are_written_and_the_report_is_printed(
     broken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -56,6 +56,7 @@ def one_line(text: str) -> str:
 # -- standard streams --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", ["robots", "--help", "--version", "explain URDF101", "info ur5"])
 def test_a_full_standard_output_is_told_in_a_line(words: str) -> None:
     code, _, err = shell(f"$URDFKIN {words} > /dev/full")
@@ -63,6 +64,7 @@ def test_a_full_standard_output_is_told_in_a_line(words: str) -> None:
     assert "standard output: cannot be written: found No space left on device" in one_line(err)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", ["robots", "--help", "info ur5"])
 def test_a_closed_standard_output_is_told_in_a_line(words: str) -> None:
     code, _, err = shell(f"$URDFKIN {words} >&-")
@@ -77,6 +79,7 @@ def test_a_closed_standard_output_is_no_matter_where_a_file_is_written(tmp_path:
     assert (tmp_path / "T.csv").read_text().startswith("sample,T00")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", ["2>&-", "2>/dev/full", "2>&- >&-"])
 def test_a_standard_error_that_takes_nothing_changes_no_exit_code(closed: str) -> None:
     assert shell(f"$URDFKIN info nothing_of_this_name {closed}")[0] == 2
@@ -114,6 +117,7 @@ ASCII = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("env", ASCII, ids=str)
 @pytest.mark.parametrize("words", ["info", "check", "check --format json", "check --format github"])
 def test_names_of_any_script_are_printed_on_any_terminal(words: str, env: dict[str, str], arm: Path) -> None:

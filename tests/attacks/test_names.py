@@ -171,6 +171,7 @@ def meant(name: str, links: list[str], joints: list[str]) -> int | str:
     return "unknown"
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(
     links=st.lists(st.sampled_from(POOL), min_size=1, max_size=5, unique=True),

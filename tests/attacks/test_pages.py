@@ -296,6 +296,7 @@ def test_no_spreadsheet_takes_a_name_for_a_formula(name: str) -> None:
         assert from_csv_cell(cell) == name
 
 
+@pytest.mark.slow
 def test_a_drawing_has_names_as_words_alone() -> None:
     def elements(called: Callable[[str], str]) -> list[Any]:
         names = [called(name) for name in IN_XML.values()]

@@ -100,6 +100,7 @@ def replacing(before: str, after: str) -> Callable[[str], ast.Module]:
     return change
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("module", "before", "after"), FRAGMENTS)
 def test_a_slip_on_the_way_is_caught(
     right: dict[str, FloatArray], module: str, before: str, after: str

@@ -132,6 +132,7 @@ def run(*words: str | Path) -> Done:
     return done
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EDITED)
 def test_a_report_that_contradicts_itself_is_refused_with_what_contradicts(name: str, tmp_path: Path) -> None:
     edit, words = EDITED[name]

@@ -117,6 +117,7 @@ def test_every_command_is_tried() -> None:
     assert set(ROBOT) | set(OTHERS) == set(COMMANDS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [[c, "ROBOT", *more] for c, lists in ROBOT.items() for more in lists],
@@ -182,6 +183,7 @@ def test_a_crash_says_its_last_words_through_the_door() -> None:
     assert acts(done.stderr) == []
 
 
+@pytest.mark.slow
 def test_on_a_real_terminal_nothing_but_our_own_colours_comes_out(files: dict[str, str]) -> None:
     for words in (["check", "ROBOT"], ["info", "ROBOT"], ["dh", "ROBOT"], ["report", "REPORT"]):
         shown = on_a_terminal([files.get(word, word) for word in words])

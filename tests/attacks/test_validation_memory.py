@@ -46,6 +46,7 @@ def test_blocks_cover_everything_once_and_keep_to_their_size(monkeypatch: pytest
         assert max(block.stop - block.start for block in found) == most
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["talos", "double_pendulum", "planar_two_link"])
 @pytest.mark.parametrize("root_joint", [None, "planar"])
 def test_comparing_in_blocks_changes_no_number(
@@ -82,6 +83,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
     assert 50_000 < max(sizes) <= 100_000
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 def test_a_plan_of_all_frames_grows_with_the_links_not_with_their_square() -> None:
     peaks = []

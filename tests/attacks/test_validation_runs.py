@@ -85,6 +85,7 @@ def test_an_executor_that_breaks_costs_what_it_did_not_do(when_asked: bool) -> N
     assert report.asked == 3
 
 
+@pytest.mark.slow
 def test_a_process_pool_of_someone_elses_can_run_the_chunks() -> None:
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         report = validate(["ur5", "no such robot"], samples=30, executor=pool)

@@ -130,6 +130,7 @@ def unescaped(text: str) -> str:
     return text
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("name", CASES)
 def test_every_form_tells_the_verdict_and_its_reason(name: str, monkeypatch: pytest.MonkeyPatch) -> None:

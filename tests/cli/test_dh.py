@@ -76,6 +76,7 @@ def test_the_whole_tree_as_one_table(form: str) -> None:
     assert "FL_HFE" in result.stdout
 
 
+@pytest.mark.slow
 def test_a_comparison_exits_with_its_verdict(tmp_path: Path) -> None:
     assert run("ur5", "--compare", "ur5").exit_code == 0
     assert "agrees exactly" in run("ur5", "--compare", "ur5").stdout

@@ -62,6 +62,7 @@ AFTER_WORK = ("validate", "report", "compare")
 ENDLESS = ("view",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [name for name in COMMANDS if name not in AFTER_WORK + ENDLESS])
 def test_the_examples_of_the_help_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -96,6 +97,7 @@ def test_help_imports_nothing_heavy() -> None:
     assert done.stdout.endswith("\n[]\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_commands_help_imports_neither_numpy_nor_pinocchio(command: str) -> None:
     code = (

@@ -127,6 +127,7 @@ def test_a_report_that_is_read_only_is_not_renamed_over(
     assert path.read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_reader_that_goes_away_is_no_error() -> None:
     import subprocess  # noqa: PLC0415
     import sys  # noqa: PLC0415
@@ -140,6 +141,7 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
         assert b"Traceback" not in running.stderr.read()
 
 
+@pytest.mark.slow
 def test_a_robot_pinocchio_cannot_check_says_so_once_with_exit_3() -> None:
     chain = "".join(
         f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'

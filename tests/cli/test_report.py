@@ -38,6 +38,7 @@ def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_validate_writes_every_form_at_once(tmp_path: Path) -> None:
     done = running.process(
         "validate", "ur5", "--samples", "2", "--json", "a.json", "--html", "a.html",

@@ -282,6 +282,7 @@ def test_mimic_joints_follow_or_are_free_as_asked() -> None:
     assert urdfkin("jacobian", "alex_psyonic_hands", "--mimic").code == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["single_link", "fixed_only", "odd_names", "same_names", "mimic_hand_40"])
 @pytest.mark.parametrize("quantity", QUANTITIES)
 def test_odd_robots_pass_through_the_command(quantity: str, name: str) -> None:

@@ -37,11 +37,13 @@ def test_no_robot_of_the_catalogue_is_unverifiable(robot: str) -> None:
     assert [str(finding) for finding in check(robot) if finding.oracle is not None] == []
 
 
+@pytest.mark.slow
 def test_the_page_of_findings_is_current(script: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     assert script.PAGE.read_text("utf-8") == script.page(), "run python scripts/make_findings.py"
 
 
+@pytest.mark.slow
 def test_a_robot_is_told_a_handful_of_things_at_most(script: ModuleType) -> None:
     assert max(len(script.warnings_of(robot)) for robot in catalogue()) <= 5

@@ -61,6 +61,7 @@ def test_every_panel_is_on_the_sheet_and_the_foot_says_what_was_checked(case: Ca
     assert foot(x, trajectory) in written
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ending", "head"), [("svg", b"<?xml"), ("png", b"\x89PNG"), ("pdf", b"%PDF")])
 def test_the_ending_says_the_format_and_the_same_motion_gives_the_same_file(
     ending: str, head: bytes, case: Case, tmp_path: Path

@@ -23,7 +23,14 @@ from urdfkin.verification.bounds import Quantity
 WITHOUT_MIMIC_MODEL = frozenset({"alex_psyonic_hands", "romeo", "talos", "talos_box"})
 
 
-@pytest.fixture(scope="module", params=examples())
+#: The first of each family, an arm with a follower and a whole humanoid; the others are marked slow.
+QUICK = {"panda", "talos", *{catalogue()[name].family: name for name in reversed(examples())}.values()}
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in examples()],
+)
 def robot(request: pytest.FixtureRequest) -> Robot:
     return urdfkin.load(request.param)
 
@@ -73,6 +80,7 @@ def test_every_quantity_agrees_on_many_samples(robot: Robot) -> None:
     assert (report.verdict, report.failed) == (Verdict.VERIFIED, 0)
 
 
+@pytest.mark.slow
 def test_a_robots_calls_agree_when_pinocchio_is_asked_directly(robot: Robot) -> None:
     generator = np.random.default_rng(2)
     q, v, a = robot.sample(1, 2)[0], generator.normal(size=robot.nv), generator.normal(size=robot.nv)

@@ -52,6 +52,7 @@ def test_the_kinova_sheet_differs_by_its_rounding_and_the_way_its_joints_count()
     assert found.metres < 5.01e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", references())
 def test_a_shipped_reference_agrees_with_its_urdf_as_it_says(name: str) -> None:
     reference = read_table(reference_path(name))
@@ -64,6 +65,7 @@ def test_a_shipped_reference_agrees_with_its_urdf_as_it_says(name: str) -> None:
     assert 'source = "' in text
 
 
+@pytest.mark.slow
 def test_a_catalogue_that_is_wrong_by_03_mm_is_found_out() -> None:
     """A published xArm7 table (robotkinematicscatalogue 1.1.2) has a3 = 52.2 instead of 52.5 mm."""
     reference = read_table(reference_path("xarm7_modified"))

@@ -85,6 +85,7 @@ def test_every_function_exists_and_every_test_is_a_test() -> None:
             assert test.split("::")[1].startswith("test_"), test
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", list(equations()))
 def test_its_tests_pass_and_fail_when_one_of_its_functions_is_slightly_wrong(number: str) -> None:
     equation = equations()[number]
