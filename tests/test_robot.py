@@ -354,6 +354,7 @@ def test_a_sample_lies_within_limits_and_repeats_itself(panda: Robot) -> None:
         panda.sample(-1)
 
 
+@pytest.mark.slow
 def test_the_oracle_keeps_out_of_what_would_end_the_process() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)

@@ -45,6 +45,7 @@ def test_the_key_of_the_kernels_names_all_that_they_depend_on() -> None:
     assert index("pip install") < index("pip freeze") < index("actions/cache@") < index("urdfkin validate")
 
 
+@pytest.mark.slow
 def test_the_command_that_makes_the_key_makes_one(tmp_path: Path) -> None:
     command = steps()[index("pip freeze")]["run"]
     output = tmp_path / "output"

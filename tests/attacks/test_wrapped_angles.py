@@ -149,6 +149,7 @@ def test_what_a_plot_verifies_is_the_formula_and_not_the_rates(tmp_path: Path) -
     assert "not whether v and a are the rates of q" in words
 
 
+@pytest.mark.slow
 def test_plot_tells_on_stderr_that_it_took_wraps_out(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     robot = wheel()

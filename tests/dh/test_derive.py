@@ -21,8 +21,6 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.tree import FloatArray, KinematicTree
 
-pytestmark = pytest.mark.slow
-
 EPS = float(np.finfo(np.float64).eps)
 CONVENTIONS = ("standard", "modified")
 LENGTH_BOUND = 10.0
@@ -44,6 +42,7 @@ def residual(table: DHTable, path: FrameChain, q: FloatArray) -> tuple[float, fl
     )
 
 
+@pytest.mark.slow
 @given(
     trees(),
     st.sampled_from(CONVENTIONS),
@@ -74,6 +73,7 @@ def test_on_many_more_chains_the_table_is_exact_and_short(
     assert longest <= LENGTH_BOUND * reach_of(path)
 
 
+@pytest.mark.slow
 @given(trees(), st.sampled_from(CONVENTIONS))
 @settings(max_examples=40)
 def test_the_table_of_a_reversed_path_is_as_exact(tree: KinematicTree, convention: str) -> None:
@@ -97,6 +97,7 @@ def test_the_table_agrees_with_pinocchio(tree: KinematicTree, convention: str) -
     assert (error[:, :3, :3].max(axis=(-1, -2)) <= 2 * radians).all()
 
 
+@pytest.mark.slow
 @given(trees(), st.sampled_from(CONVENTIONS), st.booleans())
 @settings(max_examples=120)
 def test_no_row_is_longer_than_ten_times_the_reach(
@@ -108,6 +109,7 @@ def test_no_row_is_longer_than_ten_times_the_reach(
     assert max((max(abs(row.a), abs(row.d)) for row in table.rows), default=0.0) <= bound
 
 
+@pytest.mark.slow
 @given(trees(min_joints=1))
 @settings(max_examples=30)
 def test_the_same_chain_gives_the_same_table_to_the_bit(tree: KinematicTree) -> None:
@@ -156,6 +158,7 @@ def mp_shift(axis: int, length: mpmath.mpf) -> mpmath.matrix:
     return T
 
 
+@pytest.mark.slow
 @given(trees(min_joints=1, max_joints=5), st.sampled_from(CONVENTIONS))
 @settings(max_examples=30)
 def test_in_sixty_digits_the_cells_are_right_to_a_few_units_in_the_last_place(
@@ -182,6 +185,7 @@ def test_a_pair_of_any_tilt_is_exact_and_short(power: int, convention: str) -> N
     assert max(max(abs(row.a), abs(row.d)) for row in table.rows) <= LENGTH_BOUND * reach_of(path)
 
 
+@pytest.mark.slow
 @given(st.floats(-3, 3), st.floats(-3, 3), st.integers(3, 15), st.floats(-0.5, 0.5), st.floats(0.05, 0.5))
 @settings(max_examples=40)
 def test_a_tiny_tilt_changes_the_lengths_of_a_parallel_pair_by_as_little(
@@ -319,6 +323,7 @@ def test_a_path_without_joints_is_a_table_without_rows() -> None:
         np.testing.assert_array_equal(table.placement([]), shift(1, 2, 3))
 
 
+@pytest.mark.slow
 @example(kinds="PPP")
 @given(st.text("RP", min_size=1, max_size=5))
 @settings(max_examples=40)

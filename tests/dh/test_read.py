@@ -17,11 +17,10 @@ from urdfkin.dh.read import table_from_text
 from urdfkin.errors import InputError, SourceError
 from urdfkin.tree import KinematicTree
 
-pytestmark = pytest.mark.slow
-
 ROWS = [[0.0, "pi/2", 0.3, 0.0, "R"], [0.4, 0.0, 0.0, -1.0, "P"]]
 
 
+@pytest.mark.slow
 @given(trees(), st.sampled_from(["standard", "modified"]), st.sampled_from(["toml", "json", "csv"]))
 @settings(max_examples=50)
 def test_a_written_table_reads_back_to_the_bit(tree: KinematicTree, convention: str, form: str) -> None:

@@ -16,8 +16,6 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.tree import FloatArray, JointKind, KinematicTree, Mimic
 
-pytestmark = pytest.mark.slow
-
 conventions = st.sampled_from(["standard", "modified"])
 
 
@@ -35,6 +33,7 @@ def same_cells(first: DHTable, second: DHTable) -> bool:
     return bool(np.allclose(one, two, rtol=0, atol=1e-12))
 
 
+@pytest.mark.slow
 @given(trees(), conventions, st.sampled_from(["tip", "flange"]))
 @settings(max_examples=50)
 def test_one_convention_to_the_other_and_back_is_the_same_table(
@@ -50,6 +49,7 @@ def test_one_convention_to_the_other_and_back_is_the_same_table(
     assert agree(table.placement(q), back.placement(q), table, q)
 
 
+@pytest.mark.slow
 @given(trees(), conventions)
 @settings(max_examples=40)
 def test_a_table_as_a_tree_places_the_tip_alike_in_pinocchio(tree: KinematicTree, convention: str) -> None:
@@ -65,6 +65,7 @@ def test_a_table_as_a_tree_places_the_tip_alike_in_pinocchio(tree: KinematicTree
     )
 
 
+@pytest.mark.slow
 @given(trees(mimics=False), conventions)
 @settings(max_examples=40)
 def test_a_table_from_the_tree_of_a_table_is_as_exact(tree: KinematicTree, convention: str) -> None:

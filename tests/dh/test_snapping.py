@@ -16,8 +16,6 @@ from urdfkin.dh import DHTable, dh_table
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.tree import FloatArray, KinematicTree
 
-pytestmark = pytest.mark.slow
-
 EPS = float(np.finfo(np.float64).eps)
 
 
@@ -47,6 +45,7 @@ def worst(table: DHTable, tree: KinematicTree, q: FloatArray) -> tuple[FloatArra
     )
 
 
+@pytest.mark.slow
 @given(
     st.integers(0, 10_000),
     st.sampled_from([1e-9, 3.7e-6, 1e-4, 2e-3]),
@@ -66,6 +65,7 @@ def test_no_configuration_moves_the_tip_by_more_than_declared(
     assert (radians <= allowed_radians).all()
 
 
+@pytest.mark.slow
 @given(trees(min_joints=1), st.sampled_from([1e-6, 1e-3, 0.05]))
 @settings(max_examples=50)
 def test_snapping_any_chain_keeps_its_word(tree: KinematicTree, tolerance: float) -> None:
@@ -80,6 +80,7 @@ def test_snapping_any_chain_keeps_its_word(tree: KinematicTree, tolerance: float
     assert (radians <= allowed_radians).all()
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 @settings(max_examples=40)
 def test_the_declared_bound_is_not_idle(seed: int) -> None:
@@ -91,6 +92,7 @@ def test_the_declared_bound_is_not_idle(seed: int) -> None:
     assert snap.metres <= 30.0 * snap.measured_metres
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 @settings(max_examples=30)
 def test_angles_that_are_nearly_round_become_round(seed: int) -> None:

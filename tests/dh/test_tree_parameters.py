@@ -18,8 +18,6 @@ from urdfkin.dh.tree_parameters import tree_parameters
 from urdfkin.errors import InputError
 from urdfkin.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
 
-pytestmark = pytest.mark.slow
-
 EPS = float(np.finfo(np.float64).eps)
 
 
@@ -35,6 +33,7 @@ def branching(draw: st.DrawFn) -> KinematicTree:
     return build_tree("bush", "l0", joints)
 
 
+@pytest.mark.slow
 @given(st.one_of(branching(), trees(min_joints=1)))
 @settings(max_examples=30)
 def test_every_link_is_placed_as_pinocchio_places_it(tree: KinematicTree) -> None:
@@ -47,6 +46,7 @@ def test_every_link_is_placed_as_pinocchio_places_it(tree: KinematicTree) -> Non
         assert (error[:, :3, 3].max(axis=-1) <= EPS * table.roundings * reach[:, j] + 1e-300).all()
 
 
+@pytest.mark.slow
 @given(branching())
 @settings(max_examples=40)
 def test_no_length_exceeds_ten_times_the_reach(tree: KinematicTree) -> None:
@@ -55,6 +55,7 @@ def test_no_length_exceeds_ten_times_the_reach(tree: KinematicTree) -> None:
         assert max(abs(row.b), abs(row.d), abs(row.r)) <= 10.0 * reach
 
 
+@pytest.mark.slow
 @given(branching())
 @settings(max_examples=40)
 def test_gamma_and_b_are_zero_on_the_first_moving_child(tree: KinematicTree) -> None:

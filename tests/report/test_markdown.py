@@ -11,8 +11,6 @@ from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile
 from urdfkin.printable import markdown_code, markdown_text
 from urdfkin.report.markdown import LIMIT, as_markdown, fenced
 
-pytestmark = pytest.mark.slow
-
 GITHUB_LIMIT = 65_536
 
 
@@ -49,6 +47,7 @@ def test_a_fence_is_longer_than_what_it_holds() -> None:
     assert fenced("a ``` b").startswith("````sh\n")
 
 
+@pytest.mark.slow
 def test_a_thousand_robots_still_fit_a_comment_and_the_rest_is_counted() -> None:
     document = arms()
     document["robots"] = [copy.deepcopy(document["robots"][0]) for _ in range(1000)]

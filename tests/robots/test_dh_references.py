@@ -42,6 +42,7 @@ def test_every_cell_of_the_vendors_table_comes_out_of_the_urdf(name: str) -> Non
         assert table.snap.metres <= metres
 
 
+@pytest.mark.slow
 def test_the_kinova_sheet_differs_by_its_rounding_and_the_way_its_joints_count() -> None:
     reference = read_table(reference_path("kinova"))
     robot = load("kinova")

@@ -18,8 +18,6 @@ from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, bui
 from urdfkin.urdf.skeleton import rpy_of_quaternion
 from urdfkin.urdf.writer import to_urdf
 
-pytestmark = pytest.mark.slow
-
 EPS = float(np.finfo(float).eps)
 
 
@@ -32,6 +30,7 @@ def assert_same(found: KinematicTree, given_tree: KinematicTree) -> None:
         np.testing.assert_allclose(a.axis, b.axis, rtol=0, atol=2 * EPS)
 
 
+@pytest.mark.slow
 @given(trees())
 def test_a_written_tree_reads_back_as_itself(tree: KinematicTree) -> None:
     text = to_urdf(tree).encode()
@@ -40,6 +39,7 @@ def test_a_written_tree_reads_back_as_itself(tree: KinematicTree) -> None:
     assert_same(tree_of(text), tree)
 
 
+@pytest.mark.slow
 @given(trees())
 def test_writing_twice_changes_nothing_but_the_last_digits_of_angles(tree: KinematicTree) -> None:
     once = tree_of(to_urdf(tree).encode())
@@ -70,6 +70,7 @@ def test_a_tree_of_nothing_but_a_link_reads_back() -> None:
     assert_same(tree_of(to_urdf(tree).encode()), tree)
 
 
+@pytest.mark.slow
 @given(rotations)
 def test_angles_give_the_rotation_back_even_where_pitch_is_a_quarter_turn(R: FloatArray) -> None:
     np.testing.assert_allclose(rotation(*rpy_of(R)), R, rtol=0, atol=6 * EPS)

@@ -82,6 +82,7 @@ def test_without_the_extra_one_line_says_what_to_install(monkeypatch: pytest.Mon
         new_server(port=free_port())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar_two_link", "romeo", "alex_psyonic_hands"])
 def test_robots_of_other_kinds_are_shown_too(name: str) -> None:
     server = new_server(port=free_port())
