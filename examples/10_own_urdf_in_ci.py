@@ -4,7 +4,7 @@ Learn: `check` for the text, `validate` for the numbers; the commands of the sam
 """
 
 import urdfkin
-from urdfkin.diagnostics import Severity
+from urdfkin.lint import Severity
 
 URDF = """<robot name="mine">
   <link name="base"/><link name="arm"/>

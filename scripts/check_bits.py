@@ -31,8 +31,9 @@ from urdfkin.catalogue import catalogue
 from urdfkin.checks import bound_of
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
+from urdfkin.roundings import EPS
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import EPS, Quantity
+from urdfkin.verification.bounds import Quantity
 
 #: What is computed, and how many of q, v, a it takes.
 QUANTITIES = {

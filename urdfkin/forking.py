@@ -18,3 +18,8 @@ def lock_over_forks() -> threading.RLock:
     lock = threading.RLock()
     os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release)
     return lock
+
+
+#: Held while a module is imported that is loaded only when it is needed: a child that was forked meanwhile by
+#: another thread would wait for ever for the rest of that import.
+importing = lock_over_forks()

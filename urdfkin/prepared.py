@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.forking import importing
 from urdfkin.recursion.plan import Plan
 from urdfkin.recursion.task import Task
 from urdfkin.reference import Reference
@@ -96,7 +97,8 @@ class PreparedFrame:
 
     def _first(self, quantity: Quantity, q: ArrayLike, *others: object) -> FloatArray | None:
         """Make what computes a quantity, and compute."""
-        from urdfkin.recursion.single import arrays_are_known, single  # noqa: PLC0415  loads Numba
+        with importing:
+            from urdfkin.recursion.single import arrays_are_known, single  # noqa: PLC0415  loads Numba
 
         # Quaternions are brought to norm 1 first, and what may overflow is looked at: the robot's business.
         robots = self._robot.tree.floating_joints or self._plan.is_large

@@ -2,7 +2,7 @@
 
 A walk is a program of a few instructions (`urdfkin.recursion.program`), so that a part is left out by leaving
 its instructions out: what the whole takes longer is what the part takes. A single call is taken apart from
-outside: an empty function of Python's, an empty kernel that Numba calls with the same arrays, and so on.
+outside: an empty function of Python's, a call that is refused, and so on.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from scripts.benchmarking.calls import Calls
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
 from scripts.benchmarking.timing import Work, times
 from urdfkin.recursion import cores
-from urdfkin.recursion.compiling import BOUND, NUMBERS, compiling_allowed, jitted, output
 from urdfkin.recursion.program import WIDTH, Head, Op, Program, program_of
 from urdfkin.recursion.single import single
 from urdfkin.recursion.task import Task, scratch
@@ -91,12 +90,12 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         works = [call.single(subject, quantity) for call in calls]
         for work in works:
             work.compute()
-        loop, function, empty, array, kernel, prepared, method = _times(works, rounds).values()
+        loop, function, refused, array, computed, prepared, method = _times(works, rounds).values()
         parts = {
-            "Python's call": function - loop,
-            "Numba's, an empty kernel": empty - loop,
-            "the walk": kernel - empty,
-            "prepared, beside these": prepared - kernel - (function - loop),
+            "Python's call of a method": function - loop,
+            "its call of the walk": refused - loop,
+            "the walk": computed - refused,
+            "prepared, beside these": prepared - computed - (function - loop),
             "NumPy's new array": array - loop,
             "the robot's method, beside all that": method - prepared - (array - loop),
         }
@@ -105,16 +104,13 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
 
 def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
     q_v_a = "q" if quantity == "jacobian" else "q, v, a"
-    made = single(quantity, subject.plan, Reference.LOCAL_WORLD_ALIGNED)
+    compute, _ = single(quantity, subject.plan, Reference.LOCAL_WORLD_ALIGNED)
     names = {
         "robot": subject.robot,
         "fast": subject.robot.prepare(subject.frame),
         "frame": subject.frame,
         "function": _function(quantity),
-        "nothing": _empty_kernel(quantity),
-        "kernel": made.kernel,
-        "task": made.task,
-        "kept": made.kept,
+        "compute": compute,
         "empty": np.empty,
         "shape": subject.width(quantity),
         "out": np.empty(subject.width(quantity)),
@@ -122,9 +118,9 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
     for line in (
         "q",  # an empty loop
         f"function({q_v_a}, out=out)",
-        f"nothing(task, {q_v_a}, out)",
+        f"compute({q_v_a}, shape)",  # a tuple is refused, after the arrays were looked at
         "empty(shape)",
-        f"kernel(task, {q_v_a}, out)",
+        f"compute({q_v_a}, out)",
         f"fast.{quantity}({q_v_a}, out=out)",
         f"robot.{quantity}({q_v_a}, frame, verify=False)",
     ):
@@ -143,23 +139,6 @@ def _function(quantity: str) -> Callable[..., object]:
 
     method: Callable[..., object] = getattr(Empty(), quantity)
     return method
-
-
-def _empty_kernel(quantity: str) -> Any:
-    """A kernel that takes what the real one takes and does nothing."""
-
-    def matrix(bound: object, q: object, out: object) -> int:
-        return 1
-
-    def six(bound: object, q: object, v: object, a: object, out: object) -> int:
-        return 1
-
-    columns = quantity == "jacobian"
-    kernel = jitted()(matrix if columns else six)
-    with compiling_allowed():
-        kernel.compile((BOUND, NUMBERS, output(2)) if columns else (BOUND, *[NUMBERS] * 3, output(1)))
-    kernel.disable_compile()
-    return kernel
 
 
 # -- both ------------------------------------------------------------------------------------------------

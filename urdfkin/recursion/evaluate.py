@@ -8,10 +8,12 @@ A core is loaded when it is first needed, so that a first use compiles only what
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from urdfkin.errors import NotFiniteError, RangeError
+from urdfkin.forking import importing
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.recursion.batch import in_blocks
 from urdfkin.recursion.compiling import Core
@@ -26,6 +28,12 @@ _PLACES = Task.BASE, Task.Q, Task.V, Task.A
 _STRIDES = Task.STRIDE_BASE, Task.STRIDE_Q, Task.STRIDE_V, Task.STRIDE_A
 
 
+def _cores() -> Any:
+    with importing:
+        from urdfkin.recursion import cores  # noqa: PLC0415
+    return cores
+
+
 def placements(
     plan: Plan,
     q: FloatArray,
@@ -35,8 +43,7 @@ def placements(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 4, 4) T_world_frame: 7.77 with the rotations alongside."""
-    from urdfkin.recursion.cores import placements as core  # noqa: PLC0415
-
+    core = _cores().placements
     shape = len(q), len(plan.frames), 16
     flat = np.empty(shape) if out is None else out.reshape(shape)
     _run(core, plan, program_of(plan, turned=True), [q], _ALIGNED, base, flat, threads)
@@ -54,9 +61,8 @@ def velocities(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 6) [linear; angular]: 7.127, 7.128."""
-    from urdfkin.recursion.cores import local_velocities, velocities  # noqa: PLC0415
-
-    core = local_velocities if reference is Reference.LOCAL else velocities
+    cores = _cores()
+    core = cores.local_velocities if reference is Reference.LOCAL else cores.velocities
     out = np.empty((len(q), len(plan.frames), 6)) if out is None else out
     _run(
         core,
@@ -110,8 +116,7 @@ def jacobians(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 6, nv) velocity Jacobians: 7.85."""
-    from urdfkin.recursion.cores import jacobians as core  # noqa: PLC0415
-
+    core = _cores().jacobians
     out = np.empty((len(q), len(plan.frames), 6, plan.nv)) if out is None else out
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
     _run(core, plan, program, [q], reference, base, out, threads)
@@ -129,8 +134,7 @@ def jacobian_rates(
     threads: int | None = None,
 ) -> FloatArray:
     """(n, frames, 6, nv) time derivatives of the velocity Jacobians: the J-dot of 7.126."""
-    from urdfkin.recursion.cores import jacobian_rates as core  # noqa: PLC0415
-
+    core = _cores().jacobian_rates
     out = np.empty((len(q), len(plan.frames), 6, plan.nv)) if out is None else out
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
     _run(core, plan, program, [q, v], reference, base, out, threads)
