@@ -248,7 +248,7 @@ def test_what_is_printed_goes_through_the_door() -> None:
     allowed = {
         "door.py": ("click.echo(printable(line)",),
         "info.py": ("click.echo()",), "robots.py": ("click.echo()",),
-        "explain.py": ("click.echo(equation)", "click.echo(page(", 'click.echo(f"{code.id}'),
+        "explain.py": ("click.echo(equation)", "click.echo(explain(", 'click.echo(f"{rule.id}'),
         "check.py": ("click.echo(as_json(", "click.echo(as_sarif(", "click.echo(summary(", "click.echo(f\"'"),
         "report.py": ("click.echo(asset(",), "compare.py": ("click.echo(json.dumps(",),
         "dh_work.py": ("click.echo(text, nl=False)",),
