@@ -28,21 +28,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that i
 import urdfkin
 from urdfkin.call import Call
 from urdfkin.catalogue import catalogue
-from urdfkin.checks import bound_of
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.roundings import EPS
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import Quantity
+from urdfkin.verification.quantities import Quantity, walked
+from urdfkin.verification.verifier import bound_of
 
-#: What is computed, and how many of q, v, a it takes.
-QUANTITIES = {
-    Quantity.PLACEMENT: 1,
-    Quantity.VELOCITY: 2,
-    Quantity.JACOBIAN: 1,
-    Quantity.JACOBIAN_RATE: 2,
-    Quantity.ACCELERATION: 3,
-}
 #: Lengths of batches: less than a block of eight, one, more, and many with a rest.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: How many threads a batch is spread over; None: as many as urdfkin takes.
@@ -78,9 +70,10 @@ class Subject:
 
     def results(self) -> Iterator[tuple[str, Quantity, Reference, tuple[FloatArray, ...]]]:
         """(what, quantity, reference, the inputs that it takes)."""
-        for quantity, count in QUANTITIES.items():
-            for reference in Reference if quantity is not Quantity.PLACEMENT else (_ALIGNED,):
-                yield f"{self.name}/{quantity}/{reference.name}", quantity, reference, self.inputs[:count]
+        for quantity in walked():
+            for reference in Reference if quantity.referred else (_ALIGNED,):
+                what = f"{self.name}/{quantity.name}/{reference.name}"
+                yield what, quantity, reference, self.inputs[: len(quantity.inputs)]
 
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
@@ -92,11 +85,16 @@ def spread(count: int) -> list[int]:
 
 
 def computed(
-    subject: Subject, quantity: Quantity, reference: Reference, frame: str, inputs: Sequence[Any], **how: Any
+    subject: Subject,
+    quantity: Quantity,
+    reference: Reference,
+    frame: str | Sequence[str],
+    inputs: Sequence[Any],
+    **how: Any,
 ) -> FloatArray:
     """A method's result."""
-    words = (frame,) if quantity is Quantity.PLACEMENT else (frame, reference)
-    method = getattr(subject.robot, quantity.replace(" ", "_"))
+    words = (frame, reference) if quantity.referred else (frame,)
+    method = getattr(subject.robot, quantity.method)
     result: FloatArray = method(*inputs, *words, verify=False, **how)
     return result
 
@@ -117,7 +115,7 @@ def differing(subject: Subject) -> Iterator[str]:
         single = np.stack([computed(subject, quantity, reference, frame, row) for row in rows])
         if not np.isfinite(single).all():
             yield f"{what}: not finite"
-        fast = getattr(subject.robot.prepare(frame, reference), quantity, None)
+        fast = getattr(subject.robot.prepare(frame, reference), quantity.method, None)
         if fast is not None:
             out = np.empty_like(single)
             for row, place in zip(rows, out, strict=True):
@@ -134,23 +132,12 @@ def differing(subject: Subject) -> Iterator[str]:
                             yield f"{what}: row {k} of {n} from {first} on, threads={threads}"
 
 
-#: What computes a quantity of several frames in one pass.
-_IN_ONE_PASS = {
-    Quantity.PLACEMENT: "placements",
-    Quantity.VELOCITY: "velocities",
-    Quantity.JACOBIAN: "jacobians",
-    Quantity.ACCELERATION: "accelerations",
-}
-
-
 def differing_in_one_pass(subject: Subject, now: Arrays) -> Iterator[str]:
     """What is not the same for several frames in one pass as for one after the other."""
     for what, quantity, reference, inputs in subject.results():
-        if quantity in _IN_ONE_PASS:
-            words = (subject.frames,) if quantity is Quantity.PLACEMENT else (subject.frames, reference)
-            method = getattr(subject.robot, _IN_ONE_PASS[quantity])
-            if not same(method(*(x[:KEPT] for x in inputs), *words, verify=False), now[what]):
-                yield f"{what}: several frames in one pass"
+        few = [x[:KEPT] for x in inputs]
+        if not same(computed(subject, quantity, reference, subject.frames, few), now[what]):
+            yield f"{what}: several frames in one pass"
 
 
 # -- before and after ------------------------------------------------------------------------------------
@@ -166,7 +153,7 @@ def to_keep(subject: Subject) -> dict[str, Any]:
         few = [x[:KEPT] for x in inputs]
         parts = [computed(subject, quantity, reference, frame, few) for frame in subject.frames]
         kept[what] = results = np.stack(parts, axis=1)
-        call = Call(subject.robot, subject.frames, reference, None, *few)
+        call = Call(subject.robot.tree, subject.robot.plan, subject.frames, reference, None, few)
         bound = bound_of(quantity, call.part(slice(0, KEPT)))
         kept[f"{what}/bound"] = np.broadcast_to(EPS * bound.k * bound.scale, results.shape).astype(np.float32)
     return kept

@@ -234,7 +234,7 @@ def two_link(figure: Any) -> None:
     poses = np.array([[0.15, 0.35], [0.5, 1.0], [0.75, 1.7], [0.9, 2.5]])
     circle = np.stack((np.cos(np.linspace(0, 2 * np.pi, 100)), np.sin(np.linspace(0, 2 * np.pi, 100))))
     for q, ink in zip(poses, ("#c3ccd6", "#a9b6c4", "#8092a5", INK), strict=True):
-        joints = robot.placements(q, ["link_1", "link_2", "tip"])[:, :2, 3]
+        joints = robot.placement(q, ["link_1", "link_2", "tip"])[:, :2, 3]
         axes.plot(*joints.T, "-o", color=ink, linewidth=4, markersize=6, solid_capstyle="round", zorder=2)
         ellipse = joints[-1][:, np.newaxis] + 0.22 * robot.jacobian(q, "tip")[:2] @ circle
         axes.plot(*ellipse, color=VIOLET, linewidth=1.4, zorder=3)

@@ -9,7 +9,6 @@ import urdfkin
 from urdfkin.frame_motion import FrameMotion, frame_motion
 from urdfkin.oracle import Oracle
 from urdfkin.robot import Robot
-from urdfkin.verification.bounds import Quantity
 
 N = 7
 
@@ -33,7 +32,7 @@ def test_it_is_what_the_robots_methods_give_and_pinocchio_confirms(reference: st
     np.testing.assert_array_equal(x.jacobian, robot.jacobian(q, tip, reference))
     np.testing.assert_allclose(x.parts.total, x.acceleration, rtol=1e-12, atol=1e-12)
     assert x.agrees
-    assert set(x.checks) >= {Quantity.PLACEMENT, Quantity.VELOCITY, Quantity.ACCELERATION, Quantity.JACOBIAN}
+    assert set(x.checks) >= {"placement", "velocity", "acceleration", "jacobian"}
     assert all(check.units.shape == (N,) for check in x.checks.values())
 
 
@@ -43,8 +42,8 @@ def test_a_disagreement_is_shown_and_not_raised(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(Oracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-10))
     x = motion(robot)
     assert not x.agrees
-    assert (x.checks[Quantity.VELOCITY].share > 1.0).all()
-    assert (x.checks[Quantity.PLACEMENT].share < 1.0).all()
+    assert (x.checks["velocity"].share > 1.0).all()
+    assert (x.checks["placement"].share < 1.0).all()
 
 
 def test_manipulability_is_the_root_of_the_determinant() -> None:

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from urdfkin.cli import COMMANDS
+from urdfkin.cli import commands
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 
@@ -28,7 +28,7 @@ def test_the_smallest_example_runs_and_is_verified() -> None:
 
 
 def test_every_command_stands_on_the_front_page() -> None:
-    assert [name for name in COMMANDS if f"`{name}" not in README and f"urdfkin {name}" not in README] == []
+    assert [name for name in commands() if f"`{name}" not in README and f"urdfkin {name}" not in README] == []
 
 
 def test_the_transcript_is_what_one_sees() -> None:

@@ -12,15 +12,14 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as command
 from tests.robots.odd_urdfs import urdf_of
-from urdfkin import call, roundings
+from urdfkin import roundings
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.oracle import Oracle
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.rotation import exp_rotation
-from urdfkin.verification import choosing
-from urdfkin.verification.bounds import Quantity
+from urdfkin.verification import choosing, verifier
 from urdfkin.verification.certificate import Comparison
 
 
@@ -51,7 +50,7 @@ def test_a_verification_error_says_what_where_by_how_much_and_what_was_allowed(p
     error = disagreement(panda, "acceleration")
     assert error.is_disagreement
     assert (error.quantity, error.frame, error.reference) == (
-        Quantity.ACCELERATION,
+        "acceleration",
         "panda_hand_tcp",
         "LOCAL",
     )
@@ -119,12 +118,12 @@ def test_the_certificate_counts_what_was_checked_and_says_what_was_not(panda: Ro
     assert not panda.certificate().verified
     q = panda.sample(5, 1)
     panda.jacobian(q, "panda_hand")
-    panda.placements(q[:2], ["panda_hand", "panda_link3", "panda_link4"])
+    panda.placement(q[:2], ["panda_hand", "panda_link3", "panda_link4"])
     certificate = panda.certificate()
     assert certificate.verified
     assert {line.quantity: line.checked for line in certificate.lines} == {
-        Quantity.JACOBIAN: 5,
-        Quantity.PLACEMENT: 6,
+        "jacobian": 5,
+        "placement": 6,
     }
     assert all(0.0 < line.worst < 100.0 and 0.0 < line.share < 1.0 for line in certificate.lines)
     assert certificate.pinocchio.startswith("4.")
@@ -191,7 +190,7 @@ def test_a_disagreement_whose_share_is_no_number_is_raised_too(
         [Comparison(1, 1.0, 0.5, (0, 0)), wrong],
     ):
         found = iter(results)
-        monkeypatch.setattr(call, "compare", lambda *_, found=found: next(found))
+        monkeypatch.setattr(verifier, "compare", lambda *_, found=found: next(found))
         monkeypatch.setattr(choosing, "_MOST", 1)
         with pytest.raises(urdfkin.VerificationError):
             panda.placement(panda.sample(len(results)), "panda_hand", verify=True)
@@ -253,11 +252,9 @@ def test_a_frame_that_does_not_exist_offers_the_nearest_and_one_that_is_no_name_
     with pytest.raises(UnknownNameError, match="unknown frame 'hand'; did you mean panda_hand") as caught:
         panda.jacobian(panda.neutral(), "hand")
     assert caught.value.nearest[0] == "panda_hand"
-    for frame in (3, None, b"panda_hand", ["panda_hand"]):
+    for frame in (3, None, b"panda_hand", ["panda_hand", 3], iter(["panda_hand"])):
         with pytest.raises(InputError, match="a frame is the name of a link or joint"):
             panda.jacobian(panda.neutral(), frame)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match=r"frames are a list of names: found 'panda_hand'"):
-        panda.jacobians(panda.neutral(), "panda_hand")
 
 
 def test_a_reference_is_a_member_or_its_name_in_either_case(panda: Robot) -> None:

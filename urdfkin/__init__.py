@@ -13,7 +13,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from urdfkin.call import NotVerifiedWarning
     from urdfkin.chain import FrameChain
     from urdfkin.dh import DHRow, DHTable, read_table, table_from_rows
     from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from urdfkin.validation.campaign import validate
     from urdfkin.verification.certificate import Certificate, VerificationError
     from urdfkin.verification.tables import TableError
+    from urdfkin.verification.verifier import NotVerifiedWarning
 
 # Loaded when first asked for: `import urdfkin` needs no numpy, no Pinocchio and no compiler.
 _HOMES = {
@@ -35,7 +35,7 @@ _HOMES = {
     "Finding": "urdfkin.lint",
     "FrameChain": "urdfkin.chain",
     "InputError": "urdfkin.errors",
-    "NotVerifiedWarning": "urdfkin.call",
+    "NotVerifiedWarning": "urdfkin.verification.verifier",
     "Reference": "urdfkin.reference",
     "Robot": "urdfkin.robot",
     "SourceError": "urdfkin.errors",

@@ -49,7 +49,7 @@ class Question:
     """The arguments of one call.
 
     Args:
-        frames: Names.
+        frame: A name or several.
         reference: A member or its name.
         base: None if it stands still.
         inputs: q, v, a as far as they were given: numbers that broadcast.
@@ -57,12 +57,13 @@ class Question:
 
     def __init__(
         self,
-        frames: Sequence[str],
+        frame: str | Sequence[str],
         reference: Reference | str,
         base: BaseNumbers | None,
         inputs: Sequence[ArrayLike],
     ) -> None:
-        self.frames, self.reference, self.base = tuple(frames), reference, base
+        self.frames = (frame,) if isinstance(frame, str) else tuple(frame)
+        self.reference, self.base = reference, base
         self._given = inputs
 
     @cached_property

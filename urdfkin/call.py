@@ -1,87 +1,84 @@
-"""One call's inputs as flat batches, its check, and the way back to the caller's shape."""
+"""One call's arguments as flat batches for the recursion, and the way back to the caller's shape."""
 
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.asked import Question
-from urdfkin.checks import Part, axes_of, held_against
-from urdfkin.demands import words
-from urdfkin.errors import InputError, NotFiniteError, RangeError
+from urdfkin.asked import Question, Rows
+from urdfkin.configuration import checked, shaped
+from urdfkin.demands import shown
+from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.recursion.base import STILL_STATE, BaseMotion
-from urdfkin.recursion.plan import IntArray
+from urdfkin.recursion.plan import IntArray, Plan
 from urdfkin.reference import Reference
-from urdfkin.roundings import EPS
-from urdfkin.tree import FloatArray
-from urdfkin.verification import bounds
-from urdfkin.verification.bounds import Bound, Quantity
-from urdfkin.verification.certificate import Comparison, VerificationError, compare
-from urdfkin.verification.choosing import SAMPLE, Verify, checked_choice, parts
-from urdfkin.verification.replay import replay_line
-
-if TYPE_CHECKING:
-    from urdfkin.robot import Robot
+from urdfkin.tree import FloatArray, KinematicTree
 
 T = TypeVar("T")
 
-#: The commands that compute a quantity again.
-_COMMANDS = {
-    Quantity.PLACEMENT: "placement",
-    Quantity.VELOCITY: "velocity",
-    Quantity.JACOBIAN: "jacobian",
-    Quantity.JACOBIAN_RATE: "jacobian-rate",
-    Quantity.ACCELERATION: "acceleration",
-    Quantity.ACCELERATION_BREAKDOWN: "acceleration --explain",
-}
 
+class Part(NamedTuple):
+    """Some configurations of a call, as urdfkin sees them and as the user asked for them.
 
-class NotVerifiedWarning(UserWarning):
-    """Results are handed out that Pinocchio could not check; the message says why."""
+    Attributes:
+        plan: The walk.
+        reference: For all but placements.
+        q: (n, nq).
+        rates: (n, nv) v, and a, as far as the call was given them.
+        state: (n or 1, 24) how the base moves.
+        asked: The same configurations in the user's own numbers and names.
+        representation: Of an analytical Jacobian's orientation.
+    """
 
-
-def _every_link(robot: Robot) -> tuple[str, ...]:
-    return tuple(robot.tree.frame_name(link) for link in range(len(robot.tree.links)))
+    plan: Plan
+    reference: Reference
+    q: FloatArray
+    rates: tuple[FloatArray, ...]
+    state: FloatArray
+    asked: Rows
+    representation: str = ""
 
 
 class Call:
     """One call's inputs as flat batches, and the way back to the caller's shape.
 
     Args:
-        robot: Who is asked.
-        frames: Names; None means every link.
+        tree: The robot.
+        plan: Makes the walk that meets some links, or knows it already.
+        frame: The name of a link or joint, or several.
         reference: A member or its name.
         base: How the root link moves; None if it stands still.
         inputs: q, v and a, as far as the quantity needs them.
         options: What else the call was given, by the method's names for it.
+
+    Raises:
+        InputError: wrong lengths, batches that do not broadcast, something else than names.
+        UnknownNameError: no such frame or reference.
     """
 
     def __init__(
         self,
-        robot: Robot,
-        frames: Sequence[str] | None,
+        tree: KinematicTree,
+        plan: Callable[[Sequence[int]], Plan],
+        frame: str | Sequence[str],
         reference: Reference | str,
         base: BaseMotion | None,
-        *inputs: ArrayLike,
+        inputs: Sequence[ArrayLike],
         **options: object,
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
             raise InputError("base is a BaseMotion or None", found=type(base).__name__)
-        self.robot, self.base = robot, base
-        self.frames = _every_link(robot) if frames is None else words(frames, "frames")
-        self.question = Question(
-            robot.tree.link_frames if frames is None else frames, reference, base, inputs
-        )
+        self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
+        self.several, self.frames = _frames(frame)
+        self.question = Question(frame, reference, base, inputs)
         self.reference = Reference.of(reference)
-        self.links = tuple(robot.tree.frame_link(frame) for frame in self.frames)
-        self.plan = robot.plan(self.links)
-        self.inputs, self.options = inputs, options
-        given = [robot.shaped(x, name) for x, name in zip(inputs, "qva", strict=False)]
+        self.links = tuple(tree.frame_link(name) for name in self.frames)
+        self.plan = plan(self.links)
+        given = [shaped(tree, x, name) for x, name in zip(inputs, "qva", strict=False)]
         self.shape = self._batch_shape(given)
         self.n = math.prod(self.shape)
         flat = [self._flat_input(array) for array in given]
@@ -114,11 +111,11 @@ class Call:
         """How many results the call hands out."""
         return self.n * len(self.links)
 
-    def flat(self, out: FloatArray | None, *own: int, every: bool = False) -> FloatArray | None:
-        """`out`, for one frame or for every one, as the kernels write it: (n, frames, ...)."""
+    def flat(self, out: FloatArray | None, own: tuple[int, ...]) -> FloatArray | None:
+        """`out` as the kernels write it, (n, frames, ...); raises InputError if it cannot take the result."""
         if out is None:
             return None
-        wanted = (*self.shape, len(self.links), *own) if every else (*self.shape, *own)
+        wanted = (*self.shape, *((len(self.links),) if self.several else ()), *own)
         good = isinstance(out, np.ndarray) and out.dtype == np.float64 and out.flags.c_contiguous
         if not good or out.shape != wanted or not out.flags.writeable:
             raise InputError(
@@ -129,13 +126,9 @@ class Call:
             raise InputError("out must not share memory with q, v or a: they are read again for the check")
         return out.reshape(self.n, len(self.links), *own)
 
-    def one(self, result: FloatArray, out: FloatArray | None) -> FloatArray:
-        """The (n, 1, ...) result of a call for one frame, in the caller's batch shape."""
-        return result.reshape(*self.shape, *result.shape[2:]) if out is None else out
-
-    def every(self, result: FloatArray, out: FloatArray | None = None) -> FloatArray:
-        """The (n, frames, ...) result of a call for several, in the caller's batch shape."""
-        return result.reshape(*self.shape, *result.shape[1:]) if out is None else out
+    def in_shape(self, result: FloatArray) -> FloatArray:
+        """An (n, frames, ...) result in the caller's batch shape, with an axis of frames if several."""
+        return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
         """Evaluate the walk, or name the number that is not finite."""
@@ -143,40 +136,8 @@ class Call:
             return evaluate(*arguments, **options)
         except NotFiniteError:
             for x, name in zip(self.inputs, "qva", strict=False):
-                self.robot.checked(x, name)
+                checked(self.tree, x, name)
             raise
-
-    def wanted(self, verify: Verify | None) -> Verify:
-        """Which results are to be checked; None leaves it to the robot."""
-        return checked_choice(self.robot.verify if verify is None else verify)
-
-    def verify(self, quantity: Quantity, handed_out: FloatArray, verify: Verify | None) -> None:
-        """Have results checked, in the shape in which the user gets them, and entered in the ledger.
-
-        Raises:
-            VerificationError: Pinocchio computes something else.
-            OracleError: they have another shape than what was asked.
-        """
-        robot, ledger, wanted = self.robot, self.robot.ledger, self.wanted(verify)
-        if wanted is False:
-            ledger.unchecked(quantity, self.results)
-            return
-        if (reason := robot.cannot_verify(self.base)) is not None:
-            warnings.warn(f"not verified: {reason}", NotVerifiedWarning, stacklevel=3)
-            ledger.unchecked(quantity, self.results, reason)
-            return
-        results = self.question.flat(handed_out, axes_of(quantity))
-        total, worst = Comparison.of_nothing(), None
-        for part in parts(wanted, self.n, results[:1].size):
-            comparison, failure = self._compare(quantity, results[part], part)
-            if failure is not None and (worst is None or comparison.share > total.share):
-                worst = failure
-            total += comparison
-        if worst is not None:
-            raise worst
-        ledger.checked(quantity, total)
-        if left := self.results - total.results:
-            ledger.unchecked(quantity, left, f'verify="sample" checks {SAMPLE} configurations of a call')
 
     def part(self, part: slice | IntArray) -> Part:
         """Some of its configurations, for the check."""
@@ -186,50 +147,20 @@ class Call:
         asked = self.question.rows(part)
         return Part(self.plan, self.reference, self.q[part], rates, state, asked, representation)
 
-    def _compare(
-        self, quantity: Quantity, ours: FloatArray, part: slice | IntArray
-    ) -> tuple[Comparison, VerificationError | None]:
-        """Hold some of the results against Pinocchio's; the worst of them, if it disagrees."""
-        x = self.part(part)
-        theirs, bound = held_against(quantity, self.robot.oracle(self.base), x, ours)
-        comparison = compare(ours, theirs, bound, 2)
-        if comparison.agrees:
-            return comparison, None
-        i, f = comparison.index
-        k = part.start + i if isinstance(part, slice) else int(part[i])
-        bound = Bound(*(np.broadcast_to(x, ours.shape)[i, f] for x in (bound.scale, bound.k)))
-        if not (np.isfinite(bound.scale).all() and np.isfinite(theirs[i, f]).all()):
-            raise RangeError(
-                f"the {quantity} of {self.frames[f]} leaves the range of double precision",
-                where=f"sample {list(self.index(k))}" if self.shape else None,
-                remedy="give smaller numbers",
-            )
-        return comparison, VerificationError(
-            quantity,
-            self.frames[f],
-            x.representation or self.reference.name,
-            index=self.index(k),
-            ours=ours[i, f],
-            theirs=theirs[i, f],
-            bound=EPS * bound.k * bound.scale,
-            units=float(bounds.disagreement(ours[i, f], theirs[i, f], bound).max()),
-            reproduce=self._replay(quantity, k, self.frames[f]),
-        )
-
     def index(self, k: int) -> tuple[int, ...]:
         """Flat sample `k` as an index into the caller's batch."""
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
-    def _replay(self, quantity: Quantity, k: int, frame: str) -> str:
-        values = {name: array[k].tolist() for name, array in zip("qva", (self.q, *self.rates), strict=False)}
-        without = quantity in (Quantity.PLACEMENT, Quantity.ANALYTICAL_JACOBIAN)
-        reference = None if without else self.reference.name.lower()
-        if self.base is None and quantity in _COMMANDS:
-            return replay_line(self.robot.origin, _COMMANDS[quantity], frame, reference, values)
-        options = self.options if reference is None else {"reference": reference, **self.options}
-        # The command line has no words for a moving base, and none for the rest.
-        words = [*map(repr, values.values()), repr(frame), *(f"{x}={y!r}" for x, y in options.items())]
-        if (asked := self.question.rows(np.array([k])).base) is not None:
-            fields = asked.placement, asked.velocity, asked.acceleration
-            words.append(f"base=urdfkin.BaseMotion({', '.join(repr(x[0].tolist()) for x in fields)})")
-        return f"{self.robot.origin.python}.{str(quantity).replace(' ', '_')}({', '.join(words)})"
+
+def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
+    """Whether several are asked for, and their names; whoever looks them up says which is none."""
+    if isinstance(frame, str):
+        return False, (frame,)
+    try:
+        return True, tuple(frame)[: len(frame)]  # what has no length is used up by looking
+    except TypeError:
+        raise InputError(
+            "a frame is the name of a link or joint, or a list of names",
+            found=shown(frame),
+            remedy="robot.link_frames are all links",
+        ) from None

@@ -10,8 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, NotFiniteError
+from urdfkin.rotation.arrays import floats
 from urdfkin.rotation.quaternion import NORM_TOLERANCE, unit_quaternions
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree
 
@@ -63,6 +65,32 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
         quaternion = q[..., tree.q_index[i] + 3 : tree.q_index[i] + 7]
         quaternion[...] = unit_quaternions(quaternion, f"the quaternion of joint {tree.joints[i].name}")
     return q
+
+
+def shaped(tree: KinematicTree, value: ArrayLike, what: str) -> FloatArray:
+    """q, v or a as float64 with the right last axis, quaternions of norm 1; raises InputError."""
+    array, width = floats(value, what), tree.nq if what == "q" else tree.nv
+    if array.shape[-1:] != (width,):
+        names = ", ".join(_names(tree, what)) or "none, nothing moves"
+        raise InputError(
+            f"{what} needs {width} numbers for {tree.name}: {names}", found=f"shape {array.shape}"
+        )
+    return with_unit_quaternions(tree, array) if what == "q" else array
+
+
+def checked(tree: KinematicTree, value: ArrayLike, what: str) -> FloatArray:
+    """The same, and every number finite; raises NotFiniteError too."""
+    array = shaped(tree, value, what)
+    if not np.isfinite(array).all():
+        where = np.argwhere(~np.isfinite(array))[0]
+        raise NotFiniteError(
+            f"{what} must be finite", where=_names(tree, what)[where[-1]], found=str(array[tuple(where)])
+        )
+    return array
+
+
+def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
+    return coordinate_names(tree) if what == "q" else rate_names(tree)
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:

@@ -22,7 +22,7 @@ def describe(robot: Robot) -> dict[str, Any]:
     return {
         "name": robot.name,
         "source": robot.source,
-        "mimic": robot.mimic,
+        "mimic": robot.origin.mimic if robot.verifier.mimic else False,
         "root_joint": robot.root_joint,
         "nq": robot.nq,
         "nv": robot.nv,

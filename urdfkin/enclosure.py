@@ -14,18 +14,26 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.call import Call
-from urdfkin.checks import pinocchios, urdfkins
-from urdfkin.demands import whole_number
+from urdfkin.configuration import checked
+from urdfkin.demands import whole_number, word
 from urdfkin.errors import InputError
 from urdfkin.exact.decimals import read_exact
 from urdfkin.exact.intervals import ends, of_digits
-from urdfkin.exact.recursion import move, on_base, values
+from urdfkin.exact.recursion import move, on_base
 from urdfkin.exact.vectors import exact
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.reference import Reference
 from urdfkin.rotation.arrays import floats
 from urdfkin.tree import FloatArray, frozen
-from urdfkin.verification.bounds import Quantity
+from urdfkin.verification.quantities import (
+    ACCELERATION,
+    JACOBIAN,
+    JACOBIAN_RATE,
+    PLACEMENT,
+    VELOCITY,
+    Quantity,
+)
+from urdfkin.verification.verifier import pinocchios, urdfkins
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
@@ -48,7 +56,7 @@ class Enclosure:
         pinocchio: What Pinocchio computes; None where it cannot.
     """
 
-    quantity: Quantity
+    quantity: str
     lower: FloatArray
     upper: FloatArray
     urdfkin: FloatArray
@@ -138,7 +146,7 @@ def enclose(
     """What `Robot.enclose` says."""
     if digits is not None:
         digits = whole_number(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
-    call = Call(robot, (frame,), reference, base, *inputs)
+    call = Call(robot.tree, robot.plan, word(frame, "frame"), reference, base, inputs)
     if call.shape:
         raise InputError(
             "a proof is for one sample",
@@ -146,7 +154,7 @@ def enclose(
             remedy="give q (nq,), v and a (nv,), and the base of one sample",
         )
     for x, name in zip(inputs, "qva", strict=True):
-        robot.checked(x, name)
+        checked(robot.tree, x, name)
     link, part = call.links[0], call.part(slice(0, 1))
     path = robot.tree.path(link)
     digits = digits or ENOUGH_DIGITS + len(path)
@@ -159,22 +167,22 @@ def enclose(
         base=None if base is None else on_base(base, context, context.nearest_rotation),
         context=context,
     )
-    oracle = None if robot.cannot_verify(base) else robot.oracle(base)
+    oracle = None if robot.verifier.cannot(base) else robot.verifier.oracle(base)
 
-    def enclosed(quantity: Quantity) -> Enclosure:
-        true = values(motion, link, quantity, call.reference)
+    def enclosed(row: Quantity) -> Enclosure:
+        true = row.truth(motion, link, call.reference)
         lower, upper = np.vectorize(ends, otypes=[float, float])(true)
-        ours = frozen(urdfkins(quantity, part)[0, 0])
-        theirs = None if oracle is None else frozen(pinocchios(quantity, oracle, part.asked)[0, 0])
-        return Enclosure(quantity, frozen(lower), frozen(upper), ours, theirs)
+        ours = frozen(urdfkins(row, part)[0, 0])
+        theirs = None if oracle is None else frozen(pinocchios(row, oracle, part.asked)[0, 0])
+        return Enclosure(row.name, frozen(lower), frozen(upper), ours, theirs)
 
     return Enclosures(
         frame,
         call.reference,
         digits,
-        enclosed(Quantity.PLACEMENT),
-        enclosed(Quantity.VELOCITY),
-        enclosed(Quantity.ACCELERATION),
-        enclosed(Quantity.JACOBIAN),
-        enclosed(Quantity.JACOBIAN_RATE),
+        enclosed(PLACEMENT),
+        enclosed(VELOCITY),
+        enclosed(ACCELERATION),
+        enclosed(JACOBIAN),
+        enclosed(JACOBIAN_RATE),
     )

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from urdfkin.call import Call
-from urdfkin.checks import bound_of, pinocchios
-from urdfkin.recursion import evaluate
+from urdfkin.demands import word
 from urdfkin.recursion.breakdown import AccelerationBreakdown, acceleration_breakdown
 from urdfkin.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import Bound, Quantity, result_k
+from urdfkin.verification.bounds import result_k
+from urdfkin.verification.quantities import ACCELERATION, JACOBIAN, PLACEMENT, VELOCITY, Quantity, walked
+from urdfkin.verification.verifier import held_against
 from urdfkin.verification.worst import worst_of_each
 
 
@@ -45,7 +46,7 @@ class FrameMotion:
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
         parts: The acceleration by joint and kind.
-        checks: What Pinocchio says of each quantity; empty where it cannot check the robot.
+        checks: What Pinocchio says of each quantity, by its name; empty where it cannot check the robot.
         not_verified: Why it cannot; None if it can.
     """
 
@@ -56,7 +57,7 @@ class FrameMotion:
     acceleration: FloatArray
     jacobian: FloatArray
     parts: AccelerationBreakdown
-    checks: dict[Quantity, Check]
+    checks: dict[str, Check]
     not_verified: str | None
 
     @property
@@ -104,36 +105,27 @@ def frame_motion(
         InputError: wrong lengths, numbers that are not finite.
         UnknownNameError: no such frame.
     """
-    call = Call(robot, (frame,), reference, None, q, v, a)
-    plan, reference = call.plan, call.reference
-    ours = {
-        Quantity.PLACEMENT: call.compute(evaluate.placements, plan, call.q),
-        Quantity.VELOCITY: call.compute(evaluate.velocities, plan, call.q, call.rates[0], reference),
-        Quantity.ACCELERATION: call.compute(evaluate.accelerations, plan, call.q, *call.rates, reference),
-        Quantity.JACOBIAN: call.compute(evaluate.jacobians, plan, call.q, reference),
-    }
-    reason = robot.cannot_verify()
+    call = Call(robot.tree, robot.plan, word(frame, "frame"), reference, None, (q, v, a))
+    inputs, reference = (call.q, *call.rates), call.reference
+    ours = {row: call.compute(row.ours, call.plan, inputs, reference) for row in walked()}
+    reason = robot.verifier.cannot()
+    placement, velocity, acceleration, jacobian = (
+        ours[row][:, 0] for row in (PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN)
+    )
     return FrameMotion(
         frame,
         reference,
-        ours[Quantity.PLACEMENT][:, 0],
-        ours[Quantity.VELOCITY][:, 0],
-        ours[Quantity.ACCELERATION][:, 0],
-        ours[Quantity.JACOBIAN][:, 0],
-        call.compute(acceleration_breakdown, robot.tree, call.links[0], call.q, *call.rates, reference),
-        {} if reason else _checks(call, ours),
+        placement,
+        velocity,
+        acceleration,
+        jacobian,
+        call.compute(acceleration_breakdown, robot.tree, call.links[0], *inputs, reference),
+        {} if reason else {row.name: _check(row, robot, call, results) for row, results in ours.items()},
         reason,
     )
 
 
-def _checks(call: Call, ours: dict[Quantity, FloatArray]) -> dict[Quantity, Check]:
-    oracle, x = call.robot.oracle(None), call.part(slice(0, call.n))
-    return {
-        quantity: _check(results, pinocchios(quantity, oracle, x.asked), bound_of(quantity, x))
-        for quantity, results in ours.items()
-    }
-
-
-def _check(ours: FloatArray, theirs: FloatArray, bound: Bound) -> Check:
+def _check(row: Quantity, robot: Robot, call: Call, ours: FloatArray) -> Check:
+    theirs, bound = held_against(row, robot.verifier.oracle(), call.part(slice(0, call.n)), ours)
     units = worst_of_each(ours, theirs, bound.scale, 2)
     return Check(units[:, 0], (units / result_k(bound, units.shape))[:, 0])

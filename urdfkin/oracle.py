@@ -14,8 +14,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from itertools import product
+from collections.abc import Callable, Sequence
 from typing import Any
 from xml.parsers.expat import ExpatError
 
@@ -38,8 +37,6 @@ _STACK_FOR_A_LINK = 16_384
 _SHALLOW = 100
 #: Pinocchio's workspace takes about 64 bytes times the cube of the rates (4.1.0 measured): at most 2 GB.
 MOST_RATES = 315
-
-_ALL = slice(None)
 
 #: What carries a robot whose base moves.
 _BASE = "base"
@@ -171,16 +168,9 @@ class Oracle:
             self._local.data = self._model.createData()
         return self._local.data
 
-    def _moving(self, q: FloatArray, base: BaseNumbers | None) -> Iterator[tuple[int, FloatArray]]:
-        """Numbered configurations; none for a robot without rates.
-
-        Its Jacobians have no columns, and Pinocchio 4.1 kills the process when asked for one.
-        """
-        return enumerate(self.configurations(q, base) if self._model.nv else ())
-
-    def _frame(self, name: str) -> int:
-        """Pinocchio's index of a frame."""
-        return self._index[self._frames.index(name)]
+    def _ids(self, frames: Sequence[str]) -> list[int]:
+        """Pinocchio's indices of frames."""
+        return [self._index[self._frames.index(name)] for name in frames]
 
     def _reference(self, reference: Reference | str) -> Any:
         """Pinocchio's own member of that name."""
@@ -191,8 +181,7 @@ class Oracle:
 
     def placements(self, q: FloatArray, frames: Sequence[str], base: BaseNumbers | None = None) -> FloatArray:
         """(n, frames, 4, 4) T_world_frame: `updateFramePlacements`."""
-        pin, model, data = self._pin, self._model, self._data
-        ids = [self._frame(frame) for frame in frames]
+        pin, model, data, ids = self._pin, self._model, self._data, self._ids(frames)
         out = np.empty((len(q), len(ids), 4, 4))
         for k, q_k in enumerate(self.configurations(q, base)):
             pin.forwardKinematics(model, data, q_k)
@@ -214,17 +203,17 @@ class Oracle:
         q: FloatArray,
         v: FloatArray,
         frames: Sequence[str],
-        references: Sequence[Reference | str],
+        reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, references, 6): `getFrameVelocity`."""
+        """(n, frames, 6): `getFrameVelocity`."""
         pin = self._pin
         return self._collected(
             (self.configurations(q, base), self.rates(v, base)),
             pin.forwardKinematics,
             lambda *which: pin.getFrameVelocity(*which).vector,
-            frames,
-            references,
+            self._ids(frames),
+            reference,
         )
 
     def accelerations(
@@ -233,96 +222,67 @@ class Oracle:
         v: FloatArray,
         a: FloatArray,
         frames: Sequence[str],
-        references: Sequence[Reference | str],
+        reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, references, 6): `getFrameClassicalAcceleration`."""
+        """(n, frames, 6): `getFrameClassicalAcceleration`."""
         pin = self._pin
         return self._collected(
             (self.configurations(q, base), self.rates(v, base), self.second_rates(a, base)),
             pin.forwardKinematics,
             lambda *which: pin.getFrameClassicalAcceleration(*which).vector,
-            frames,
-            references,
+            self._ids(frames),
+            reference,
         )
 
     def jacobians(
         self,
         q: FloatArray,
         frames: Sequence[str],
-        references: Sequence[Reference | str],
+        reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, references, 6, nv): `computeJointJacobians`, then `getFrameJacobian`."""
+        """(n, frames, 6, nv): `computeJointJacobians`, then `getFrameJacobian`."""
         pin, inputs = self._pin, (self.configurations(q, base),)
-        return self._layout.couple(
-            self._collected(inputs, pin.computeJointJacobians, pin.getFrameJacobian, frames, references)
-        )
+        compute, get = pin.computeJointJacobians, pin.getFrameJacobian
+        return self._layout.couple(self._collected(inputs, compute, get, self._ids(frames), reference))
 
     def jacobian_rates(
         self,
         q: FloatArray,
         v: FloatArray,
         frames: Sequence[str],
-        references: Sequence[Reference | str],
+        reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, references, 6, nv): `getFrameJacobianTimeVariation`."""
+        """(n, frames, 6, nv): `getFrameJacobianTimeVariation`."""
         pin, inputs = self._pin, (self.configurations(q, base), self.rates(v, base))
         compute, get = pin.computeJointJacobiansTimeVariation, pin.getFrameJacobianTimeVariation
-        return self._layout.couple(self._collected(inputs, compute, get, frames, references))
+        return self._layout.couple(self._collected(inputs, compute, get, self._ids(frames), reference))
 
-    def jacobian_rates_of_all(
-        self,
-        q: FloatArray,
-        v: FloatArray,
-        frames: Sequence[str],
-        reference: Reference,
-        among: slice = _ALL,
-    ) -> tuple[FloatArray, FloatArray]:
-        """(n, frames, 6, nv) of frames, (n, joints, 6, nv) by `getJointJacobianTimeVariation`.
+    def joint_jacobians(self, q: FloatArray, among: slice, reference: Reference | str) -> FloatArray:
+        """(n, joints, 6, nv): `getJointJacobian` of a run of the moving joints, in the tree's order."""
+        pin, inputs, joints = self._pin, (self.configurations(q),), self._layout.joint_ids[among]
+        compute, get = pin.computeJointJacobians, pin.getJointJacobian
+        return self._layout.couple(self._collected(inputs, compute, get, joints, reference))
 
-        Both come from one `computeJointJacobiansTimeVariation`; joints are the moving ones, in order,
-        or those `among` them.
-        """
-        pin, model, data = self._pin, self._model, self._data
-        ids, joints, wanted = (
-            [self._frame(f) for f in frames],
-            self._layout.joint_ids[among],
-            self._reference(reference),
-        )
-        of_frames = np.empty((len(q), len(ids), 6, model.nv))
-        of_joints = np.empty((len(q), len(joints), 6, model.nv))
-        v_full = self.rates(v)
-        for k, q_k in self._moving(q, None):
-            pin.computeJointJacobiansTimeVariation(model, data, q_k, v_full[k])
-            for f, frame in enumerate(ids):
-                of_frames[k, f] = _columns(pin.getFrameJacobianTimeVariation(model, data, frame, wanted))
-            for j, joint in enumerate(joints):
-                of_joints[k, j] = _columns(pin.getJointJacobianTimeVariation(model, data, joint, wanted))
-        return self._layout.couple(of_frames), self._layout.couple(of_joints)
-
-    def joint_jacobians(
-        self, q: FloatArray, references: Sequence[Reference], among: slice = _ALL
+    def joint_jacobian_rates(
+        self, q: FloatArray, v: FloatArray, among: slice, reference: Reference | str
     ) -> FloatArray:
-        """(n, joints, references, 6, nv): `getJointJacobian` of moving joints, in the tree's order."""
-        pin, model, data = self._pin, self._model, self._data
-        wanted = [self._reference(reference) for reference in references]
-        joints = self._layout.joint_ids[among]
-        full = np.empty((len(q), len(joints), len(wanted), 6, model.nv))
-        for k, q_k in self._moving(q, None):
-            pin.computeJointJacobians(model, data, q_k)
-            for j, joint in enumerate(joints):
-                for r, reference in enumerate(wanted):
-                    full[k, j, r] = _columns(pin.getJointJacobian(model, data, joint, reference))
-        return self._layout.couple(full)
+        """(n, joints, 6, nv): `getJointJacobianTimeVariation`, likewise."""
+        pin, joints = self._pin, self._layout.joint_ids[among]
+        inputs = self.configurations(q), self.rates(v)
+        compute, get = pin.computeJointJacobiansTimeVariation, pin.getJointJacobianTimeVariation
+        return self._layout.couple(self._collected(inputs, compute, get, joints, reference))
 
     def screws(self, q: FloatArray) -> FloatArray:
         """(n, 6, rates): the whole `data.J` of `computeJointJacobians`, one column a rate, followers too."""
-        out = np.empty((len(q), 6, len(self._layout.rate_columns)))
-        for k, q_k in self._moving(q, None):
-            J = _columns(self._pin.computeJointJacobians(self._model, self._data, q_k))
-            out[k] = J[:, self._layout.rate_columns]
+        columns, model = self._layout.rate_columns, self._model
+        out = np.empty((len(q), 6, len(columns)))
+        # Without rates Pinocchio 4.1 kills the process; of one rate it hands out a plain vector.
+        for k, q_k in enumerate(self.configurations(q) if columns else ()):
+            J = self._pin.computeJointJacobians(model, self._data, q_k)
+            out[k] = J.reshape(6, model.nv)[:, columns]
         return out
 
     def _collected(
@@ -330,32 +290,29 @@ class Oracle:
         inputs: tuple[FloatArray, ...],
         compute: Callable[..., object],
         get: Callable[..., FloatArray],
-        frames: Sequence[str],
-        references: Sequence[Reference | str],
+        ids: Sequence[int],
+        reference: Reference | str,
     ) -> FloatArray:
-        """(n, frames, references, ...): `compute` for each of the inputs, then `get` for each of the wanted.
+        """(n, ids, ...): `compute` for each of the inputs, then `get` for each frame or joint.
 
-        A tight loop for one frame in one reference: what it takes beyond Pinocchio's own time is the price of
-        a check.
+        A tight loop for one frame: what it takes beyond Pinocchio's own time is the price of a check.
         """
-        model, data, n = self._model, self._data, len(inputs[0])
-        ids = [self._frame(frame) for frame in frames]
-        wanted = list(product(ids, map(self._reference, references)))
+        model, data, n, wanted = self._model, self._data, len(inputs[0]), self._reference(reference)
         own = (6, model.nv) if compute is not self._pin.forwardKinematics else (6,)
-        out = np.empty((n, len(ids), len(references), *own))
+        out = np.empty((n, len(ids), *own))
         if not all(own):  # Pinocchio 4.1 kills the process when asked for a Jacobian without columns
             return out
-        flat = out.reshape(n, len(wanted), *((6,) if model.nv == 1 else own))
-        if len(wanted) == 1:
-            ((frame, reference),), alone = wanted, flat[:, 0]
+        flat = out.reshape(n, len(ids), *((6,) if model.nv == 1 else own))
+        if len(ids) == 1:
+            (one,), alone = ids, flat[:, 0]
             for k, x in enumerate(zip(*inputs, strict=True)):
                 compute(model, data, *x)
-                alone[k] = get(model, data, frame, reference)
+                alone[k] = get(model, data, one, wanted)
             return out
         for to, x in zip(flat, zip(*inputs, strict=True), strict=True):
             compute(model, data, *x)
-            for place, (frame, reference) in enumerate(wanted):
-                to[place] = get(model, data, frame, reference)
+            for place, one in enumerate(ids):
+                to[place] = get(model, data, one, wanted)
         return out
 
     # -- layout --------------------------------------------------------------------------------------
@@ -388,8 +345,3 @@ def _depth(tree: KinematicTree) -> int:
     for joint in tree.joints:
         depths.append(depths[joint.parent] + 1)
     return max(depths)
-
-
-def _columns(J: FloatArray) -> FloatArray:
-    """(6, nv), also for a robot of one rate, whose single column Pinocchio hands out as a plain vector."""
-    return J if J.ndim > 1 else J.reshape(6, 1)

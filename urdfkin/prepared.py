@@ -19,7 +19,6 @@ from urdfkin.recursion.plan import Plan
 from urdfkin.recursion.task import Task
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import Quantity
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
@@ -58,10 +57,10 @@ class PreparedFrame:
         self.frame, self.reference = frame, reference
         self._robot, self._plan = robot, plan
         # Compiled, or read from disk, when they are first called.
-        self._placement: Fast = partial(self._first, Quantity.PLACEMENT)
-        self._velocity: Fast = partial(self._first, Quantity.VELOCITY)
-        self._jacobian: Fast = partial(self._first, Quantity.JACOBIAN)
-        self._acceleration: Fast = partial(self._first, Quantity.ACCELERATION)
+        self._placement: Fast = partial(self._first, "placement")
+        self._velocity: Fast = partial(self._first, "velocity")
+        self._jacobian: Fast = partial(self._first, "jacobian")
+        self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
         # It holds addresses of this process: a copy prepares itself anew.
@@ -95,7 +94,7 @@ class PreparedFrame:
             return six
         return self._robot.acceleration(q, v, a, self.frame, self.reference, out=out, verify=False, threads=1)
 
-    def _first(self, quantity: Quantity, q: ArrayLike, *others: object) -> FloatArray | None:
+    def _first(self, quantity: str, q: ArrayLike, *others: object) -> FloatArray | None:
         """Make what computes a quantity, and compute."""
         with importing:
             from urdfkin.recursion.single import arrays_are_known, single  # noqa: PLC0415  loads Numba
@@ -105,6 +104,6 @@ class PreparedFrame:
         if robots or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
             return None
         compute, task = single(quantity, self._plan, self.reference)
-        self._robot.ledger.account(quantity).counters.append((task, Task.COUNT))
+        self._robot.verifier.ledger.account(quantity).counters.append((task, Task.COUNT))
         setattr(self, f"_{quantity}", compute)
         return compute(q, *others)

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,24 +14,39 @@ from numpy.typing import ArrayLike
 
 from urdfkin import configuration
 from urdfkin.call import Call
-from urdfkin.demands import switch, whole_number
-from urdfkin.errors import InputError, NotFiniteError
+from urdfkin.chain import FrameChain, chain
+from urdfkin.demands import choice, real_number, shown, switch, whole_number, word, words
+from urdfkin.dh.make import dh_table
+from urdfkin.dh.table import DHTable
+from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
+from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
+from urdfkin.frame_names import LinkFrame
 from urdfkin.lint import Finding
-from urdfkin.manipulator import Manipulator
-from urdfkin.oracle import Oracle, OracleError, version
+from urdfkin.motion.representation import QUATERNION
 from urdfkin.origin import Origin
 from urdfkin.prepared import PreparedFrame
-from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import BaseMotion
+from urdfkin.recursion.batch import in_parts
+from urdfkin.recursion.breakdown import KINDS, AccelerationBreakdown, moving_joints
 from urdfkin.recursion.plan import Plan, make_plan
 from urdfkin.reference import Reference
-from urdfkin.rotation.arrays import floats, scalars
-from urdfkin.tables import Tables
+from urdfkin.rotation.arrays import scalars
+from urdfkin.rotation.euler_rates import NEAREST
 from urdfkin.tree import FloatArray, KinematicTree
-from urdfkin.verification.bounds import Quantity
-from urdfkin.verification.certificate import Certificate, Ledger
-from urdfkin.verification.choosing import Verify, checked_choice
+from urdfkin.verification.bounds import nearest_singularity
+from urdfkin.verification.certificate import Certificate
+from urdfkin.verification.choosing import Verify
+from urdfkin.verification.quantities import (
+    ACCELERATION_BREAKDOWN,
+    ANALYTICAL_JACOBIAN,
+    JACOBIAN,
+    PLACEMENT,
+    QUANTITIES,
+    quantity,
+    walked,
+)
 from urdfkin.verification.sampling import sample
+from urdfkin.verification.verifier import Verifier
 
 if TYPE_CHECKING:
     from urdfkin.enclosure import Enclosures
@@ -40,7 +56,7 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _MOST_NUMBERS = (2**63 - 1) // 8
 
 
-class Robot(Manipulator, Tables):
+class Robot:
     """A robot that was loaded; make one with `urdfkin.load`.
 
     Configurations `q` are (..., nq), rates `v` and `a` (..., nv), with any leading batch shape; the three
@@ -48,12 +64,8 @@ class Robot(Manipulator, Tables):
 
     Attributes:
         tree: Links and joints.
-        urdf: The URDF text that Pinocchio checks against.
-        origin: What was given to `load`.
-        verify: Whether results are checked unless a call says otherwise.
-        mimic: As it was given to `load`; False too where the catalogue turns it off.
+        verifier: What checks its results: the text that Pinocchio reads, and what was found so far.
         findings: What there was to say about the URDF; no errors.
-        unverifiable: Why Pinocchio cannot check this robot; None if it can, as far as is known.
         base_frame: The catalogue's base for chains; for other robots the root link.
     """
 
@@ -64,30 +76,23 @@ class Robot(Manipulator, Tables):
         *,
         origin: Origin,
         verify: Verify = True,
-        mimic: bool | None = None,
+        mimic: bool = True,
         findings: tuple[Finding, ...] = (),
         unverifiable: str | None = None,
         base_frame: str | None = None,
         tip_frame: str | None = None,
     ) -> None:
         self.tree = tree
-        self.urdf = urdf
-        self.origin = origin
-        self.verify = checked_choice(verify)
-        self.mimic = mimic
+        self.verifier = Verifier(urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable)
         self.findings = findings
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
-        self.unverifiable = unverifiable
-        self.ledger = Ledger()
         self._plans: dict[tuple[int, ...], Plan] = {}
-        self._oracles: dict[bool, Oracle] = {}
         self._prepared: dict[object, PreparedFrame] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Pinocchio's models are rebuilt where they are needed; compiled plans are cheap to rebuild too.
-        # A copy, in this process or another, has handed out nothing yet: its ledger is empty.
-        return {**self.__dict__, "ledger": Ledger(), "_plans": {}, "_oracles": {}, "_prepared": {}}
+        # Compiled plans are cheap to rebuild where they are needed; a copy has an account of its own.
+        return {**self.__dict__, "verifier": copy(self.verifier), "_plans": {}, "_prepared": {}}
 
     def __repr__(self) -> str:
         return f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>"
@@ -98,6 +103,16 @@ class Robot(Manipulator, Tables):
     def name(self) -> str:
         """The robot's name in the URDF."""
         return self.tree.name
+
+    @property
+    def urdf(self) -> str:
+        """The URDF text that Pinocchio checks against."""
+        return self.verifier.text
+
+    @property
+    def origin(self) -> Origin:
+        """What was given to `load`."""
+        return self.verifier.origin
 
     @property
     def source(self) -> str:
@@ -126,8 +141,13 @@ class Robot(Manipulator, Tables):
 
     @property
     def link_names(self) -> tuple[str, ...]:
-        """Every link, root first, in the order in which all frames are handed out."""
+        """Every link, root first."""
         return self.tree.links
+
+    @property
+    def link_frames(self) -> tuple[LinkFrame, ...]:
+        """Every link as a frame, `link:NAME`, to be asked for all at once; no name stands for two."""
+        return self.tree.link_frames
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -182,11 +202,13 @@ class Robot(Manipulator, Tables):
 
     def limit_violations(self, q: ArrayLike) -> list[str]:
         """One line for each joint that leaves its bounds somewhere in `q` (..., nq)."""
-        return configuration.limit_violations(self.tree, self.checked(q, "q"))
+        return configuration.limit_violations(self.tree, configuration.checked(self.tree, q, "q"))
 
     def to_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """(..., nq) to the configuration of `pinocchio.buildModelFromUrdf(path, mimic=mimic)`."""
-        return configuration.to_pinocchio(self.tree, self.checked(q, "q"), mimic=switch(mimic, "mimic"))
+        return configuration.to_pinocchio(
+            self.tree, configuration.checked(self.tree, q, "q"), mimic=switch(mimic, "mimic")
+        )
 
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """The inverse of `to_pinocchio`; angles of continuous joints come back in (-pi, pi]."""
@@ -194,21 +216,58 @@ class Robot(Manipulator, Tables):
 
     # -- what it computes ----------------------------------------------------------------------------
 
-    def placement(
+    def compute(
         self,
-        q: ArrayLike,
-        frame: str,
+        name: str,
+        inputs: Sequence[ArrayLike],
+        frame: str | Sequence[str],
+        reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 4, 4) T_world_frame, eq. 7.77 with the rotations alongside.
+        """Any quantity of the walk by its name, as the method of that name computes it.
+
+        Args:
+            name: "placement", "velocity", "jacobian", "jacobian rate" or "acceleration".
+            inputs: q, v and a, as far as it takes them.
+            frame: As in `placement`; so are the others.
+            reference: For which point and in which axes; a placement has none.
+            base: As in `placement`.
+            out: As in `placement`.
+            verify: As in `placement`.
+            threads: As in `placement`.
+
+        Raises:
+            UnknownNameError: no such quantity or frame.
+            InputError: as `placement`; other inputs than the quantity takes; one that has a way of its own.
+            VerificationError: Pinocchio computes something else.
+        """
+        row = quantity(word(name, "name"))
+        if row not in walked():
+            raise InputError(f"the {name} has a method of its own", remedy=f"call {row.method}")
+        if not isinstance(inputs, tuple | list) or len(inputs) != len(row.inputs):
+            raise InputError(f"the {name} takes ({', '.join(row.inputs)})", found=shown(inputs))
+        return self._computed(name, inputs, frame, reference, base, out, verify, threads)
+
+    def placement(
+        self,
+        q: ArrayLike,
+        frame: str | Sequence[str],
+        *,
+        base: BaseMotion | None = None,
+        out: FloatArray | None = None,
+        verify: Verify | None = None,
+        threads: int | None = None,
+    ) -> FloatArray:
+        """(..., 4, 4) T_world_frame, eq. 7.77 with the rotations alongside; (..., frames, 4, 4) of several.
 
         Args:
             q: (..., nq) rad, m.
-            frame: A link's or joint's name.
+            frame: A link's or joint's name; or a list of names, all of which one pass computes
+                (`link_frames` are every link).
             base: How the root link moves; None if it stands at the world's origin.
             out: C-contiguous float64 array of the result's shape to write into; after an error it may hold
                 anything.
@@ -228,18 +287,13 @@ class Robot(Manipulator, Tables):
             and (one := fast._placement(q, out)) is not None
         ):
             return one
-        call = Call(self, (frame,), _ALIGNED, base, q)
-        to = call.flat(out, 4, 4)
-        poses = call.compute(evaluate.placements, call.plan, call.q, base=call.state, out=to, threads=threads)
-        result = call.one(poses, out)
-        call.verify(Quantity.PLACEMENT, result, verify)
-        return result
+        return self._computed("placement", (q,), frame, _ALIGNED, base, out, verify, threads)
 
     def velocity(
         self,
         q: ArrayLike,
         v: ArrayLike,
-        frame: str,
+        frame: str | Sequence[str],
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
@@ -254,17 +308,12 @@ class Robot(Manipulator, Tables):
             and (one := fast._velocity(q, v, out)) is not None
         ):
             return one
-        call = Call(self, (frame,), reference, base, q, v)
-        walk, to = (call.plan, call.q, *call.rates, call.reference), call.flat(out, 6)
-        sixes = call.compute(evaluate.velocities, *walk, base=call.state, out=to, threads=threads)
-        result = call.one(sixes, out)
-        call.verify(Quantity.VELOCITY, result, verify)
-        return result
+        return self._computed("velocity", (q, v), frame, reference, base, out, verify, threads)
 
     def jacobian(
         self,
         q: ArrayLike,
-        frame: str,
+        frame: str | Sequence[str],
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
@@ -282,19 +331,35 @@ class Robot(Manipulator, Tables):
             and (one := fast._jacobian(q, out)) is not None
         ):
             return one
-        call = Call(self, (frame,), reference, base, q)
-        walk, to = (call.plan, call.q, call.reference), call.flat(out, 6, self.nv)
-        Js = call.compute(evaluate.jacobians, *walk, base=call.state, out=to, threads=threads)
-        result = call.one(Js, out)
-        call.verify(Quantity.JACOBIAN, result, verify)
-        return result
+        return self._computed("jacobian", (q,), frame, reference, base, out, verify, threads)
+
+    def jacobian_rate(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        frame: str | Sequence[str],
+        reference: Reference | str = _ALIGNED,
+        *,
+        base: BaseMotion | None = None,
+        out: FloatArray | None = None,
+        verify: Verify | None = None,
+        threads: int | None = None,
+    ) -> FloatArray:
+        """(..., 6, nv) J-dot, the time derivative of `jacobian` along the motion (7.126).
+
+        In LOCAL_WORLD_ALIGNED, J a + J-dot v is the acceleration of the text and of `acceleration`. In LOCAL
+        and WORLD it is the *spatial* acceleration, which differs by w x vel: there the point, or the axes,
+        that the rows speak of move themselves. On a moving base, what the base does comes on top. Arguments
+        and errors as `placement`.
+        """
+        return self._computed("jacobian rate", (q, v), frame, reference, base, out, verify, threads)
 
     def acceleration(
         self,
         q: ArrayLike,
         v: ArrayLike,
         a: ArrayLike,
-        frame: str,
+        frame: str | Sequence[str],
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
@@ -312,12 +377,109 @@ class Robot(Manipulator, Tables):
             and (one := fast._acceleration(q, v, a, out)) is not None
         ):
             return one
-        call = Call(self, (frame,), reference, base, q, v, a)
-        walk, to = (call.plan, call.q, *call.rates, call.reference), call.flat(out, 6)
-        sixes = call.compute(evaluate.accelerations, *walk, base=call.state, out=to, threads=threads)
-        result = call.one(sixes, out)
-        call.verify(Quantity.ACCELERATION, result, verify)
-        return result
+        return self._computed("acceleration", (q, v, a), frame, reference, base, out, verify, threads)
+
+    def analytical_jacobian(
+        self,
+        q: ArrayLike,
+        frame: str | Sequence[str],
+        representation: str = "ZYZ",
+        *,
+        nearest: float = NEAREST,
+        base: BaseMotion | None = None,
+        out: FloatArray | None = None,
+        verify: Verify | None = None,
+        threads: int | None = None,
+    ) -> FloatArray:
+        """The manipulator Jacobian J = C^-1 J_v (7.122): derivatives of position and orientation by q.
+
+        It is checked against Pinocchio's rotation and Jacobian, with the rates of the orientation's numbers
+        by a way of their own (`urdfkin.verification.line_of_nodes`). The bound grows as 1 / s^2, s being the
+        sine or cosine of the middle angle: near the singularity that many digits are lost.
+
+        Args:
+            q: (..., nq) rad, m.
+            frame: As in `placement`.
+            representation: Euler sequence by SciPy's name ("ZYZ" is the text's, "xyz" is rpy), or
+                "quaternion".
+            nearest: How near the representational singularity may be, radians.
+            base: How the root link stands; None if at the world's origin.
+            out: As in `placement`.
+            verify: As in `placement`.
+            threads: As in `placement`.
+
+        Returns:
+            (..., 6, nv), or (..., 7, nv) for a quaternion.
+
+        Raises:
+            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`, or, when it
+                is to be checked, than rounding can tell (some 1e-13 rad); the error says how near. A
+                quaternion has none.
+            UnknownNameError: no such frame or representation.
+            InputError: as `placement`.
+            VerificationError: Pinocchio computes something else.
+        """
+        representation, nearest = word(representation, "representation"), real_number(nearest, "nearest")
+        options = {"representation": representation, "nearest": nearest}
+        call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,), **options)
+        if self.verifier.wanted(verify):
+            nearest = max(nearest, nearest_singularity(call.plan))
+        rows = 7 if representation == QUATERNION else 6
+        to = call.flat(out, (rows, self.nv))
+        J = np.empty((call.n, len(call.links), rows, self.nv)) if to is None else to
+        walk, state = (call.plan, (call.q,), _ALIGNED), {"base": call.state, "threads": threads}
+        Rs = call.compute(PLACEMENT.ours, *walk, **state)[..., :3, :3]
+        Js_v = call.compute(JACOBIAN.ours, *walk, out=J if rows == 6 else None, **state)
+        near: list[tuple[float, int]] = []
+
+        def compute(part: slice) -> None:
+            try:
+                with np.errstate(over="ignore", invalid="ignore"):
+                    J[part] = ANALYTICAL_JACOBIAN.compute(representation, Rs[part], Js_v[part], nearest)
+            except RepresentationSingularityError as error:
+                near.append((error.distance, part.start + error.sample[0]))
+
+        in_parts(compute, call.n, threads)
+        if near:
+            distance, k = min(near)
+            raise RepresentationSingularityError(representation, distance, call.index(k))
+        if not np.isfinite(J).all():
+            raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
+        handed_out = call.in_shape(J) if out is None else out
+        self.verifier.check(ANALYTICAL_JACOBIAN, call, handed_out, verify)
+        return handed_out
+
+    def acceleration_breakdown(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        frame: str,
+        reference: Reference | str = _ALIGNED,
+        *,
+        base: BaseMotion | None = None,
+        out: FloatArray | None = None,
+        verify: Verify | None = None,
+        threads: int | None = None,
+    ) -> AccelerationBreakdown:
+        """`acceleration`, as a sum over joints and kinds: transverse, centripetal, Coriolis, sliding.
+
+        The sum is checked against Pinocchio's acceleration. Arguments and errors as `placement`, for one
+        frame; `out` is for the terms, (..., joints, 4, 6).
+
+        Returns:
+            The parts, with the caller's batch shape in front.
+        """
+        call = Call(self.tree, self.plan, word(frame, "frame"), reference, base, (q, v, a))
+        to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(KINDS), 6))
+        flat = (self.tree, call.links[0], call.q, *call.rates, call.reference, call.state)
+        parts: AccelerationBreakdown = call.compute(
+            ACCELERATION_BREAKDOWN.compute, *flat, out=None if to is None else to[:, 0], threads=threads
+        )
+        base_part, terms = (x.reshape(*call.shape, *x.shape[1:]) for x in (parts.base, parts.terms))
+        breakdown = AccelerationBreakdown(parts.joints, base_part, terms if out is None else out)
+        self.verifier.check(ACCELERATION_BREAKDOWN, call, breakdown.total, verify)
+        return breakdown
 
     def enclose(
         self,
@@ -384,11 +546,103 @@ class Robot(Manipulator, Tables):
             prepared = self._prepared[key] = PreparedFrame(self, frame, Reference.of(reference), plan)
         return prepared
 
+    # -- chains and Denavit-Hartenberg tables ---------------------------------------------------------
+
+    def chain(self, tip: str | None = None, base: str | None = None) -> FrameChain:
+        """The joints between two frames, down the tree, up, or through the common ancestor.
+
+        Args:
+            tip: A link's or joint's name; the robot's tip when None.
+            base: Likewise; the robot's base frame when None.
+
+        Raises:
+            UnknownNameError: no such frame.
+            InputError: a planar or floating joint lies on the way.
+        """
+        return chain(self.tree, choice(tip, self.tip_frame, "tip"), choice(base, self.base_frame, "base"))
+
+    def select(self, path: FrameChain | DHTable, q: ArrayLike) -> FloatArray:
+        """(..., coordinates) of a path or table out of the robot's `q` (..., nq).
+
+        Raises:
+            InputError: `q` has another length than the robot's.
+        """
+        return path.coupling.select(self.tree, q)
+
+    def dh(
+        self,
+        tip: str | None = None,
+        base: str | None = None,
+        convention: str = "standard",
+        *,
+        near_parallel: str = "hayati",
+        snap: float = 0.0,
+        last: str = "tip",
+        parallel_offset: str = "last",
+        flip: Collection[str] = (),
+        verify: bool | None = None,
+    ) -> DHTable:
+        """The Denavit-Hartenberg table of the path between two frames, checked against Pinocchio.
+
+        Its methods take the path's own coordinates, `table.joint_names`; `robot.select(table, q)` picks them
+        out of the robot's. The other arguments are those of `urdfkin.dh.dh_table`.
+
+        Args:
+            tip: A link's or joint's name; the robot's tip when None.
+            base: Likewise; the robot's base frame when None.
+            convention: "standard" (distal, the text's) or "modified" (proximal, Craig's).
+            near_parallel: "hayati" or "strict": what nearly parallel axes get.
+            snap: Radians within which angles are made multiples of 15 degrees; 0 for an exact table.
+            last: "tip" or "flange": whether the last row takes the tip.
+            parallel_offset: "last", "first" or "each".
+            flip: Joints to count the other way.
+            verify: Whether Pinocchio checks the table; None leaves it to the robot.
+
+        Raises:
+            UnknownNameError: a frame or a joint that does not exist.
+            InputError: an option's value, or a planar or floating joint on the way.
+            TableError: Pinocchio computes something else.
+
+        Example:
+            >>> import urdfkin
+            >>> urdfkin.load("ur5").dh("tool0", "base", snap=1e-6).rows[3].d
+            0.10915
+        """
+        table = dh_table(
+            self.tree,
+            choice(tip, self.tip_frame, "tip"),
+            choice(base, self.base_frame, "base"),
+            word(convention, "convention"),
+            near_parallel=word(near_parallel, "near_parallel"),
+            snap=snap,
+            last=word(last, "last"),
+            parallel_offset=word(parallel_offset, "parallel_offset"),
+            flip=[word(joint, "each of flip") for joint in words(flip, "flip")],
+        )
+        if self.verifier.wanted(verify):
+            self.verifier.table(table)
+        return table
+
+    def tree_parameters(self, *, verify: bool | None = None) -> TreeParameters:
+        """Khalil and Kleinfinger's parameters of the whole robot as one table, checked against Pinocchio.
+
+        Args:
+            verify: Whether Pinocchio checks it; None leaves it to the robot.
+
+        Raises:
+            InputError: a planar or floating joint, which has no single axis.
+            TableError: Pinocchio computes something else.
+        """
+        parameters = tree_parameters(self.tree)
+        if self.verifier.wanted(verify):
+            self.verifier.tree_parameters(parameters)
+        return parameters
+
     # -- what it is worth ----------------------------------------------------------------------------
 
     def certificate(self) -> Certificate:
         """What was checked so far, how closely it agreed, by which Pinocchio, and what was not checked."""
-        return self.ledger.certificate(self.name, version())
+        return self.verifier.certificate()
 
     # -- inside --------------------------------------------------------------------------------------
 
@@ -399,55 +653,34 @@ class Robot(Manipulator, Tables):
             plan = self._plans[key] = make_plan(self.tree, key)
         return plan
 
-    def oracle(self, base: BaseMotion | None) -> Oracle:
-        """Pinocchio's model of the robot, made once; on a free-flyer if the base moves."""
-        moving = base is not None
-        if moving not in self._oracles:
-            self._oracles[moving] = Oracle(
-                self.urdf,
-                self.tree,
-                mimic=self.mimic is not False,
-                moving_base=moving,
-                root_joint=self.root_joint,
-            )
-        return self._oracles[moving]
+    def _computed(
+        self,
+        name: str,
+        inputs: Sequence[ArrayLike],
+        frame: str | Sequence[str],
+        reference: Reference | str,
+        base: BaseMotion | None,
+        out: FloatArray | None,
+        verify: Verify | None,
+        threads: int | None,
+    ) -> FloatArray:
+        row = QUANTITIES[name]
+        call = Call(self.tree, self.plan, frame, reference, base, inputs)
+        to = call.flat(out, row.own_shape(self.nv))
+        flat = (call.plan, (call.q, *call.rates), call.reference)
+        found = call.compute(row.ours, *flat, base=call.state, out=to, threads=threads)
+        result = call.in_shape(found) if out is None else out
+        self.verifier.check(row, call, result, verify)
+        return result
 
-    def _fast(self, frame: str, reference: Reference | str, verify: Verify | None) -> PreparedFrame | None:
+    def _fast(
+        self, frame: str | Sequence[str], reference: Reference | str, verify: Verify | None
+    ) -> PreparedFrame | None:
         """The short way for a single configuration that nobody checks; None where it is not for this call."""
-        if verify is not False and (verify is not None or self.verify is not False):
+        if verify is not False and (verify is not None or self.verifier.policy is not False):
+            return None
+        if not isinstance(frame, str):
             return None
         if reference is _ALIGNED and type(frame) is str and (fast := self._prepared.get(frame)) is not None:
             return fast
         return self.prepare(frame, reference)
-
-    def cannot_verify(self, base: BaseMotion | None = None) -> str | None:
-        """Why Pinocchio cannot check this robot; None if it can."""
-        if self.unverifiable is None:
-            try:
-                self.oracle(base)
-            except OracleError as error:
-                self.unverifiable = str(error)
-        return self.unverifiable
-
-    def shaped(self, value: ArrayLike, what: str) -> FloatArray:
-        """`value` as float64 with the right last axis."""
-        array = floats(value, what)
-        width = self.nq if what == "q" else self.nv
-        if array.shape[-1:] != (width,):
-            names = self.coordinate_names if what == "q" else self.rate_names
-            raise InputError(
-                f"{what} needs {width} numbers for {self.name}: {', '.join(names) or 'none, nothing moves'}",
-                found=f"shape {array.shape}",
-            )
-        return configuration.with_unit_quaternions(self.tree, array) if what == "q" else array
-
-    def checked(self, value: ArrayLike, what: str) -> FloatArray:
-        """The same, and every number finite."""
-        array = self.shaped(value, what)
-        if not np.isfinite(array).all():
-            names = self.coordinate_names if what == "q" else self.rate_names
-            where = np.argwhere(~np.isfinite(array))[0]
-            raise NotFiniteError(
-                f"{what} must be finite", where=names[where[-1]], found=str(array[tuple(where)])
-            )
-        return array

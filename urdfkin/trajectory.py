@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urdfkin.columns import read_columns
+from urdfkin.configuration import checked
 from urdfkin.demands import real_number, whole_number
 from urdfkin.errors import InputError
 from urdfkin.files import read_text
@@ -80,7 +81,7 @@ def line(robot: Robot, start: FloatArray, end: FloatArray, duration: float, samp
             f"a line needs a duration above 0 and {_FEWEST} samples", found=f"{duration} s, {samples}"
         )
     _only_plain_joints(robot)
-    q_0, q_1 = robot.checked(start, "q"), robot.checked(end, "q")
+    q_0, q_1 = checked(robot.tree, start, "q"), checked(robot.tree, end, "q")
     t = np.linspace(0.0, duration, samples)
     u = (t / duration)[:, np.newaxis]
     s = u**3 * (10.0 + u * (-15.0 + 6.0 * u))
@@ -118,7 +119,7 @@ def read_trajectory(robot: Robot, path: Path) -> Trajectory:
         raise InputError(
             "time must increase", where=str(path), found=f"sample {int(np.argmax(np.diff(t) <= 0.0)) + 1}"
         )
-    q = robot.checked(q, "q")
+    q = checked(robot.tree, q, "q")
     if any(name in data for name in rates):
         v, a = (_columns(path, data, [f"{x}:{name}" for name in robot.rate_names]) for x in "va")
         return Trajectory(frozen(t), frozen(q), frozen(v), frozen(a), "as given")

@@ -133,7 +133,7 @@ def _frame_works(subject: Subject, frames: Sequence[str]) -> list[Work]:
     out, every = np.empty((len(frames), n, 4, 4)), np.empty((n, len(frames), 4, 4))
 
     def together() -> FloatArray:
-        return robot.placements(q, frames, out=every, threads=1, verify=False)
+        return robot.placement(q, frames, out=every, threads=1, verify=False)
 
     def apart() -> None:
         for k, frame in enumerate(frames):

@@ -98,10 +98,10 @@ def _together(
     """Each quantity of all frames in a batch, of one frame in that batch, and of one configuration."""
     kept = dict[str, FloatArray]()
     if reference is Reference.LOCAL_WORLD_ALIGNED:
-        kept["placement"] = robot.placements(q, frames, base=base)
-    kept["velocity"] = robot.velocities(q, v, frames, reference, base=base)
-    kept["jacobian"] = robot.jacobians(q, frames, reference, base=base)
-    kept["acceleration"] = robot.accelerations(q, v, a, frames, reference, base=base)
+        kept["placement"] = robot.placement(q, frames, base=base)
+    kept["velocity"] = robot.velocity(q, v, frames, reference, base=base)
+    kept["jacobian"] = robot.jacobian(q, frames, reference, base=base)
+    kept["acceleration"] = robot.acceleration(q, v, a, frames, reference, base=base)
     yield from kept.items()
     inputs: dict[str, tuple[FloatArray, ...]] = {
         "placement": (q,),

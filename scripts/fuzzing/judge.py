@@ -11,10 +11,10 @@ import numpy as np
 import urdfkin
 from scripts.fuzzing import Case
 from scripts.fuzzing.asking import MismatchError, ask, ask_prepared
-from urdfkin.call import NotVerifiedWarning
 from urdfkin.errors import RangeError, UrdfkinError
 from urdfkin.lint import Finding, Severity, UrdfError
 from urdfkin.robot import Robot
+from urdfkin.verification.verifier import NotVerifiedWarning
 
 #: Findings about sizes that arithmetic cannot carry: a result that is no number is no surprise after them.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
@@ -82,6 +82,6 @@ def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.War
     marked = [finding for finding in findings if finding.oracle is not None]
     if marked:
         return Outcome("not verified, with a finding that says why", marked[0].code)
-    if (reason := robot.cannot_verify()) is not None:
+    if (reason := robot.verifier.cannot()) is not None:
         return Outcome("Pinocchio refuses what passed check", reason)
     return Outcome("not verified, and nothing says why", "; ".join(str(w.message) for w in warned))

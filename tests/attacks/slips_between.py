@@ -49,15 +49,17 @@ from urdfkin.tree import FloatArray
 
 #: Where a user's numbers pass on their way to the result, and on their way to Pinocchio.
 MODULES = (
-    "asked", "call", "chain", "checks", "configuration", "coupling", "dh.to_tree", "followers",
-    "frame_names", "from_table", "manipulator", "motion.representation", "oracle", "oracle_base",
+    "asked", "call", "chain", "configuration", "coupling", "dh.to_tree", "followers",
+    "frame_names", "from_table", "motion.representation", "oracle", "oracle_base",
     "oracle_frames", "oracle_layout", "recursion.base", "recursion.batch", "recursion.evaluate",
     "recursion.plan", "recursion.program", "reference", "robot",
     "rotation.aligning", "rotation.arrays", "rotation.euler", "rotation.euler_rates",
-    "rotation.nearest", "rotation.quaternion", "rotation.quaternion_rates", "tables", "tree",
+    "rotation.nearest", "rotation.quaternion", "rotation.quaternion_rates", "tree",
     "urdf.reader", "urdf.skeleton", "urdf.writer", "verification.bounds",
-    "verification.certificate", "verification.choosing", "verification.line_of_nodes",
-    "verification.magnitudes", "verification.tables",
+    "verification.analytical", "verification.certificate", "verification.choosing",
+    "verification.line_of_nodes",
+    "verification.magnitudes", "verification.quantities", "verification.tables",
+    "verification.verifier",
 )  # fmt: skip
 
 #: A result is the right one when it is off by less than this share of the largest number.
@@ -108,17 +110,17 @@ def results() -> Iterator[tuple[str, Callable[[Robot], FloatArray]]]:
     yield "placement", lambda r: r.placement(q, "f")
     yield "placement of a link like a joint", lambda r: r.placement(list(one[0]), "link:b", base=stands)
     yield "placement of a joint", lambda r: r.placement(q, "joint:slide", base=moves)
-    yield "placements", lambda r: r.placements(q[:, 0])
+    yield "placements", lambda r: r.placement(q[:, 0], r.link_frames)
     yield "velocity", lambda r: r.velocity(q, v, "link:b", "WORLD", base=moves)
     yield "velocity, alone", lambda r: r.velocity(one[0], one[1], "joint:b", "local")
-    yield "velocities", lambda r: r.velocities(q, v, ["f", "h"], "local", base=stands, verify="sample")
+    yield "velocities", lambda r: r.velocity(q, v, ["f", "h"], "local", base=stands, verify="sample")
     yield "jacobian", lambda r: r.jacobian(q, "second", "local", base=moves)
     yield "jacobian into out", lambda r: r.jacobian(q, "link:b", out=np.empty((2, 1, 6, 12)))
-    yield "jacobians", lambda r: r.jacobians(one[0], ["f", "link:b"], "world")
+    yield "jacobians", lambda r: r.jacobian(one[0], ["f", "link:b"], "world")
     yield "jacobian rate", lambda r: r.jacobian_rate(q, v, "f", "local", base=moves)
     yield "acceleration", lambda r: r.acceleration(q, v, a, "f", "local", base=moves)
     yield "acceleration, alone", lambda r: r.acceleration(*one, "link:b")
-    yield "accelerations", lambda r: r.accelerations(q, v, a, ["f", "g", "link:b"], "world", base=moves)
+    yield "accelerations", lambda r: r.acceleration(q, v, a, ["f", "g", "link:b"], "world", base=moves)
     yield "analytical jacobian", lambda r: r.analytical_jacobian(q, "f", "xyz", base=moves)
     yield "of a quaternion", lambda r: r.analytical_jacobian(one[0], "link:b", "quaternion", base=stands)
     yield "breakdown", lambda r: r.acceleration_breakdown(q, v, a, "f", base=moves).total
@@ -136,7 +138,7 @@ def _of_table(q: FloatArray) -> FloatArray:
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = exp_rotation([0.3, -0.2, 0.5]), (0.1, 0.2, 0.3)
     table = replace(table_from_rows(rows, "standard"), base=T, tool=T @ T)
-    robot = table.to_robot()
+    robot = urdfkin.load(table)
     return robot.placement(q, robot.tip_frame)
 
 
@@ -160,7 +162,7 @@ def blind() -> list[str]:
             compute(robot)
         except Exception:
             continue
-        if not robot.cannot_verify() and robot.certificate().verified:
+        if not robot.verifier.cannot() and robot.certificate().verified:
             found.append(name)
     return found
 
@@ -175,7 +177,7 @@ def outcome(right: dict[str, FloatArray] | None) -> tuple[str, dict[str, FloatAr
     except Exception as error:
         return f"refused: {type(error).__name__}: {error}"[:200], found
     for name, compute in results():
-        robot.ledger = type(robot.ledger)()
+        robot.verifier.ledger = type(robot.verifier.ledger)()
         try:
             found[name] = compute(robot)
         except (urdfkin.VerificationError, OracleError, urdfkin.TableError):
@@ -185,7 +187,7 @@ def outcome(right: dict[str, FloatArray] | None) -> tuple[str, dict[str, FloatAr
             words.add(f"refused: {name}: {type(error).__name__}: {error}"[:200])
             continue
         if right is not None and not _alike(found[name], right[name]):
-            if robot.cannot_verify() or not (robot.certificate().verified or name in UNCOUNTED):
+            if robot.verifier.cannot() or not (robot.certificate().verified or name in UNCOUNTED):
                 words.add("caught")  # found at the door: the result is handed out as not verified
             else:
                 wrong.append(name)

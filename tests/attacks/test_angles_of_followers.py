@@ -70,9 +70,9 @@ def test_chains_of_followers_are_verified_however_far_they_have_turned(far: floa
         rules = [tuple(map(repr, rng.normal(size=2).tolist())) for _ in range(4)]
         robot = urdfkin.load(text(*((multiplier, offset) for multiplier, offset in rules)))
         q, v, a = rng.uniform(-far, far, (3, 20, 1))
-        robot.placements(q)
-        robot.jacobians(q)
-        robot.accelerations(q, v / far, a / far)
+        robot.placement(q, robot.link_frames)
+        robot.jacobian(q, robot.link_frames)
+        robot.acceleration(q, v / far, a / far, robot.link_frames)
         assert all(line.share < 0.3 for line in robot.certificate().lines)
 
 
@@ -95,7 +95,7 @@ def test_sine_and_cosine_are_right_to_the_last_digit_for_angles_of_any_size(expo
     x = np.random.default_rng(exponent).uniform(1.0, 10.0, 60) * 10.0**exponent
     level = urdfkin.load(text().replace('rpy="0.1 0.2 0.3"', ""), verify=False)
     ours = level.placement(x[:, np.newaxis], "l1")
-    theirs = level.oracle(None).placements(x[:, np.newaxis], ["l1"])[:, 0]
+    theirs = level.verifier.oracle().placements(x[:, np.newaxis], ["l1"])[:, 0]
     with mpmath.workdps(50 + exponent):
         for k, angle in enumerate(x.tolist()):
             true = mpmath.cos(mpmath.mpf(angle)), mpmath.sin(mpmath.mpf(angle))

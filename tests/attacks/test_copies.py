@@ -39,8 +39,9 @@ def test_a_copy_has_a_ledger_of_its_own(copied: Callable[[Robot], Robot]) -> Non
 def test_a_copy_is_the_same_robot(copied: Callable[[Robot], Robot]) -> None:
     robot = urdfkin.load("panda", verify="sample")
     again = copied(robot)
-    assert (again.name, again.verify, again.tip_frame) == (robot.name, "sample", robot.tip_frame)
+    assert (again.name, again.verifier.policy, again.tip_frame) == (robot.name, "sample", robot.tip_frame)
     assert (again.sample(3) == robot.sample(3)).all()
     np.testing.assert_array_equal(
-        again.placements(again.sample(3)), robot.placements(robot.sample(3), verify=False)
+        again.placement(again.sample(3), again.link_frames),
+        robot.placement(robot.sample(3), robot.link_frames, verify=False),
     )

@@ -17,7 +17,6 @@ from urdfkin.dh import DHTable, dh_table, export
 from urdfkin.dh.hint import noisy_cells
 from urdfkin.errors import InputError
 from urdfkin.roundings import EPS
-from urdfkin.tables import verified
 from urdfkin.tree import JointKind, KinematicTree, Mimic
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verification.tables import TableCheck, TableError
@@ -55,7 +54,7 @@ def robot_of(tree: KinematicTree) -> urdfkin.Robot:
 
 
 def checked(robot: urdfkin.Robot, table: DHTable) -> TableCheck:
-    check = verified(robot, table)
+    check = robot.verifier.table(table)
     assert check is not None
     return check
 
@@ -92,7 +91,7 @@ def test_a_wrong_strict_table_is_a_disagreement_however_long_its_rows_are() -> N
     rows = list(table.rows)
     rows[0] = replace(rows[0], alpha=rows[0].alpha + 1e-3)
     with pytest.raises(TableError, match="DISAGREES"):
-        verified(robot, replace(table, rows=tuple(rows)))
+        robot.verifier.table(replace(table, rows=tuple(rows)))
 
 
 def test_the_robotics_toolbox_is_told_to_snap_and_what_strict_rows_would_cost() -> None:
@@ -135,7 +134,7 @@ def test_a_wrong_multiplier_in_a_table_is_still_found(multiplier: float) -> None
     wrong = Mimic("rack", multiplier * (1.0 + 1e-9), 0.0)
     rows = (table.rows[0], replace(table.rows[1], mimic=wrong), table.rows[2])
     with pytest.raises(TableError, match="DISAGREES"):
-        verified(robot, replace(table, rows=rows))
+        robot.verifier.table(replace(table, rows=rows))
 
 
 # -- noise ----------------------------------------------------------------------------------------------

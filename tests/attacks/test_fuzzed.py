@@ -52,7 +52,7 @@ TINY = """<robot name="r"><link name="a"/><link name="b"/>
  rpy="1 0.2 0.3"/><axis xyz="0 0.6 0.8"/></joint></robot>"""
 
 
-@pytest.mark.filterwarnings("error::urdfkin.call.NotVerifiedWarning")
+@pytest.mark.filterwarnings("error::urdfkin.NotVerifiedWarning")
 def test_a_table_of_lengths_whose_squares_vanish_does_not_lose_to_rounding() -> None:
     robot = urdfkin.load(TINY)
     for convention in ("standard", "modified"):

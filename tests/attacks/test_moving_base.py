@@ -114,10 +114,10 @@ def test_a_turned_base_stays_well_within_the_bound(reference: str) -> None:
     T = at(orientations(n, 6))
     T[:, :3, 3] = generator.normal(size=(n, 3))
     base = BaseMotion(T, *generator.normal(size=(2, n, 6)))
-    robot.placements(q, base=base)
-    robot.velocities(q, v, ["a", "b"], reference, base=base)
-    robot.jacobians(q, ["a", "b"], reference, base=base)
-    robot.accelerations(q, v, a, ["a", "b"], reference, base=base)
+    robot.placement(q, robot.link_frames, base=base)
+    robot.velocity(q, v, ["a", "b"], reference, base=base)
+    robot.jacobian(q, ["a", "b"], reference, base=base)
+    robot.acceleration(q, v, a, ["a", "b"], reference, base=base)
     assert robot.certificate().verified
     assert max(line.share for line in robot.certificate().lines) < 0.2
 

@@ -115,12 +115,12 @@ def test_a_robot_whose_link_and_joint_share_a_name_moves_on_its_base(name: str) 
     shared = {joint.name for joint in robot.tree.joints} & set(robot.link_names)
     assert shared
     q, base = robot.sample(2, 3), BaseMotion(TURNED, np.arange(6.0), np.arange(6.0) - 2.0)
-    everywhere = robot.placements(q, base=base)
-    np.testing.assert_allclose(everywhere, TURNED @ robot.placements(q), atol=1e-14)
+    everywhere = robot.placement(q, robot.link_frames, base=base)
+    np.testing.assert_allclose(everywhere, TURNED @ robot.placement(q, robot.link_frames), atol=1e-14)
     v, a = np.random.default_rng(1).normal(size=(2, 2, robot.nv))
     for frame in [f(own) for own in sorted(shared)[:2] for f in (LinkFrame.of, JointFrame.of)]:
-        robot.accelerations(q, v, a, [frame], base=base)
-        robot.jacobians(q, [frame], "local", base=base)
+        robot.acceleration(q, v, a, [frame], base=base)
+        robot.jacobian(q, [frame], "local", base=base)
     assert robot.certificate().verified
 
 
@@ -132,15 +132,18 @@ def test_the_world_and_the_root_joint_move_with_the_base(root_joint: str) -> Non
     np.testing.assert_allclose(robot.placement(q, "universe", base=base), TURNED, atol=1e-15)
     for frame in ("universe", "link:universe", "root_joint", "joint:root_joint", "base"):
         np.testing.assert_allclose(robot.velocity(q, v, frame, base=base), np.arange(6.0), atol=1e-14)
-    assert robot.placements(q, base=base).shape == (4, 4, 4)
+    assert robot.placement(q, robot.link_frames, base=base).shape == (4, 4, 4)
     assert robot.certificate().verified
 
 
 @pytest.mark.parametrize("name", ["anymal_c", "so100"])
 def test_all_links_are_had_without_naming_them(name: str) -> None:
     robot = urdfkin.load(name)
-    assert robot.placements(robot.neutral()).shape == (len(robot.link_names), 4, 4)
-    assert robot.velocities(robot.neutral(), np.ones(robot.nv)).shape == (len(robot.link_names), 6)
+    assert robot.placement(robot.neutral(), robot.link_frames).shape == (len(robot.link_names), 4, 4)
+    assert robot.velocity(robot.neutral(), np.ones(robot.nv), robot.link_frames).shape == (
+        len(robot.link_names),
+        6,
+    )
     assert robot.certificate().verified
 
 
@@ -152,9 +155,9 @@ def test_the_remedy_for_an_ambiguous_name_works() -> None:
     assert robot.placement([], "joint:c")[:2, 3].tolist() == [1.0, 1.0]
     assert robot.placement([], "joint:b")[:2, 3].tolist() == [1.0, 0.0]
     with pytest.raises(OracleError, match="two of Pinocchio's frames have this name"):
-        robot.oracle(None).placements(np.zeros((1, 0)), ["b"])
+        robot.verifier.oracle().placements(np.zeros((1, 0)), ["b"])
     with pytest.raises(OracleError, match="Pinocchio has no such frame: found 'link:d'"):
-        robot.oracle(None).placements(np.zeros((1, 0)), ["link:d"])
+        robot.verifier.oracle().placements(np.zeros((1, 0)), ["link:d"])
 
 
 def meant(name: str, links: list[str], joints: list[str]) -> int | str:
@@ -206,12 +209,12 @@ def test_of_hostile_names_every_one_stands_for_the_same_frame_on_both_sides(
                 with pytest.raises(wanted):
                     robot.placement(q, name, base=base)
                 with pytest.raises(OracleError):
-                    robot.oracle(base).placements(q[np.newaxis], [name])
+                    robot.verifier.oracle(base).placements(q[np.newaxis], [name])
             else:
                 found = robot.placement(q, name, base=base)[:3, 3]
                 np.testing.assert_allclose(found, T[:3, :3] @ places[where] + T[:3, 3], atol=1e-14)
-        every = robot.placements(q, base=base)[:, :3, 3]
+        every = robot.placement(q, robot.link_frames, base=base)[:, :3, 3]
         expected = [T[:3, :3] @ places[links.index(name)] + T[:3, 3] for name in robot.link_names]
         np.testing.assert_allclose(every, expected, atol=1e-14)
-        robot.jacobians(q, robot.all_frames, base=base)
+        robot.jacobian(q, robot.all_frames, base=base)
     assert robot.certificate().verified

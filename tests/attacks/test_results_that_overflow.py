@@ -21,7 +21,7 @@ METHODS: dict[str, Callable[..., object]] = {
     "acceleration": lambda r, q, v, a, **o: r.acceleration(q, v, a, FRAME, **o),
     "acceleration, local": lambda r, q, v, a, **o: r.acceleration(q, v, a, FRAME, "local", **o),
     "acceleration, world": lambda r, q, v, a, **o: r.acceleration(q, v, a, FRAME, "world", **o),
-    "accelerations": lambda r, q, v, a, **o: r.accelerations(q, v, a, [FRAME, "base_link"], **o),
+    "accelerations": lambda r, q, v, a, **o: r.acceleration(q, v, a, [FRAME, "base_link"], **o),
     "acceleration_breakdown": lambda r, q, v, a, **o: r.acceleration_breakdown(q, v, a, FRAME, **o),
 }
 

@@ -15,7 +15,7 @@ import pytest
 
 from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
 from tests.cli.running import Done, urdfkin
-from urdfkin.cli import COMMANDS
+from urdfkin.cli import commands
 from urdfkin.cli.door import Door
 from urdfkin.dh.export import FORMATS
 
@@ -114,7 +114,7 @@ def harmless(done: Done, words: list[str]) -> None:
 
 
 def test_every_command_is_tried() -> None:
-    assert set(ROBOT) | set(OTHERS) == set(COMMANDS)
+    assert set(ROBOT) | set(OTHERS) == set(commands())
 
 
 @pytest.mark.slow
@@ -134,7 +134,7 @@ def test_no_word_of_a_report_or_of_the_command_line_acts(words: list[str], files
     harmless(run(files, words), words)
 
 
-@pytest.mark.parametrize("command", [*COMMANDS, "no such command"])
+@pytest.mark.parametrize("command", [*commands(), "no such command"])
 def test_no_name_of_a_file_or_an_option_acts(command: str) -> None:
     for words in ([command, f"--{FILE}"], [command, f"{FILE}.urdf"], [f"{command}{FILE}"]):
         if words != ["explain", f"{FILE}.urdf"]:

@@ -73,9 +73,10 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
 
     for name in ("placements", "velocities", "accelerations", "jacobians", "jacobian_rates"):
         monkeypatch.setattr(evaluate, name, seen(getattr(evaluate, name)))
-    for name in ("placements", "velocities", "accelerations", "jacobians", "jacobian_rates_of_all"):
+    for name in ("placements", "velocities", "accelerations", "jacobians", "jacobian_rates"):
         monkeypatch.setattr(Oracle, name, seen(getattr(Oracle, name)))
-    monkeypatch.setattr(Oracle, "joint_jacobians", seen(Oracle.joint_jacobians))
+    for name in ("joint_jacobians", "joint_jacobian_rates"):
+        monkeypatch.setattr(Oracle, name, seen(getattr(Oracle, name)))
     monkeypatch.setattr(comparing, "BLOCK_BYTES", 100_000)
     (chunk,) = chunks(_subject("talos", None, None), 5, 3)
     run_chunk(chunk)

@@ -5,14 +5,15 @@ import os
 import shlex
 import subprocess
 import sys
-from importlib import import_module, metadata
+from importlib import metadata
 from pathlib import Path
 
+import click
 import pytest
 
 from tests.cli.running import process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
-from urdfkin.cli import COMMANDS
+from urdfkin.cli import cli, commands
 from urdfkin.resources import robots_dir
 
 #: Heavy, or needless where nothing is computed.
@@ -38,7 +39,7 @@ def run_examples(command: str) -> None:
 
 def test_every_command_stands_on_the_help_page_with_a_summary() -> None:
     text = urdfkin("--help").text
-    for name, (_, summary) in COMMANDS.items():
+    for name, (_, summary) in commands().items():
         assert f"  {name} " in text
         assert summary.split()[0] in text
 
@@ -48,7 +49,7 @@ def elbow() -> str:
     return (robots_dir() / "elbow.urdf").read_text()
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", commands())
 def test_every_command_has_help_with_an_example_of_itself(command: str) -> None:
     done = urdfkin(command, "--help")
     assert done.code == 0
@@ -63,7 +64,7 @@ ENDLESS = ("view",)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", [name for name in COMMANDS if name not in AFTER_WORK + ENDLESS])
+@pytest.mark.parametrize("command", [name for name in commands() if name not in AFTER_WORK + ENDLESS])
 def test_the_examples_of_the_help_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "robots").mkdir()
@@ -98,7 +99,7 @@ def test_help_imports_nothing_heavy() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", commands())
 def test_a_commands_help_imports_neither_numpy_nor_pinocchio(command: str) -> None:
     code = (
         f"import sys\nfrom urdfkin.cli import main\nsys.argv = ['urdfkin', {command!r}, '--help']\n"
@@ -128,5 +129,6 @@ def test_the_version_names_pinocchios_too() -> None:
 
 
 def test_every_summary_and_module_is_there() -> None:
-    for module, _ in COMMANDS.values():
-        assert callable(import_module(module).command)
+    group = click.Context(cli)
+    for name in commands():
+        assert isinstance(cli.get_command(group, name), click.Command)

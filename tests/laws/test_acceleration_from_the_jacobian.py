@@ -10,9 +10,9 @@ from urdfkin.recursion.base import STILL_STATE
 from urdfkin.reference import Reference
 from urdfkin.roundings import EPS
 from urdfkin.tree import FloatArray
-from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Bound
 from urdfkin.verification.magnitudes import magnitudes
+from urdfkin.verification.quantities import ACCELERATION, JACOBIAN, JACOBIAN_RATE
 
 
 def room(bound: Bound) -> FloatArray:
@@ -38,8 +38,8 @@ def test_the_jacobian_and_its_rate_make_the_acceleration(name: str) -> None:
             velocity = evaluate.velocities(plan, q, v, reference)
             expected[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
         allowed = (
-            np.einsum("nfij,nj->nfi", room(bounds.jacobian_bound(plan, size, reference)), np.abs(a))
-            + np.einsum("nfij,nj->nfi", room(bounds.jacobian_rate_bound(plan, size, reference)), np.abs(v))
-            + room(bounds.acceleration_bound(size, reference))
+            np.einsum("nfij,nj->nfi", room(JACOBIAN.bound(plan, size, reference)), np.abs(a))
+            + np.einsum("nfij,nj->nfi", room(JACOBIAN_RATE.bound(plan, size, reference)), np.abs(v))
+            + room(ACCELERATION.bound(plan, size, reference))
         )
         assert (np.abs(total - expected) <= allowed).all(), reference

@@ -30,10 +30,10 @@ QUANTITIES: dict[str, Compute] = {
     "jacobian": lambda robot, q, v, a: robot.jacobian(q, robot.tip_frame, "local"),
     "jacobian_rate": lambda robot, q, v, a: robot.jacobian_rate(q, v, robot.tip_frame, "world"),
     "acceleration": lambda robot, q, v, a: robot.acceleration(q, v, a, robot.tip_frame, "world"),
-    "placements": lambda robot, q, v, a: robot.placements(q),
-    "velocities": lambda robot, q, v, a: robot.velocities(q, v),
-    "jacobians": lambda robot, q, v, a: robot.jacobians(q),
-    "accelerations": lambda robot, q, v, a: robot.accelerations(q, v, a),
+    "placements": lambda robot, q, v, a: robot.placement(q, robot.link_frames),
+    "velocities": lambda robot, q, v, a: robot.velocity(q, v, robot.link_frames),
+    "jacobians": lambda robot, q, v, a: robot.jacobian(q, robot.link_frames),
+    "accelerations": lambda robot, q, v, a: robot.acceleration(q, v, a, robot.link_frames),
 }
 
 
@@ -155,10 +155,10 @@ def test_out_is_written_for_several_frames_and_by_several_threads_too(shape: tup
     q, v, a = (x.reshape(*shape, 8) for x in state(robot, n, 6))
     frames = ["panda_hand", "panda_link3", "panda_rightfinger"]
     calls: list[tuple[tuple[int, ...], Callable[..., FloatArray]]] = [
-        ((4, 4), lambda **how: robot.placements(q, frames, **how)),
-        ((6,), lambda **how: robot.velocities(q, v, frames, "local", **how)),
-        ((6, 8), lambda **how: robot.jacobians(q, frames, **how)),
-        ((6,), lambda **how: robot.accelerations(q, v, a, frames, "world", **how)),
+        ((4, 4), lambda **how: robot.placement(q, frames, **how)),
+        ((6,), lambda **how: robot.velocity(q, v, frames, "local", **how)),
+        ((6, 8), lambda **how: robot.jacobian(q, frames, **how)),
+        ((6,), lambda **how: robot.acceleration(q, v, a, frames, "world", **how)),
     ]
     for own, call in calls:
         out = np.full((*shape, 3, *own), np.nan)
@@ -233,7 +233,7 @@ def test_one_configuration_for_many_rates_is_as_if_it_had_been_repeated(single: 
             [
                 robot.velocity(x["q"], x["v"], robot.tip_frame, reference, threads=threads),
                 robot.jacobian_rate(x["q"], x["v"], robot.tip_frame, reference, threads=threads),
-                robot.accelerations(x["q"], x["v"], x["a"], None, reference, threads=threads),
+                robot.acceleration(x["q"], x["v"], x["a"], robot.link_frames, reference, threads=threads),
             ]
             for x in (once, repeated)
         ]

@@ -67,10 +67,10 @@ def all_frames_faults(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray)
     """Where a frame among all is not what it is by itself."""
     for reference in urdfkin.Reference:
         together = {
-            "placement": robot.placements(q),
-            "velocity": robot.velocities(q, v, None, reference),
-            "jacobian": robot.jacobians(q, None, reference),
-            "acceleration": robot.accelerations(q, v, a, None, reference),
+            "placement": robot.placement(q, robot.link_frames),
+            "velocity": robot.velocity(q, v, robot.link_frames, reference),
+            "jacobian": robot.jacobian(q, robot.link_frames, reference),
+            "acceleration": robot.acceleration(q, v, a, robot.link_frames, reference),
         }
         for f, frame in enumerate(f"link:{name}" for name in robot.link_names):
             alone = {

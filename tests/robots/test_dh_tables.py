@@ -9,7 +9,6 @@ from urdfkin.dh.make import dh_table
 from urdfkin.dh.noise import left_out
 from urdfkin.loading import load
 from urdfkin.roundings import EPS
-from urdfkin.tables import verified
 
 #: Tables of each robot that is checked in the fast subset.
 FAST = {"ur5", "panda", "xarm7", "kinova", "so101", "tiago"}
@@ -26,7 +25,7 @@ def test_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long_row(name: st
     for leaf in robot.tree.leaves():
         tip = robot.tree.links[leaf]
         table = dh_table(robot.tree, tip, root, convention)
-        check = verified(robot, table, samples=10)
+        check = robot.verifier.table(table, samples=10)
         assert check is not None
         assert check.agrees
         assert max(check.units.values()) <= 20.0 + left_out(robot.chain(tip, root)) / EPS

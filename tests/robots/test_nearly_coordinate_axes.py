@@ -108,7 +108,7 @@ def test_the_two_differ_by_the_tilt_and_urdfkin_is_the_one_that_read_the_file(ki
     tilt = 1e-12
     robot = loaded(text(kind, near(0.99 * tilt, seed)))
     ours = robot.placement([2.0], "l1")
-    theirs = robot.oracle(None).placements(np.array([[2.0]]), ["l1"])[0, 0]
+    theirs = robot.verifier.oracle().placements(np.array([[2.0]]), ["l1"])[0, 0]
     assert 0.1 * tilt < np.abs(ours - theirs).max() < 2.0 * tilt
     # Twice as long, the same direction is no longer taken for a coordinate axis: the two agree with ours.
     doubled = loaded(text(kind, 2.0 * near(0.99 * tilt, seed)))
@@ -165,7 +165,7 @@ def test_a_slip_larger_than_the_tilts_allow_is_caught_behind_them_and_any_slip_b
         slipped(6.0 * allowed).placement(q, "l4")
     with pytest.raises(urdfkin.VerificationError):
         slipped(100.0 * 24.0 * EPS).placement(q, "l2")  # Pinocchio's axes on this path are the file's
-    slipped(0.0).placements(q)
+    slipped(0.0).placement(q, robot.link_frames)
 
 
 def test_the_tilt_is_read_from_the_text_and_not_from_the_tree_under_test() -> None:

@@ -22,7 +22,7 @@ ELBOW_LINKS = ("base", "trunk", "upper_arm", "elbow_link", "forearm", "wrist_pit
 
 
 def w_of_links() -> FloatArray:
-    velocities = robot("elbow").velocities(ELBOW.q, ELBOW.v, ELBOW_LINKS)
+    velocities = robot("elbow").velocity(ELBOW.q, ELBOW.v, ELBOW_LINKS)
     return velocities[:, 3:]
 
 

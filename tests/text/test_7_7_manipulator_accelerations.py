@@ -33,7 +33,7 @@ def test_7_126_the_acceleration_is_J_a_and_the_jacobians_rate_times_v(moving: Mo
 
 def test_7_127_angular_velocity_goes_from_link_to_link() -> None:
     for moving, turning in ((ELBOW, [True] * 6), (POLAR, [True, False])):
-        w = robot(moving.name).velocities(moving.q, moving.v, LINKS[moving.name])[:, 3:]
+        w = robot(moving.name).velocity(moving.q, moving.v, LINKS[moving.name])[:, 3:]
         before = np.zeros(3)
         for i, turns in enumerate(turning, start=1):
             assert close(w[i - 1], before + joint_angular_velocity(moving.axis(i), moving.v[i - 1], turns))
@@ -52,7 +52,7 @@ def test_7_128_and_so_does_linear_velocity() -> None:
 
 
 def test_7_129_angular_acceleration_gains_a_term_where_a_turning_link_carries_an_axis() -> None:
-    alphas = robot("elbow").accelerations(ELBOW.q, ELBOW.v, ELBOW.a, LINKS["elbow"])[:, 3:]
+    alphas = robot("elbow").acceleration(ELBOW.q, ELBOW.v, ELBOW.a, LINKS["elbow"])[:, 3:]
     before = np.zeros(3)
     for i in range(1, 7):
         z = ELBOW.axis(i)

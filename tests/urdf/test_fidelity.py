@@ -10,8 +10,8 @@ import pytest
 
 import urdfkin
 from tests.lint.cases.arm import LIMIT, arm, fixed
-from urdfkin.call import NotVerifiedWarning
 from urdfkin.robot import Robot
+from urdfkin.verification.verifier import NotVerifiedWarning
 
 TIP = "link:tool"
 

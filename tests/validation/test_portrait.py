@@ -20,7 +20,7 @@ from urdfkin.validation.outcome import Verdict
 
 def test_the_chains_of_a_catalogues_robot_are_its_limbs_checked_in_both_conventions() -> None:
     robot = urdfkin.load("talos")
-    chains = chains_of(robot, robot.oracle(None))
+    chains = chains_of(robot, robot.verifier.oracle())
     assert [chain["limb"] for chain in chains] == ["left_arm", "right_arm", "left_leg", "right_leg", "head"]
     for chain in chains:
         assert chain["samples"] >= 10

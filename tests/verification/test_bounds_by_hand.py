@@ -11,6 +11,7 @@ from urdfkin.tree import FloatArray
 from urdfkin.verification import bounds
 from urdfkin.verification.bounds import Bound
 from urdfkin.verification.magnitudes import Magnitudes
+from urdfkin.verification.quantities import ACCELERATION, JACOBIAN, JACOBIAN_RATE, PLACEMENT, VELOCITY
 
 #: A turning joint, one that slides twice as far as the coordinate before it says.
 ARM = """<robot name="r">
@@ -49,8 +50,8 @@ def columns(bound: Bound) -> tuple[FloatArray, FloatArray, float]:
     return scale[0], scale[3], float(bound.k.ravel()[0])
 
 
-def test_a_placement_is_held_to_the_path_and_its_rotation_to_one() -> None:
-    bound = bounds.placement_bound(sizes())
+def test_a_placement_is_held_to_the_path_and_its_rotation_to_one(plan: Plan) -> None:
+    bound = PLACEMENT.bound(plan, sizes(), None)
     expected = np.array([[1, 1, 1, P], [1, 1, 1, P], [1, 1, 1, P], [0, 0, 0, 0]], dtype=np.float64)
     assert (bound.scale[0, 0] == expected).all()
     assert bound.k.ravel().tolist() == [24.0 * JOINTS]
@@ -59,8 +60,8 @@ def test_a_placement_is_held_to_the_path_and_its_rotation_to_one() -> None:
 @pytest.mark.parametrize(
     ("reference", "linear", "factors"), [(ALIGNED, VEL, 2), (LOCAL, VEL, 3), (WORLD, VEL + W * P, 3)]
 )
-def test_a_velocity_has_two_factors(reference: Reference, linear: float, factors: int) -> None:
-    assert six(bounds.velocity_bound(sizes(), reference)) == (linear, W, 24.0 * JOINTS * factors)
+def test_a_velocity_has_two_factors(plan: Plan, reference: Reference, linear: float, factors: int) -> None:
+    assert six(VELOCITY.bound(plan, sizes(), reference)) == (linear, W, 24.0 * JOINTS * factors)
 
 
 @pytest.mark.parametrize(
@@ -71,42 +72,48 @@ def test_a_velocity_has_two_factors(reference: Reference, linear: float, factors
         (WORLD, ACC + 2 * W * VEL + (ALPHA + W * W) * P, 4),
     ],
 )
-def test_an_acceleration_has_three(reference: Reference, linear: float, factors: int) -> None:
-    assert six(bounds.acceleration_bound(sizes(), reference)) == (linear, ALPHA, 24.0 * JOINTS * factors)
+def test_an_acceleration_has_three(plan: Plan, reference: Reference, linear: float, factors: int) -> None:
+    assert six(ACCELERATION.bound(plan, sizes(), reference)) == (linear, ALPHA, 24.0 * JOINTS * factors)
 
 
 @pytest.mark.parametrize(("reference", "factors"), [(ALIGNED, 2), (LOCAL, 3), (WORLD, 3)])
 def test_a_jacobian_has_two(plan: Plan, reference: Reference, factors: int) -> None:
-    linear, angular, k = columns(bounds.jacobian_bound(plan, sizes(), reference))
+    linear, angular, k = columns(JACOBIAN.bound(plan, sizes(), reference))
     assert (linear.tolist(), angular.tolist(), k) == ([P, 3.0], [1.0, 0.0], 24.0 * JOINTS * factors)
 
 
 @pytest.mark.parametrize(("reference", "again", "factors"), [(ALIGNED, 1, 3), (LOCAL, 2, 4), (WORLD, 1, 4)])
 def test_its_rate_has_three(plan: Plan, reference: Reference, again: int, factors: int) -> None:
-    linear, angular, k = columns(bounds.jacobian_rate_bound(plan, sizes(), reference))
+    linear, angular, k = columns(JACOBIAN_RATE.bound(plan, sizes(), reference))
     assert linear.tolist() == [again * W * P + VEL, 3.0 * again * W]
     assert angular.tolist() == [again * W, 0.0]
     assert k == 24.0 * JOINTS * factors
 
 
 def test_rates_of_angles_grow_as_the_square_of_the_distance_from_the_singularity(plan: Plan) -> None:
+    def euler(apart: float) -> Bound:
+        jacobian = JACOBIAN.bound(plan, sizes(), ALIGNED)
+        return bounds.euler_jacobian_bound(jacobian, sizes(), np.array([[apart]]))
+
     delta = EPS * 24.0 * JOINTS
     for apart in (1.0, 1e-3, 1e-6):
-        scale = bounds.euler_jacobian_bound(plan, sizes(), np.array([[apart]])).scale[0, 0]
+        scale = bounds.euler_jacobian_bound(
+            JACOBIAN.bound(plan, sizes(), ALIGNED), sizes(), np.array([[apart]])
+        ).scale[0, 0]
         s = apart - delta
         assert (scale[:3] == [P, 3.0]).all()
         assert scale[[3, 5], 0] == pytest.approx(1.5 / s**2, rel=1e-15)
         assert scale[4, 0] == pytest.approx(1.0 / s, rel=1e-15)
         assert (scale[3:, 1] == 0.0).all()
-    hidden = bounds.euler_jacobian_bound(plan, sizes(), np.array([[delta]]))
+    hidden = euler(delta)
     assert not np.isfinite(hidden.scale[0, 0, 3:, 0]).any()
     assert bounds.nearest_singularity(plan) == 4.0 * delta
 
 
 def test_rates_of_a_quaternion_are_held_to_those_of_the_jacobian(plan: Plan) -> None:
     bound, jacobian = (
-        bounds.quaternion_jacobian_bound(plan, sizes()),
-        bounds.jacobian_bound(plan, sizes(), ALIGNED),
+        bounds.quaternion_jacobian_bound(JACOBIAN.bound(plan, sizes(), ALIGNED)),
+        JACOBIAN.bound(plan, sizes(), ALIGNED),
     )
     assert (bound.scale[0, 0, :6] == jacobian.scale[0, 0]).all()
     assert (bound.scale[0, 0, 6] == jacobian.scale[0, 0, 5]).all()
@@ -116,5 +123,5 @@ def test_rates_of_a_quaternion_are_held_to_those_of_the_jacobian(plan: Plan) -> 
 def test_a_tilt_adds_twice_itself_to_each_factor(plan: Plan) -> None:
     tilt = 1e-13
     k = 24.0 * JOINTS + 2.0 * tilt / EPS
-    assert six(bounds.velocity_bound(sizes(tilt), LOCAL))[2] == 3.0 * k
-    assert columns(bounds.jacobian_bound(plan, sizes(tilt), ALIGNED))[2] == 2.0 * k
+    assert six(VELOCITY.bound(plan, sizes(tilt), LOCAL))[2] == 3.0 * k
+    assert columns(JACOBIAN.bound(plan, sizes(tilt), ALIGNED))[2] == 2.0 * k

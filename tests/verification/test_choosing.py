@@ -9,17 +9,16 @@ import pytest
 
 import urdfkin
 from tests.laws.subjects import state
-from urdfkin import checks
 from urdfkin.asked import Rows
 from urdfkin.errors import InputError
 from urdfkin.oracle import Oracle
 from urdfkin.recursion.base import BaseMotion
 from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray
-from urdfkin.verification import choosing
-from urdfkin.verification.bounds import Quantity
+from urdfkin.verification import choosing, verifier
 from urdfkin.verification.certificate import Certificate
 from urdfkin.verification.choosing import SAMPLE, Verify, parts
+from urdfkin.verification.quantities import PLACEMENT, Quantity
 
 #: Numbers of a part: one configuration at a time, a few, and all.
 SIZES = (1, 200, 10**9)
@@ -30,15 +29,15 @@ MARK = 0.123456
 
 def calls(
     robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: BaseMotion | None, verify: Verify
-) -> dict[Quantity, Callable[[], FloatArray]]:
+) -> dict[str, Callable[[], FloatArray]]:
     """One call for each quantity; two of them are of several frames."""
     asked = {"base": base, "verify": verify}
     return {
-        Quantity.PLACEMENT: lambda: robot.placements(q, FRAMES, **asked),  # type: ignore[arg-type]
-        Quantity.VELOCITY: lambda: robot.velocity(q, v, FRAMES[0], "local", **asked),  # type: ignore[arg-type]
-        Quantity.JACOBIAN: lambda: robot.jacobian(q, FRAMES[0], "world", **asked),  # type: ignore[arg-type]
-        Quantity.JACOBIAN_RATE: lambda: robot.jacobian_rate(q, v, FRAMES[0], **asked),  # type: ignore[arg-type]
-        Quantity.ACCELERATION: lambda: robot.accelerations(q, v, a, FRAMES, "world", **asked),  # type: ignore[arg-type]
+        "placement": lambda: robot.placement(q, FRAMES, **asked),  # type: ignore[arg-type]
+        "velocity": lambda: robot.velocity(q, v, FRAMES[0], "local", **asked),  # type: ignore[arg-type]
+        "jacobian": lambda: robot.jacobian(q, FRAMES[0], "world", **asked),  # type: ignore[arg-type]
+        "jacobian rate": lambda: robot.jacobian_rate(q, v, FRAMES[0], **asked),  # type: ignore[arg-type]
+        "acceleration": lambda: robot.acceleration(q, v, a, FRAMES, "world", **asked),  # type: ignore[arg-type]
     }
 
 
@@ -63,7 +62,7 @@ def panda() -> Robot:
 @pytest.fixture
 def fresh(panda: Robot) -> Robot:
     """The same with an empty ledger; Pinocchio's models are kept."""
-    panda.ledger = type(panda.ledger)()
+    panda.verifier.ledger = type(panda.verifier.ledger)()
     panda._prepared.clear()
     return panda
 
@@ -71,17 +70,17 @@ def fresh(panda: Robot) -> Robot:
 @pytest.fixture
 def lies(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pinocchio is off by a millionth where the finger stands at the mark, and by more where it is beyond."""
-    right = checks.pinocchios
+    right = verifier.pinocchios
 
     def wrong(quantity: Quantity, oracle: Oracle, asked: Rows) -> FloatArray:
         theirs, finger = right(quantity, oracle, asked), asked.inputs[0][:, 7]
         size = np.where(np.abs(finger - MARK) < 1e-3, 1e-6 + np.abs(finger - MARK), 0.0)
         # Numbers that must agree exactly stay as they are: wherever they do not, there is nothing worse.
-        rows = theirs[..., :3, :] if quantity is Quantity.PLACEMENT else theirs
+        rows = theirs[..., :3, :] if quantity is PLACEMENT else theirs
         rows *= 1.0 + size.reshape(-1, *[1] * (theirs.ndim - 1))
         return theirs
 
-    monkeypatch.setattr(checks, "pinocchios", wrong)
+    monkeypatch.setattr(verifier, "pinocchios", wrong)
 
 
 BATCHES = [
@@ -132,13 +131,13 @@ def test_the_certificate_does_not_depend_on_the_parts(
     q, v, a = batch(fresh, shape)
     for size in SIZES:
         monkeypatch.setattr(choosing, "_AT_A_TIME", size)
-        fresh.ledger = type(fresh.ledger)()
+        fresh.verifier.ledger = type(fresh.verifier.ledger)()
         for compute in calls(fresh, q, v, a, motion, True).values():
             compute()
         found.append(fresh.certificate())
     assert found[0] == found[1] == found[2]
     n = int(np.prod(shape))
-    several = (Quantity.PLACEMENT, Quantity.ACCELERATION)
+    several = ("placement", "acceleration")
     counts = {line.quantity: line.checked for line in found[0].lines}
     assert counts == {quantity: n * (3 if quantity in several else 1) for quantity in counts}
     assert len(counts) == 5
@@ -156,7 +155,7 @@ def test_of_a_large_batch_a_sample_is_checked_and_the_rest_stated(
     for compute in calls(fresh, q, v, a, motion, "sample").values():
         compute()
     certificate = fresh.certificate()
-    frames = {Quantity.PLACEMENT: 3, Quantity.ACCELERATION: 3}
+    frames = {"placement": 3, "acceleration": 3}
     for line in certificate.lines:
         of = frames.get(line.quantity, 1)
         assert (line.checked, line.unchecked) == (SAMPLE * of, (250 - SAMPLE) * of)

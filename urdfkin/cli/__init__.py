@@ -16,16 +16,15 @@ from urdfkin.cli import streams
 from urdfkin.cli.crash import run
 from urdfkin.cli.door import guard
 from urdfkin.errors import UnknownNameError
+from urdfkin.verification.quantities import by_command
 
-#: Command name -> (module that holds `command`, one-line summary), in the order of the help page.
-COMMANDS: dict[str, tuple[str, str]] = {
+#: Command name -> (module that holds `command`, one-line summary), in the order of the help page, before and
+#: after the commands that compute a quantity.
+_BEFORE: dict[str, tuple[str, str]] = {
     "robots": ("urdfkin.cli.robots", "robots that can be called by a short name"),
     "info": ("urdfkin.cli.info", "joints, limits, frames and coordinates of a robot"),
-    "placement": ("urdfkin.cli.placement", "pose of a frame"),
-    "velocity": ("urdfkin.cli.velocity", "velocity of a frame"),
-    "jacobian": ("urdfkin.cli.jacobian", "velocity Jacobian of a frame"),
-    "jacobian-rate": ("urdfkin.cli.jacobian_rate", "rate of a frame's velocity Jacobian"),
-    "acceleration": ("urdfkin.cli.acceleration", "classical acceleration of a frame"),
+}
+_AFTER: dict[str, tuple[str, str]] = {
     "dh": ("urdfkin.cli.dh", "Denavit-Hartenberg tables, checked, compared, in many forms"),
     "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
     "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),
@@ -35,6 +34,13 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "view": ("urdfkin.cli.view", "a robot in a browser tab, with sliders and arrows"),
     "compare": ("urdfkin.cli.compare", "what changed between two validations"),
 }
+#: The module that makes a command of a row of the quantities' table.
+_QUANTITY = "urdfkin.cli.quantity"
+
+
+def commands() -> dict[str, tuple[str, str]]:
+    """Every command's module and summary."""
+    return _BEFORE | {name: (_QUANTITY, row.summary) for name, row in by_command().items()} | _AFTER
 
 
 class LazyGroup(click.Group):
@@ -42,26 +48,28 @@ class LazyGroup(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names in the order of the table, which is the order of the work."""
-        return list(COMMANDS)
+        return list(commands())
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import one command's file."""
-        if cmd_name not in COMMANDS:
+        if (found := commands().get(cmd_name)) is None:
             return None
-        return cast("click.Command", importlib.import_module(COMMANDS[cmd_name][0]).command)
+        module = importlib.import_module(found[0])
+        made = module.command_of(by_command()[cmd_name]) if found[0] == _QUANTITY else module.command
+        return cast("click.Command", made)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """As click does, but an unknown command offers the nearest ones."""
-        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            raise UnknownNameError("command", args[0], COMMANDS)
+        if args and args[0] not in commands() and not args[0].startswith("-"):
+            raise UnknownNameError("command", args[0], commands())
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The table of commands, from the summaries alone."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
+            formatter.write_dl([(name, summary) for name, (_, summary) in commands().items()])
 
 
 def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.door import say
-from urdfkin.cli.output import SIX, check_line, console, write_file
+from urdfkin.cli.output import check_line, console, write_file
 from urdfkin.cli.tables import print_named
 from urdfkin.printable import csv_cell, json_text
+from urdfkin.verification.quantities import SIX
 
 if TYPE_CHECKING:
     from urdfkin.recursion.breakdown import AccelerationBreakdown

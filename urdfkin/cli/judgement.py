@@ -52,7 +52,7 @@ def _judged(
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
     from urdfkin.judge import judge  # noqa: PLC0415
-    from urdfkin.lint import UrdfWarning  # noqa: PLC0415
+    from urdfkin.lint import UrdfWarning  # noqa: PLC0415  keeps --help fast
     from urdfkin.loading import load  # noqa: PLC0415
     from urdfkin.verification.sampling import draw_base  # noqa: PLC0415
 

@@ -28,11 +28,9 @@ if TYPE_CHECKING:
 
     from urdfkin.tree import FloatArray
     from urdfkin.verification.certificate import Certificate
+    from urdfkin.verification.quantities import Quantity
 
 FORMATS = ("table", "json", "csv", "npy")
-SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
-#: Quantities with a column for each rate.
-MATRICES = ("jacobian", "jacobian rate")
 #: Columns beyond which a table gets no wider: padding takes memory.
 _WIDEST = 10_000
 #: How many samples of a batch a table shows.
@@ -115,7 +113,7 @@ def _umask() -> int:
 
 def emit(
     inputs: Inputs,
-    quantity: str,
+    quantity: Quantity,
     reference: str | None,
     result: FloatArray,
     format_: str,
@@ -162,23 +160,19 @@ def exit_code(certificate: Certificate) -> int:
 
 
 def _as_json(
-    inputs: Inputs, quantity: str, reference: str | None, result: FloatArray, certificate: Certificate
+    inputs: Inputs, quantity: Quantity, reference: str | None, result: FloatArray, certificate: Certificate
 ) -> bytes:
     document: dict[str, Any] = {
         "robot": inputs.robot.name,
         "source": inputs.robot.source,
-        "quantity": quantity,
+        "quantity": quantity.name,
         "frame": inputs.frame,
         "reference": reference,
-        "rows": list(SIX) if quantity != "placement" else None,
+        "rows": list(quantity.labels) or None,
         "coordinates": list(inputs.robot.coordinate_names),
         "rates": list(inputs.robot.rate_names),
-        "q": inputs.q.tolist(),
     }
-    if quantity in ("velocity", "jacobian rate", "acceleration"):
-        document["v"] = inputs.v.tolist()
-    if quantity == "acceleration":
-        document["a"] = inputs.a.tolist()
+    document |= {letter: getattr(inputs, letter).tolist() for letter in quantity.inputs}
     document["result"] = result.tolist()
     document["verified"] = certificate.verified
     document["check"] = check_line(certificate)
@@ -186,18 +180,18 @@ def _as_json(
 
 
 def _as_csv(
-    inputs: Inputs, quantity: str, reference: str | None, result: FloatArray, certificate: Certificate
+    inputs: Inputs, quantity: Quantity, reference: str | None, result: FloatArray, certificate: Certificate
 ) -> bytes:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    if quantity in MATRICES:
+    if quantity.columns:
         writer.writerow(["sample", "row", *map(csv_cell, inputs.robot.rate_names)])
         for k, J in enumerate(result):
             writer.writerows(
-                [k, row, *map(repr, values)] for row, values in zip(SIX, J.tolist(), strict=True)
+                [k, row, *map(repr, values)] for row, values in zip(quantity.labels, J.tolist(), strict=True)
             )
     else:
-        names = SIX if quantity != "placement" else [f"T{i}{j}" for i in range(4) for j in range(4)]
+        names = quantity.labels or [f"T{i}{j}" for i in range(4) for j in range(4)]
         writer.writerow(["sample", *names])
         writer.writerows(
             [k, *map(repr, row)] for k, row in enumerate(result.reshape(len(result), -1).tolist())
@@ -206,7 +200,7 @@ def _as_csv(
 
 
 def _as_npy(
-    inputs: Inputs, quantity: str, reference: str | None, result: FloatArray, certificate: Certificate
+    inputs: Inputs, quantity: Quantity, reference: str | None, result: FloatArray, certificate: Certificate
 ) -> bytes:
     import numpy as np  # noqa: PLC0415
 
@@ -219,17 +213,17 @@ def _as_npy(
 
 
 def _print_table(
-    inputs: Inputs, quantity: str, reference: str | None, result: FloatArray, certificate: Certificate
+    inputs: Inputs, quantity: Quantity, reference: str | None, result: FloatArray, certificate: Certificate
 ) -> None:
     out = console()
     where = f", {reference}" if reference else ""
-    out.print(f"{inputs.robot.name}: {quantity} of {inputs.frame}{where}", style="bold")
+    out.print(f"{inputs.robot.name}: {quantity.name} of {inputs.frame}{where}", style="bold")
     for k, value in enumerate(result[:_SHOWN]):
         if len(result) > 1:
             out.print(f"sample {k}")
-        if quantity in MATRICES:
+        if quantity.columns:
             rows = zip(inputs.robot.rate_names, *value.tolist(), strict=True)
-            print_named(out, ["joint", *SIX], rows)
+            print_named(out, ["joint", *quantity.labels], rows)
         else:
             out.print(_table(quantity, value))
     if len(result) > _SHOWN:
@@ -237,12 +231,12 @@ def _print_table(
     out.print(check_line(certificate), style="green" if certificate.verified else "bold yellow")
 
 
-def _table(quantity: str, value: FloatArray) -> Table:
-    if quantity == "placement":
+def _table(quantity: Quantity, value: FloatArray) -> Table:
+    if not quantity.units:
         return make_table(
             ["axis of the world", "x of frame", "y of frame", "z of frame", "position [m]"],
             ((axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)),
         )
-    linear, angular = ("m/s", "rad/s") if quantity == "velocity" else ("m/s^2", "rad/s^2")
-    rows = zip((f"linear [{linear}]", f"angular [{angular}]"), value.reshape(2, 3).tolist(), strict=True)
+    names = [f"{name} [{unit}]" for name, unit in quantity.units.items()]
+    rows = zip(names, value.reshape(-1, 3).tolist(), strict=True)
     return make_table(["", "x", "y", "z"], ((name, *row) for name, row in rows))

@@ -32,7 +32,6 @@ from urdfkin.kinematics import equations as eq
 from urdfkin.oracle_base import BaseNumbers
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray, JointKind, KinematicTree
-from urdfkin.verification.bounds import Quantity
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,17 +194,30 @@ def _free_columns(moved: State, kind: JointKind, at: int) -> tuple[Column, ...]:
 Six = tuple[Number, ...]
 
 
-def values(motion: Motion, link: int, quantity: Quantity, reference: Reference) -> NDArray[np.object_]:
-    """The numbers of one quantity of one link, in the shape in which `Robot` hands them out."""
+def placement_values(motion: Motion, link: int) -> NDArray[np.object_]:
+    """(4, 4) T_world_link, as `Robot` hands it out."""
     s = motion.states[link]
-    if quantity is Quantity.PLACEMENT:
-        return _array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
-    if quantity is Quantity.VELOCITY:
-        return _array(velocity(s, reference))
-    if quantity is Quantity.ACCELERATION:
-        return _array(acceleration(s, reference))
-    columns = jacobian if quantity is Quantity.JACOBIAN else jacobian_rate
-    return _array(columns(motion, link, reference)).reshape(motion.nv, 6).T
+    return _array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
+
+
+def velocity_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+    """(6,), likewise."""
+    return _array(velocity(motion.states[link], reference))
+
+
+def acceleration_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+    """(6,), likewise."""
+    return _array(acceleration(motion.states[link], reference))
+
+
+def jacobian_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+    """(6, nv), likewise."""
+    return _array(jacobian(motion, link, reference)).reshape(motion.nv, 6).T
+
+
+def jacobian_rate_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+    """(6, nv), likewise."""
+    return _array(jacobian_rate(motion, link, reference)).reshape(motion.nv, 6).T
 
 
 def _array(numbers: Sequence[Any]) -> NDArray[np.object_]:

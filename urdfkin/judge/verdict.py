@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from urdfkin.asked import BaseRows
 from urdfkin.call import Call
-from urdfkin.checks import bound_of, pinocchios, urdfkins
 from urdfkin.errors import InputError
 from urdfkin.exact.decimals import read_exact
-from urdfkin.exact.recursion import move, on_base, values
+from urdfkin.exact.recursion import move, on_base
 from urdfkin.exact.vectors import exact, mp
 from urdfkin.motion.representation import QUATERNION, analytical_jacobian
 from urdfkin.oracle_base import BaseNumbers, davenport
@@ -31,7 +30,6 @@ from urdfkin.rotation.quaternion import quaternion_of
 from urdfkin.roundings import EPS, LEAST_UNIT
 from urdfkin.tree import FloatArray
 from urdfkin.verification.bounds import (
-    Quantity,
     euler_jacobian_bound,
     nearest_singularity,
     quaternion_jacobian_bound,
@@ -39,11 +37,11 @@ from urdfkin.verification.bounds import (
 )
 from urdfkin.verification.line_of_nodes import euler_jacobian, quaternion_jacobian
 from urdfkin.verification.magnitudes import magnitudes
+from urdfkin.verification.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, walked
 from urdfkin.verification.sampling import Samples, draw
+from urdfkin.verification.verifier import bound_of, pinocchios, urdfkins
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: What is judged in each reference.
-_IN_REFERENCES = Quantity.VELOCITY, Quantity.JACOBIAN, Quantity.JACOBIAN_RATE, Quantity.ACCELERATION
 _FIFTY_DIGITS = np.vectorize(mp.mpf, otypes=[object])
 #: The numbers of an orientation, by what a line calls them.
 _REPRESENTATIONS = {
@@ -79,7 +77,7 @@ class Line:
         pinocchio: Pinocchio's.
     """
 
-    quantity: Quantity
+    quantity: str
     reference: str
     numbers: int
     urdfkin: Errors
@@ -121,7 +119,7 @@ class Judgement:
             "moving_base": self.moving_base,
             "lines": [
                 {
-                    "quantity": line.quantity.value,
+                    "quantity": line.quantity,
                     "reference": line.reference or None,
                     "numbers": line.numbers,
                     "urdfkin": {"worst": line.urdfkin.worst, "typical": line.urdfkin.typical},
@@ -171,8 +169,10 @@ class _Work:
             raise InputError(
                 f"base is one, or one for each of {len(x.q)} samples", found=f"{base.batch_shape}"
             )
-        self.oracle = robot.oracle(base)
-        self.part = Call(robot, None, _ALIGNED, base, x.q, x.v, x.a).part(slice(0, len(x.q)))
+        self.oracle = robot.verifier.oracle(base)
+        self.part = Call(robot.tree, robot.plan, robot.link_frames, _ALIGNED, base, (x.q, x.v, x.a)).part(
+            slice(0, len(x.q))
+        )
         self.links = range(len(robot.tree.links))
         joints, moves = read_exact(robot.urdf, robot.tree), self.part.asked.base
         self.motions = [
@@ -186,39 +186,42 @@ class _Work:
         ]
 
     def lines(self) -> Iterator[Line]:
-        """Quantity by quantity."""
-        yield _line(Quantity.PLACEMENT, "", [self._compared(Quantity.PLACEMENT, _ALIGNED)])
-        for reference in Reference:
-            for quantity in _IN_REFERENCES:
-                yield _line(quantity, reference.name.lower(), [self._compared(quantity, reference)])
+        """Quantity by quantity, reference by reference."""
+        for reference in (None, *Reference):
+            for row in walked():
+                if row.exact is not None and reference in row.references:
+                    name = "" if reference is None else reference.name.lower()
+                    yield _line(row.name, name, [self._compared(row, reference)])
         for name, representations in _REPRESENTATIONS.items():
-            yield _line(Quantity.ANALYTICAL_JACOBIAN, name, list(self._analytical(representations)))
+            yield _line(ANALYTICAL_JACOBIAN.name, name, list(self._analytical(representations)))
 
-    def _compared(self, quantity: Quantity, reference: Reference) -> _Compared:
+    def _compared(self, row: Quantity, reference: Reference | None) -> _Compared:
+        reference = _ALIGNED if reference is None else reference
         asked = self.part.asked._replace(reference=reference)
         part = self.part._replace(reference=reference, asked=asked)
-        ours, theirs = urdfkins(quantity, part), pinocchios(quantity, self.oracle, asked)
-        scale = np.broadcast_to(bound_of(quantity, part).scale, ours.shape)
-        return _Compared(ours, theirs, self._true(quantity, reference).reshape(ours.shape), scale)
+        ours, theirs = urdfkins(row, part), pinocchios(row, self.oracle, asked)
+        scale = np.broadcast_to(bound_of(row, part).scale, ours.shape)
+        return _Compared(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
 
-    def _true(self, quantity: Quantity, reference: Reference) -> NDArray[np.object_]:
+    def _true(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
         """(n, links, ...) as `urdfkins`."""
-        numbers = [
-            [values(motion, link, quantity, reference) for link in self.links] for motion in self.motions
-        ]
-        return np.array(numbers, dtype=object)
+        return np.array(
+            [[row.truth(motion, link, reference) for link in self.links] for motion in self.motions],
+            dtype=object,
+        )
 
     def _analytical(self, representations: Sequence[str]) -> Iterator[_Compared]:
         """Representation by representation, each a list of Jacobians."""
-        poses, J_v = self._compared(Quantity.PLACEMENT, _ALIGNED), self._compared(Quantity.JACOBIAN, _ALIGNED)
+        poses, J_v = self._compared(PLACEMENT, None), self._compared(JACOBIAN, _ALIGNED)
         plan, x = self.part.plan, self.part
         size, nearest = magnitudes(plan, x.q, None, None, x.state), max(NEAREST, nearest_singularity(plan))
+        jacobian = JACOBIAN.bound(plan, size, _ALIGNED)
         R, R_theirs = poses.urdfkin[..., :3, :3], poses.pinocchio[..., :3, :3]
         moving = _moving_columns(J_v.scale)
         R_true, J_true = map(_FIFTY_DIGITS, (poses.true[..., :3, :3], _columns(J_v.true, moving)))
         for name in representations:
             if name == QUATERNION:
-                bound, quat = quaternion_jacobian_bound(plan, size), quaternion_of(R)
+                bound, quat = quaternion_jacobian_bound(jacobian), quaternion_of(R)
                 clear = np.abs(quat[..., 3]) > EPS * result_k(bound, quat.shape[:-1])
                 true = quaternion_jacobian(exact_quaternion(R_true[clear], quat[clear]), J_true[clear])
             else:
@@ -226,7 +229,7 @@ class _Work:
                 true, apart = euler_jacobian(name, R_true[clear], J_true[clear])
                 everywhere = np.ones(clear.shape)
                 everywhere[clear] = apart
-                bound = euler_jacobian_bound(plan, size, everywhere)
+                bound = euler_jacobian_bound(jacobian, size, everywhere)
             ours = analytical_jacobian(name, R[clear], J_v.urdfkin[clear], 0.0)
             theirs = analytical_jacobian(name, R_theirs[clear], J_v.pinocchio[clear], 0.0)
             ours, theirs, scale = (_columns(J, moving[clear]) for J in (ours, theirs, bound.scale[clear]))
@@ -258,7 +261,7 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
     return unit
 
 
-def _line(quantity: Quantity, reference: str, compared: Sequence[_Compared]) -> Line:
+def _line(quantity: str, reference: str, compared: Sequence[_Compared]) -> Line:
     """The errors of both sides in what was compared of one quantity."""
     sides: tuple[list[FloatArray], list[FloatArray]] = [], []
     for ours, theirs, true, scale in compared:

@@ -102,7 +102,7 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
         return
     for k, (quantity, check) in enumerate(x.checks.items()):
-        axes.plot(t, check.units, color=COLOURS[k], linestyle=STYLES[k], label=quantity.value)
+        axes.plot(t, check.units, color=COLOURS[k % 7], linestyle=STYLES[k % 7], label=quantity)
         outside = check.share > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color="#B00020", label="outside the bound")

@@ -7,27 +7,8 @@ from typing import Literal
 
 from urdfkin.report.document import Check, Document, Judged, Judgement, Robot, Units
 from urdfkin.validation.outcome import Verdict
+from urdfkin.verification.quantities import QUANTITIES
 
-#: Quantities as a reader knows them, in the order of a report.
-QUANTITIES = {
-    "placement": "placement",
-    "velocity": "velocity",
-    "jacobian": "Jacobian",
-    "jacobian rate": "Jacobian rate",
-    "acceleration": "acceleration",
-    "joint jacobian": "joint Jacobian",
-    "joint jacobian rate": "joint Jacobian rate",
-    "screws": "data.J",
-}
-#: Column heads short enough for a line of all robots, and the quantities whose worst stands below them.
-COLUMNS = {
-    "place": ("placement",),
-    "vel": ("velocity",),
-    "J": ("jacobian", "joint jacobian"),
-    "J-dot": ("jacobian rate", "joint jacobian rate"),
-    "acc": ("acceleration",),
-    "data.J": ("screws",),
-}
 SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
 #: Worse verdicts first.
 VERDICTS = tuple(verdict.value for verdict in Verdict)
@@ -35,7 +16,7 @@ VERDICTS = tuple(verdict.value for verdict in Verdict)
 
 def quantity_name(quantity: str) -> str:
     """What a reader calls a quantity."""
-    return QUANTITIES.get(quantity, quantity)
+    return QUANTITIES[quantity].title if quantity in QUANTITIES else quantity
 
 
 def check_name(check: Check) -> str:
@@ -87,11 +68,12 @@ def in_order(robot: Robot) -> list[Check]:
 
 
 def columns(robots: Sequence[Robot]) -> dict[str, tuple[str, ...]]:
-    """The columns of `COLUMNS` that any robot fills; a quantity of no column has its own."""
-    found = quantities(robots)
-    known = {name for names in COLUMNS.values() for name in names}
-    heads = {head: names for head, names in COLUMNS.items() if any(name in found for name in names)}
-    return heads | {name: (name,) for name in found if name not in known}
+    """The columns that any robot fills, by their heads; a quantity that is not known has its own."""
+    heads: dict[str, tuple[str, ...]] = {}
+    for name in quantities(robots):
+        head = QUANTITIES[name].head if name in QUANTITIES else name
+        heads[head] = (*heads.get(head, ()), name)
+    return heads
 
 
 def column(robot: Robot, names: Sequence[str]) -> list[Check]:

@@ -63,7 +63,7 @@ class Subject:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
             robot = load(self.source, mimic=self.origin.mimic, root_joint=self.origin.root_joint)
-        robot.origin = self.origin  # what was read here may be the text of a file
+        robot.verifier.origin = self.origin  # what was read here may be the text of a file
         return robot
 
     def load(self) -> Robot:
@@ -73,8 +73,8 @@ class Subject:
             OracleError: a finding says that Pinocchio refuses it or reads another robot.
         """
         robot = self.read()
-        if robot.unverifiable is not None:
-            raise OracleError(robot.unverifiable, where=self.label)
+        if robot.verifier.unverifiable is not None:
+            raise OracleError(robot.verifier.unverifiable, where=self.label)
         return robot
 
 
@@ -143,7 +143,7 @@ def _loaded(chunk: Chunk) -> tuple[Robot, Oracle]:
     robot = chunk.subject.load()
     most = memory.share() if chunk.memory is None else chunk.memory
     memory.demand(robot.tree, CHUNK_SAMPLES + SPECIAL, most)
-    found = robot, robot.oracle(None)
+    found = robot, robot.verifier.oracle()
     _kept[chunk.subject] = found
     return found
 

@@ -14,7 +14,6 @@ from functools import reduce
 import numpy as np
 
 from urdfkin.oracle import Oracle
-from urdfkin.recursion import evaluate
 from urdfkin.recursion.base import STILL_STATE
 from urdfkin.recursion.plan import make_plan
 from urdfkin.reference import Reference
@@ -22,9 +21,9 @@ from urdfkin.robot import Robot
 from urdfkin.tree import FloatArray, KinematicTree, freed
 from urdfkin.validation.clock import Clock
 from urdfkin.validation.tally import Inputs, Key, Tally, tally
-from urdfkin.verification import bounds
-from urdfkin.verification.bounds import Bound, Quantity
+from urdfkin.verification.bounds import Bound
 from urdfkin.verification.magnitudes import magnitudes
+from urdfkin.verification.quantities import SCREWS, walked
 from urdfkin.verification.sampling import Samples
 
 #: How large an array of a block may be, bytes; some ten arrays of this size are there at a time.
@@ -47,7 +46,7 @@ def tallies(robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: 
         for key, part in _Block(*work, frames).tallies():
             found[key] = found[key].beside(part) if key in found else part
     screws = reduce(Tally.beside, _Screws(*work).tallies())
-    return found | {(Quantity.SCREWS, Reference.WORLD.name.lower()): screws}
+    return found | {(SCREWS.name, Reference.WORLD.name.lower()): screws}
 
 
 def frame_bytes(samples: int, rates: int) -> int:
@@ -101,46 +100,21 @@ class _Block(_Work):
         self.joint_names = robot.joint_names[self.joints]
 
     def tallies(self) -> Iterator[tuple[Key, Tally]]:
-        x, oracle, plan, frames = self.x, self.oracle, self.plan, self.frames
-        theirs = self.clock.theirs(oracle.placements, x.q, frames)
-        ours = self.clock.ours(evaluate.placements, plan, x.q)
-        bound = bounds.placement_bound(self.size)
-        yield (Quantity.PLACEMENT, ""), self.tally(ours, theirs, bound, frames)
-        for reference in Reference:
-            name = reference.name.lower()
-            ours = self.clock.ours(evaluate.velocities, plan, x.q, x.v, reference)
-            theirs = self.clock.theirs(oracle.velocities, x.q, x.v, frames, [reference])[:, :, 0]
-            bound = bounds.velocity_bound(self.size, reference)
-            yield (Quantity.VELOCITY, name), self.tally(ours, theirs, bound, frames)
-            ours = self.clock.ours(evaluate.accelerations, plan, x.q, x.v, x.a, reference)
-            theirs = self.clock.theirs(oracle.accelerations, x.q, x.v, x.a, frames, [reference])[:, :, 0]
-            bound = bounds.acceleration_bound(self.size, reference)
-            yield (Quantity.ACCELERATION, name), self.tally(ours, theirs, bound, frames)
-            yield from self._jacobians(reference)
-            yield from self._jacobian_rates(reference)
-
-    def _jacobians(self, reference: Reference) -> Iterator[tuple[Key, Tally]]:
-        q, name = self.x.q, reference.name.lower()
-        ours = self.clock.ours(evaluate.jacobians, self.plan, q, reference)
-        theirs = self.clock.theirs(self.oracle.jacobians, q, self.frames, [reference])[:, :, 0]
-        bound = bounds.jacobian_bound(self.plan, self.size, reference)
-        yield (Quantity.JACOBIAN, name), self.tally(ours, theirs, bound, self.frames)
-        theirs = self.clock.theirs(self.oracle.joint_jacobians, q, [reference], self.joints)[:, :, 0]
-        yield (Quantity.JOINT_JACOBIAN, name), self._of_joints(ours, theirs, bound)
-
-    def _jacobian_rates(self, reference: Reference) -> Iterator[tuple[Key, Tally]]:
-        q, v, name = self.x.q, self.x.v, reference.name.lower()
-        ours = self.clock.ours(evaluate.jacobian_rates, self.plan, q, v, reference)
-        theirs, of_joints = self.clock.theirs(
-            self.oracle.jacobian_rates_of_all, q, v, self.frames, reference, self.joints
-        )
-        bound = bounds.jacobian_rate_bound(self.plan, self.size, reference)
-        yield (Quantity.JACOBIAN_RATE, name), self.tally(ours, theirs, bound, self.frames)
-        yield (Quantity.JOINT_JACOBIAN_RATE, name), self._of_joints(ours, of_joints, bound)
-
-    def _of_joints(self, ours: FloatArray, theirs: FloatArray, bound: Bound) -> Tally:
-        part = Bound(bound.scale[:, self.places], bound.k[:, self.places])
-        return self.tally(ours[:, self.places], theirs, part, self.joint_names)
+        """Quantity by quantity; a joint's is its child link's, for which Pinocchio has another way."""
+        inputs = self.x.q, self.x.v, self.x.a
+        for row in walked():
+            joints = [joint for joint in walked("joints") if joint.compute is row.compute]
+            for reference in row.references:
+                name = reference.name.lower() if reference is not None else ""
+                ours = self.clock.ours(row.ours, self.plan, inputs, reference)
+                theirs = self.clock.theirs(row.theirs, self.oracle, inputs, self.frames, reference)
+                bound = row.bound(self.plan, self.size, reference)
+                yield (row.name, name), self.tally(ours, theirs, bound, self.frames)
+                for joint in joints:
+                    theirs = self.clock.theirs(joint.theirs, self.oracle, inputs, self.joints, reference)
+                    part = Bound(bound.scale[:, self.places], bound.k[:, self.places])
+                    tally = self.tally(ours[:, self.places], theirs, part, self.joint_names)
+                    yield (joint.name, name), tally
 
 
 class _Screws(_Work):
@@ -150,7 +124,7 @@ class _Screws(_Work):
         robot, x = self.robot, self.x
         tree = freed(robot.tree)
         q_free = _leaders_spread(robot.tree, tree, x.q)
-        theirs = self.clock.theirs(self.oracle.screws, x.q).swapaxes(1, 2)
+        theirs = self.clock.theirs(SCREWS.ask, self.oracle, x.q).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
         for block in blocks(len(moving), frame_bytes(len(x.q), tree.nv)):
@@ -164,8 +138,8 @@ class _Screws(_Work):
         plan = make_plan(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
         size = magnitudes(plan, q, *still, STILL_STATE)
-        J = self.clock.ours(evaluate.jacobians, plan, q, Reference.WORLD)
-        bound = bounds.jacobian_bound(plan, size, Reference.WORLD)
+        J = self.clock.ours(SCREWS.ours, plan, (q,), Reference.WORLD)
+        bound = SCREWS.bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
         ours = J[:, frame, :, column].swapaxes(0, 1)

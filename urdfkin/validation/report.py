@@ -20,7 +20,7 @@ from urdfkin.validation.clock import Clock
 from urdfkin.validation.outcome import Outcome, Verdict, outcome
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
 from urdfkin.validation.tally import HISTOGRAM_EDGES, Key, Tally, WorstCase
-from urdfkin.verification.bounds import Quantity
+from urdfkin.verification.quantities import QUANTITIES
 from urdfkin.verification.replay import replay_line
 
 if TYPE_CHECKING:
@@ -77,11 +77,11 @@ class RobotReport:
         """How many of them lie outside their bound."""
         return sum(tally.failed for tally in self.tallies.values())
 
-    def of(self, quantity: Quantity) -> list[Tally]:
+    def of(self, quantity: str) -> list[Tally]:
         """The tallies of one quantity, one a reference."""
-        return [tally for (kind, _), tally in self.tallies.items() if kind is quantity]
+        return [tally for (kind, _), tally in self.tallies.items() if kind == quantity]
 
-    def worst(self, quantity: Quantity) -> float | None:
+    def worst(self, quantity: str) -> float | None:
         """The largest disagreement of a quantity in eps * scale, None if it was not compared."""
         return max((tally.worst for tally in self.of(quantity)), default=None)
 
@@ -117,7 +117,7 @@ class RobotReport:
         tally = self.tallies[key]
         case = tally.case
         return {
-            "quantity": quantity.value,
+            "quantity": quantity,
             "reference": reference or None,
             "results": tally.results,
             "failed": tally.failed,
@@ -127,7 +127,7 @@ class RobotReport:
             "share_of_bound": _finite(tally.share),
             "bound": [_finite(k) for k in tally.bounds],
             "histogram": list(tally.histogram),
-            "subjects": _subjects(quantity),
+            "subjects": QUANTITIES[quantity].of,
             "worst_by_subject": [_finite(units) for units in tally.by_frame],
             "worst_case": None
             if case is None
@@ -143,35 +143,17 @@ class RobotReport:
         }
 
 
-#: The command of a quantity, where it is not the quantity's own name.
-_COMMANDS = {
-    Quantity.JOINT_JACOBIAN: "jacobian",
-    Quantity.SCREWS: "jacobian",
-    Quantity.JACOBIAN_RATE: "jacobian-rate",
-    Quantity.JOINT_JACOBIAN_RATE: "jacobian-rate",
-}
-
-
-def _subjects(quantity: Quantity) -> str:
-    """What a quantity was compared of."""
-    if quantity is Quantity.SCREWS:
-        return "columns"
-    return "joints" if quantity.startswith("joint ") else "frames"
-
-
 def _finite(units: float) -> float | None:
     """JSON has no infinity: None stands for a result that is no number or must agree exactly and does not."""
     return units if math.isfinite(units) else None
 
 
-def replay(origin: Origin, quantity: Quantity, reference: str, case: WorstCase) -> str:
+def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:
     """The command for one case."""
-    command = _COMMANDS.get(quantity, quantity.value)
-    given = {"placement": "q", "jacobian": "q", "acceleration": "qva"}.get(command, "qv")
+    row = QUANTITIES[quantity]
     # Joints are compared under their plain names, which a link elsewhere may have too.
-    of_a_joint = quantity is Quantity.SCREWS or quantity.startswith("joint ")
-    frame = f"joint:{case.frame}" if of_a_joint else case.frame
-    return replay_line(origin, command, frame, reference, {letter: getattr(case, letter) for letter in given})
+    frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
+    return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import Bound, Quantity, result_k
+from urdfkin.verification.bounds import Bound, result_k
 from urdfkin.verification.worst import worst_of_each
 
 #: Edges of the histogram of disagreements, in eps * scale: ten bins a decade from 0.001 to 100,000.
@@ -150,4 +150,4 @@ def tally(
 
 
 #: What each tally of a robot is about: a quantity and the reference it was taken in.
-Key = tuple[Quantity, str]
+Key = tuple[str, str]

@@ -24,7 +24,6 @@ across robots.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
@@ -35,34 +34,10 @@ from urdfkin.roundings import EPS, LEAST_UNIT, of_joints
 from urdfkin.tree import FloatArray
 from urdfkin.verification.magnitudes import Magnitudes
 
+_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+
 #: A scale beyond the range of doubles is inf; `disagreement` accepts nothing there.
 _BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
-
-
-class Quantity(StrEnum):
-    """What can be checked."""
-
-    PLACEMENT = "placement"
-    VELOCITY = "velocity"
-    JACOBIAN = "jacobian"
-    JACOBIAN_RATE = "jacobian rate"
-    ACCELERATION = "acceleration"
-    ANALYTICAL_JACOBIAN = "analytical jacobian"
-    ACCELERATION_BREAKDOWN = "acceleration breakdown"
-    JOINT_JACOBIAN = "joint jacobian"
-    JOINT_JACOBIAN_RATE = "joint jacobian rate"
-    SCREWS = "screws"
-
-
-#: How many rotated vectors are multiplied in each term of [linear; angular], in LOCAL_WORLD_ALIGNED; what is
-#: not here has the bound of one of these.
-_FACTORS = {
-    Quantity.PLACEMENT: 1,
-    Quantity.VELOCITY: 2,
-    Quantity.JACOBIAN: 2,
-    Quantity.JACOBIAN_RATE: 3,
-    Quantity.ACCELERATION: 3,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,32 +62,32 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     return np.broadcast_to(np.where((k > 0.0) & (k < np.inf), k, np.nan), leading)
 
 
-def roundings(quantity: Quantity, reference: Reference, size: Magnitudes) -> FloatArray:
-    """`k` for each result: its factors, times what each may be off by."""
-    extra = 0 if reference is Reference.LOCAL_WORLD_ALIGNED or quantity is Quantity.PLACEMENT else 1
-    return (_FACTORS[quantity] + extra) * size.roundings
+def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
+    """A scale (n, frames, ...) with `k` for each result: its factors, times what each may be off by."""
+    factors += reference is not _ALIGNED
+    k = factors * size.roundings
+    return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
 
 
-def placement_bound(size: Magnitudes) -> Bound:
+def placement_scale(plan: Plan, size: Magnitudes) -> FloatArray:
     """For (n, frames, 4, 4): the path's length for positions, 1 for rotations, 0 for the last row."""
     scale = np.zeros((*size.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
     scale[..., :3, 3] = size.p[..., None]
-    k = roundings(Quantity.PLACEMENT, Reference.LOCAL_WORLD_ALIGNED, size)
-    return Bound(scale, k[..., None, None])
+    return scale
 
 
 @_BEYOND
-def velocity_bound(size: Magnitudes, reference: Reference) -> Bound:
+def velocity_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
     """For (n, frames, 6)."""
     linear = size.vel
     if reference is Reference.WORLD:
         linear = eq.point_velocity(linear, size.w, size.p)
-    return Bound(_six(linear, size.w), roundings(Quantity.VELOCITY, reference, size)[..., None])
+    return _six(linear, size.w)
 
 
 @_BEYOND
-def acceleration_bound(size: Magnitudes, reference: Reference) -> Bound:
+def acceleration_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
     """For (n, frames, 6). Pinocchio goes through spatial accelerations, which differ by w x vel.
 
     It is that of a breakdown's sum too. There the terms are gathered by joints: v_k z x (v_k z x d_k) and
@@ -125,7 +100,7 @@ def acceleration_bound(size: Magnitudes, reference: Reference) -> Bound:
     linear = size.acc + shared
     if reference is Reference.WORLD:
         linear = eq.point_acceleration(linear + shared, size.alpha, size.w, size.p)
-    return Bound(_six(linear, size.alpha), roundings(Quantity.ACCELERATION, reference, size)[..., None])
+    return _six(linear, size.alpha)
 
 
 def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
@@ -145,16 +120,15 @@ def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 
 
 @_BEYOND
-def jacobian_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
+def jacobian_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
     """For (n, frames, 6, nv): the path's length for turning columns, 1 for sliding ones, 0 for idle ones."""
     turning, sliding = column_weights(plan)
     linear, angular = eq.turning_column(turning, size.p[..., None])
-    scale = _six_rows(linear + sliding, angular)
-    return Bound(scale, roundings(Quantity.JACOBIAN, reference, size)[..., None, None])
+    return _six_rows(linear + sliding, angular)
 
 
 @_BEYOND
-def jacobian_rate_bound(plan: Plan, size: Magnitudes, reference: Reference) -> Bound:
+def jacobian_rate_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
     """For (n, frames, 6, nv).
 
     A frame's turning columns are no longer than its path, and their arms change no faster than its origin
@@ -168,12 +142,11 @@ def jacobian_rate_bound(plan: Plan, size: Magnitudes, reference: Reference) -> B
         column, axis = eq.turning_column(turning, p)
         linear = eq.rate_in_turning_axes(linear, w, column + sliding)
         angular = eq.rate_in_turning_axes(angular, w, axis)
-    scale = _six_rows(linear, angular)
-    return Bound(scale, roundings(Quantity.JACOBIAN_RATE, reference, size)[..., None, None])
+    return _six_rows(linear, angular)
 
 
 @_BEYOND
-def euler_jacobian_bound(plan: Plan, size: Magnitudes, apart: FloatArray) -> Bound:
+def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> Bound:
     """For (n, frames, 6, nv): the positions' rows are those of the Jacobian; it grows near the singularity.
 
     The rates of the outer angles are r . w, that of the middle one u . w, with the reciprocal basis of
@@ -186,26 +159,25 @@ def euler_jacobian_bound(plan: Plan, size: Magnitudes, apart: FloatArray) -> Bou
     products and quotients, on either side) is held by the joint counted more: there is no offset to add here.
 
     Args:
-        plan: The walk.
+        bound: The Jacobian's.
         size: Of the frames.
         apart: (n, frames) s of Pinocchio's rotation.
     """
     s = apart - EPS * size.roundings
     s = np.where(s > 0.0, s, 0.0)  # where rounding hides the singularity nothing is accepted
-    bound = jacobian_bound(plan, size, Reference.LOCAL_WORLD_ALIGNED)
+    scale = bound.scale.copy()
     with np.errstate(divide="ignore"):
-        bound.scale[..., [3, 5], :] *= (1.5 / (s * s))[..., None, None]
-        bound.scale[..., 4, :] *= (1.0 / s)[..., None]
-    return bound
+        scale[..., [3, 5], :] *= (1.5 / (s * s))[..., None, None]
+        scale[..., 4, :] *= (1.0 / s)[..., None]
+    return Bound(scale, bound.k)
 
 
-def quaternion_jacobian_bound(plan: Plan, size: Magnitudes) -> Bound:
+def quaternion_jacobian_bound(bound: Bound) -> Bound:
     """For (n, frames, 7, nv): the positions' rows are those of the Jacobian; there is no singularity.
 
     A row of 4 q q^T is linear in R, off by less than 4.6 delta and at least 2 long, so that q is off by
     2.3 delta, half the product of w and q by (2.3 + 1) / 2 delta of w: less than the Jacobian's two factors.
     """
-    bound = jacobian_bound(plan, size, Reference.LOCAL_WORLD_ALIGNED)
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
 

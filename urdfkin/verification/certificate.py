@@ -10,7 +10,8 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.forking import lock_over_forks
 from urdfkin.recursion.plan import IntArray
 from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import Bound, Quantity, result_k
+from urdfkin.verification.bounds import Bound, result_k
+from urdfkin.verification.quantities import QUANTITIES
 from urdfkin.verification.worst import worst_of_each
 
 #: The reason that certificates give for what nobody wanted checked.
@@ -38,7 +39,7 @@ class VerificationError(UrdfkinError):
 
     def __init__(
         self,
-        quantity: Quantity,
+        quantity: str,
         frame: str,
         reference: str,
         *,
@@ -127,7 +128,7 @@ class Line:
         unchecked: How many results were handed out without a check.
     """
 
-    quantity: Quantity
+    quantity: str
     checked: int
     worst: float
     share: float
@@ -189,7 +190,7 @@ class Account:
         """All results that nobody wanted checked."""
         return self.not_asked_for + sum(int(counts[place]) for counts, place in self.counters)
 
-    def line(self, quantity: Quantity) -> Line:
+    def line(self, quantity: str) -> Line:
         """The same as a certificate has it."""
         found = self.checked
         return Line(quantity, found.results, found.worst, found.share, self.unchecked + self.unwanted)
@@ -199,21 +200,21 @@ class Account:
 class Ledger:
     """Counts what a robot hands out; safe to use from several threads."""
 
-    _accounts: dict[Quantity, Account] = field(default_factory=dict)
+    _accounts: dict[str, Account] = field(default_factory=dict)
     _reasons: dict[str, None] = field(default_factory=dict)
 
-    def account(self, quantity: Quantity) -> Account:
+    def account(self, quantity: str) -> Account:
         """A quantity's account, for those who count often."""
         with _entering:
             return self._accounts.setdefault(quantity, Account())
 
-    def checked(self, quantity: Quantity, comparison: Comparison) -> None:
+    def checked(self, quantity: str, comparison: Comparison) -> None:
         """Enter results that Pinocchio confirmed."""
         account = self.account(quantity)
         with _entering:
             account.checked += comparison
 
-    def unchecked(self, quantity: Quantity, results: int, reason: str | None = None) -> None:
+    def unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
         """Enter results that were handed out without a check, and why; None if nobody wanted one."""
         account = self.account(quantity)
         with _entering:
@@ -227,7 +228,7 @@ class Ledger:
         """What stands in the ledger now."""
         with _entering:
             found = [
-                (quantity, self._accounts[quantity]) for quantity in Quantity if quantity in self._accounts
+                (quantity, self._accounts[quantity]) for quantity in QUANTITIES if quantity in self._accounts
             ]
             reasons = [NOT_ASKED_FOR] if any(account.unwanted for _, account in found) else []
             lines = [account.line(quantity) for quantity, account in found]

@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urdfkin.chain import chain
+from urdfkin.dh.motion import acceleration, jacobian
 from urdfkin.dh.noise import left_out
 from urdfkin.dh.snapping import LARGEST_TOLERANCE, rotation_angle
 from urdfkin.dh.table import DHTable
@@ -38,7 +39,7 @@ from urdfkin.roundings import EPS, of_joints, of_rows
 from urdfkin.tree import FloatArray, KinematicTree
 from urdfkin.verification.sampling import Samples
 
-_ALIGNED = [Reference.LOCAL_WORLD_ALIGNED]
+_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: No length of a table with Hayati rows exceeds so many times the robot's reach (docs/dh.md).
 PROMISED = 10.0
 
@@ -120,8 +121,8 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
     apart = _Apart(
         np.hypot.reduce(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
         rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3]),
-        np.abs(table.jacobian(own_q) - motion.jacobian[..., columns]),
-        _split(np.abs(table.acceleration(own_q, own_v, own_a) - motion.acceleration)),
+        np.abs(jacobian(table, own_q) - motion.jacobian[..., columns]),
+        _split(np.abs(acceleration(table, own_q, own_v, own_a) - motion.acceleration)),
     )
     size = sizes(tree, table, samples)
     slack = _Slack(table, own_q, size)
@@ -209,9 +210,9 @@ def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples
     T = oracle.placements(samples.q, frames)
     R = T[:, 0, :3, :3]
     r = T[:, 1, :3, 3] - T[:, 0, :3, 3]
-    J = oracle.jacobians(samples.q, frames, _ALIGNED)[:, :, 0]
-    vel = oracle.velocities(samples.q, samples.v, frames, _ALIGNED)[:, :, 0]
-    acc = oracle.accelerations(samples.q, samples.v, samples.a, frames, _ALIGNED)[:, :, 0]
+    J = oracle.jacobians(samples.q, frames, _ALIGNED)
+    vel = oracle.velocities(samples.q, samples.v, frames, _ALIGNED)
+    acc = oracle.accelerations(samples.q, samples.v, samples.a, frames, _ALIGNED)
     J_base, J_tip = J[:, 0], J[:, 1]
     J_linear = J_tip[:, :3] - J_base[:, :3] - np.cross(J_base[:, 3:], r[..., None], axis=1)
     J_angular = J_tip[:, 3:] - J_base[:, 3:]

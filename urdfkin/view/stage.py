@@ -28,7 +28,7 @@ class Stage:
     def __init__(self, server: Any, robot: Robot) -> None:
         self._scene, self._server, self.robot = server.scene, server, robot
         tree = robot.tree
-        Ts = robot.placements(robot.neutral(), verify=False)
+        Ts = robot.placement(robot.neutral(), robot.link_frames, verify=False)
         self.reach = float(np.linalg.norm(np.ptp(Ts[:, :3, 3], axis=0))) or 1.0
         self._scene.set_up_direction("+z")
         self._scene.add_grid(

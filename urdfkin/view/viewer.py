@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from urdfkin.configuration import checked
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.frame_motion import FrameMotion, frame_motion
@@ -115,10 +116,10 @@ class Viewer:
     def set_q(self, q: FloatArray) -> None:
         """Put the robot into a configuration and the sliders with it."""
         with self._lock:
-            self.q = self.robot.checked(q, "q").copy()
+            self.q = checked(self.robot.tree, q, "q").copy()
             for at, slider in self.sliders:
                 slider.value = float(np.clip(self.q[at], slider.min, slider.max))
-            self.q = self.robot.checked(q, "q").copy()
+            self.q = checked(self.robot.tree, q, "q").copy()
             self.update()
 
     def _turn(self) -> None:
@@ -151,7 +152,7 @@ class Viewer:
             drawn = self.motion if self.motion.reference is aligned else self._motion(v, a, aligned)
             self.words.content = numbers(self.motion)
             self.stage.show(shapes=self.meshes.value, skeleton=self.skeleton.value, axes=self.axes.value)
-            self.stage.move(self.robot.placements(self.q, verify=False))
+            self.stage.move(self.robot.placement(self.q, self.robot.link_frames, verify=False))
             self._draw(drawn)
 
     def _motion(self, v: FloatArray, a: FloatArray, reference: Reference) -> FrameMotion:
