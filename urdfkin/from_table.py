@@ -1,6 +1,6 @@
-"""From a Denavit-Hartenberg table back to a robot that computes, is checked, and can be written as a URDF.
+"""Whether the URDF that was made of a Denavit-Hartenberg table is the table's.
 
-Pinocchio checks the robot's results against its URDF, which urdfkin wrote. That the URDF is the table's is
+Pinocchio checks a robot's results against its URDF, which urdfkin wrote. That the URDF is the table's is
 checked here, once: Pinocchio's placements of the tip against the products of the table's own matrices (7.64).
 """
 
@@ -11,43 +11,23 @@ import numpy as np
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.to_tree import link_names
 from urdfkin.frame_names import LinkFrame
-from urdfkin.loading import load
-from urdfkin.robot import Robot
 from urdfkin.roundings import EPS, ROW, of_rows, of_rows_read_back
 from urdfkin.tree import FloatArray
-from urdfkin.verification.choosing import Verify
+from urdfkin.verification.sampling import sample
 from urdfkin.verification.tables import TableError
+from urdfkin.verification.verifier import Verifier
 
 #: Configurations that a robot is held against its table in.
 _SAMPLES = 8
 
 
-def robot_from_table(table: DHTable, *, verify: Verify = True) -> Robot:
-    """The robot of a table, by way of its URDF, which is also what Pinocchio checks it against.
-
-    Args:
-        table: Any table.
-        verify: Whether the URDF is held against the table, and every result against Pinocchio's.
-
-    Raises:
-        TableError: the URDF is not the table's.
-
-    Example:
-        >>> from urdfkin.dh import table_from_rows
-        >>> robot = robot_from_table(table_from_rows([[0.4, 0, 0, 0], [0.3, 0, 0, 0]], "standard"))
-        >>> float(robot.placement([0.0, 0.0], "tip")[0, 3])
-        0.7
-    """
-    robot = load(table.to_urdf(), verify=verify)
-    if verify is not False and robot.cannot_verify() is None:
-        _demand_the_tables(robot, table)
-    return robot
-
-
-def _demand_the_tables(robot: Robot, table: DHTable) -> None:
-    q = robot.sample(_SAMPLES)
-    own = table.coupling.select(robot.tree, q)
-    theirs = robot.oracle(None).placements(q, [LinkFrame.of(link_names(table)[-1])])[:, 0]
+def demand_the_tables(verifier: Verifier, table: DHTable) -> None:
+    """Raise TableError where the robot that Pinocchio reads in the URDF is not the table's."""
+    if verifier.cannot() is not None:
+        return
+    q = sample(verifier.tree, _SAMPLES, np.random.default_rng(0))
+    own = table.coupling.select(verifier.tree, q)
+    theirs = verifier.oracle().placements(q, [LinkFrame.of(link_names(table)[-1])])[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
     # Base and tool may be rotations to six digits only, and Pinocchio's side makes rotations of them.
     rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Mapping
 
+from urdfkin.dh.read import is_table_file, read_table
+from urdfkin.dh.table import DHTable
+from urdfkin.dh.to_tree import to_urdf
+from urdfkin.errors import InputError
+from urdfkin.files import at_home
+from urdfkin.from_table import demand_the_tables
 from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rules.axes import tilts
 from urdfkin.lint.runner import read_urdf
 from urdfkin.origin import Origin
 from urdfkin.robot import Robot
-from urdfkin.sources import Source, read_source
+from urdfkin.sources import Source, Text, as_word, read_source
 from urdfkin.tree import with_tilts
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.remembering import remembered_tree
-from urdfkin.verification.choosing import Verify
+from urdfkin.verification.choosing import Verify, checked_choice
 
 
 def load(
-    source: Source,
+    source: Source | DHTable,
     *,
     verify: Verify = True,
     mimic: bool | None = None,
@@ -30,7 +37,8 @@ def load(
 
     Args:
         source: A path (.urdf or .xacro), a name of the catalogue (`urdfkin robots` lists them), URDF text,
-            bytes, an open file, or `-` for standard input.
+            bytes, an open file, or `-` for standard input; or a Denavit-Hartenberg table, as it is or as a
+            file (.toml, .json, .csv): its base frame is the root, its tip the leaf.
         verify: Whether every result is held against Pinocchio's; "sample" has 100 configurations of each
             call checked.
         mimic: Whether mimic joints follow their leaders, as the URDF says; False lets each move freely.
@@ -45,13 +53,49 @@ def load(
         UrdfError: the file has errors; `findings` tells which and where.
         SourceError: it cannot be read.
         UnknownNameError: no file and no robot of that name; the nearest names are offered.
+        TableError: the URDF that was made of a table is not the table's.
 
     >>> robot = load("panda")
     >>> height = robot.placement(robot.neutral(), "panda_hand")[2, 3]
     >>> robot.nq, round(float(height), 4)
     (8, 0.926)
+    >>> from urdfkin.dh import table_from_rows
+    >>> robot = load(table_from_rows([[0.4, 0, 0, 0], [0.3, 0, 0, 0]], "standard"))
+    >>> float(robot.placement([0.0, 0.0], "tip")[0, 3])
+    0.7
     """
+    if isinstance(source, DHTable) or is_table_file(source):
+        return _load_table(source, xacro_args, verify=verify, mimic=mimic, root_joint=root_joint)
     text = read_source(source, xacro_args=xacro_args)
+    return _robot(text, verify=verify, mimic=mimic, root_joint=root_joint)
+
+
+def _load_table(
+    source: DHTable | str | os.PathLike[str],
+    xacro_args: Mapping[str, object] | None,
+    *,
+    verify: Verify,
+    mimic: bool | None,
+    root_joint: str | None,
+) -> Robot:
+    if xacro_args:
+        raise InputError("xacro_args go with the path of a .xacro file", found="a table")
+    if isinstance(source, DHTable):
+        table, name = source, "<table>"
+    else:
+        path = at_home(source)
+        table, name = read_table(path), as_word(path)
+    text = Text(to_urdf(table).encode(), name, name)
+    robot = _robot(text, verify=verify, mimic=mimic, root_joint=root_joint)
+    if checked_choice(verify):
+        plain = mimic is not False and root_joint is None
+        demand_the_tables((robot if plain else _robot(text)).verifier, table)
+    return robot
+
+
+def _robot(
+    text: Text, *, verify: Verify = True, mimic: bool | None = None, root_joint: str | None = None
+) -> Robot:
     origin = Origin(text.source, mimic, root_joint, text.xacro_args)
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
@@ -63,7 +107,7 @@ def load(
     if text.entry is None:
         for finding in findings:
             if finding.severity is Severity.WARNING:
-                warnings.warn(str(finding), UrdfWarning, stacklevel=2)
+                warnings.warn(str(finding), UrdfWarning, stacklevel=3)
     read = read_tree if text.entry is None else remembered_tree
     tree = read(urdf, mimic=mimic, root_joint=root_joint)
     if tilted := tilts(urdf):
@@ -73,7 +117,7 @@ def load(
         text.data.decode("utf-8-sig"),
         origin=origin,
         verify=verify,
-        mimic=origin.mimic if mimic else False,
+        mimic=mimic,
         findings=findings,
         unverifiable=_unverifiable(findings),
         base_frame=text.entry.base if text.entry else None,

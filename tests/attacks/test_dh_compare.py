@@ -18,6 +18,7 @@ from urdfkin.dh.compare import compare, comparison_text
 from urdfkin.dh.digits import last_digits
 from urdfkin.dh.read import read_mapping, table_of
 from urdfkin.dh.references import reference_path
+from urdfkin.dh.to_tree import to_tree
 from urdfkin.rotation import exp_rotation
 from urdfkin.tree import KinematicTree
 
@@ -145,7 +146,7 @@ def test_no_cell_of_a_nominal_table_is_blamed_for_more_than_the_tip_is_off(name:
     nominal = dh_table(robot.tree, tip, base, snap=1e-4)
     strict = dh_table(calibrated(robot.tree, seed), tip, base, near_parallel="strict")
     assert max(abs(row.d) for row in strict.rows) > 100.0
-    found = compare(chain(strict.to_tree(), tip, base), nominal)
+    found = compare(chain(to_tree(strict), tip, base), nominal)
     assert found.metres < 3e-3
     assert found.differences[0].tip <= 2.0 * found.metres
     assert found.residual <= 1e-9

@@ -12,6 +12,8 @@ import urdfkin as library
 from tests.cli.running import process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.catalogue import catalogue
+from urdfkin.dh import read_table
+from urdfkin.dh.references import references
 from urdfkin.tree import FloatArray
 from urdfkin.verification.sampling import sample
 
@@ -301,3 +303,12 @@ def test_without_verification_exit_3_says_so() -> None:
     done = urdfkin("jacobian", "panda", "--no-verify", "--format", "json")
     assert done.code == 3
     assert done.data["verified"] is False
+
+
+def test_a_table_is_a_robot_to_every_command() -> None:
+    path = str(references()["ur5"])
+    done = urdfkin("jacobian", path, "--q", "0.1,0.2,0.3,0.4,0.5,0.6", "--format", "json")
+    assert done.code == 0, done.err
+    robot = library.load(read_table(path))
+    J = robot.jacobian([0.1, 0.2, 0.3, 0.4, 0.5, 0.6], robot.tip_frame)
+    assert json.loads(done.out)["result"] == [J.tolist()]

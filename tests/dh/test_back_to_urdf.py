@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,11 +12,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tests.random_chains import configurations, trees
-from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows
+from urdfkin import loading
+from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows, to_tree, to_urdf
 from urdfkin.dh.references import references
+from urdfkin.errors import InputError
 from urdfkin.loading import load
 from urdfkin.tree import FloatArray, KinematicTree
-from urdfkin.urdf.writer import to_urdf
+from urdfkin.urdf import writer
+from urdfkin.validation.campaign import validate
+from urdfkin.verification.tables import TableError
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -54,8 +61,8 @@ def test_urdf_to_table_to_urdf_is_one_robot_to_pinocchio(tree: KinematicTree, co
     assume(not taken_for_a_coordinate_axis(tree))
     table = dh_table(tree, "tip", convention=convention)
     q = configurations(tree.nq, 4)
-    before = placements(to_urdf(tree), table.joint_names, q, "tip")
-    after = placements(table.to_urdf(), table.joint_names, q, table.to_tree().links[-1])
+    before = placements(writer.to_urdf(tree), table.joint_names, q, "tip")
+    after = placements(to_urdf(table), table.joint_names, q, to_tree(table).links[-1])
     agree(table, before, after, q)
 
 
@@ -74,7 +81,7 @@ def test_a_catalogue_robot_survives_the_way_to_a_table_and_back(
 ) -> None:
     robot = load(name)
     table = robot.dh(tip, base, convention)
-    again = table.to_robot()
+    again = load(table)
     q = robot.sample(6)
     own = robot.select(table, q)
     order = [table.joint_names.index(joint) for joint in again.coordinate_names]
@@ -89,7 +96,7 @@ def test_a_catalogue_robot_survives_the_way_to_a_table_and_back(
 @pytest.mark.parametrize("name", references())
 def test_a_shipped_reference_is_a_robot(name: str) -> None:
     table = read_table(references()[name])
-    robot = table.to_robot()
+    robot = load(table)
     q = robot.sample(4)
     np.testing.assert_allclose(robot.placement(q, table.tip_frame), table.placement(q), atol=1e-14)
     assert robot.certificate().verified
@@ -97,6 +104,42 @@ def test_a_shipped_reference_is_a_robot(name: str) -> None:
 
 def test_a_table_with_a_sliding_joint_and_no_limits_is_a_robot() -> None:
     table = table_from_rows([[0, "pi/2", 0.3, 0], [0, 0, 0.1, 0, "P"]], "standard")
-    robot = table.to_robot()
+    robot = load(table)
     q = robot.sample(4)
     np.testing.assert_allclose(robot.placement(q, "tip"), table.placement(q), atol=1e-13)
+
+
+@pytest.mark.parametrize("root_joint", [None, "floating"])
+def test_a_tables_file_is_a_source_like_any_other(tmp_path: Path, root_joint: str | None) -> None:
+    path = references()["ur5"]
+    (tmp_path / "arm.toml").write_bytes(path.read_bytes())
+    table = read_table(path)
+    robot, same = load(tmp_path / "arm.toml", root_joint=root_joint), load(table, root_joint=root_joint)
+    q = robot.sample(3)
+    np.testing.assert_array_equal(robot.jacobian(q, "tool0"), same.jacobian(q, "tool0"))
+    assert robot.certificate().verified
+    assert (robot.source, same.source) == (str(tmp_path / "arm.toml"), "<table>")
+    line = f"urdfkin.load({str(tmp_path / 'arm.toml')!r}"
+    assert robot.origin.python.startswith(line)
+
+
+def test_a_table_is_validated_as_it_is_and_as_a_file() -> None:
+    path = references()["ur5"]
+    report = validate([str(path), read_table(path)], samples=2)
+    assert report.passed
+    assert [robot.source for robot in report.robots] == [str(path), "<table>"]
+    assert report.robots[0].results == report.robots[1].results
+
+
+def test_a_urdf_that_is_not_the_tables_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = read_table(references()["ur5"])
+    other = replace(table, rows=(replace(table.rows[0], d=table.rows[0].d + 1e-9), *table.rows[1:]))
+    monkeypatch.setattr(loading, "to_urdf", lambda _: to_urdf(other))
+    with pytest.raises(TableError, match="the URDF that was made of a table is not the table's"):
+        load(table)
+    assert load(table, verify=False).nq == 6
+
+
+def test_a_table_takes_no_xacro_arguments() -> None:
+    with pytest.raises(InputError, match="xacro_args go with"):
+        load(read_table(references()["ur5"]), xacro_args={"arm": "left"})

@@ -15,6 +15,7 @@ from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.chain import chain
 from urdfkin.dh import DHTable, dh_table, table_from_rows, units_of
 from urdfkin.dh.compare import compare, comparison_text
+from urdfkin.dh.convert import to_convention
 from urdfkin.errors import InputError
 from urdfkin.tree import FloatArray, KinematicTree
 
@@ -63,7 +64,7 @@ def disguised(table: DHTable, seed: int) -> DHTable:
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 def test_what_cannot_matter_is_forgiven(seed: int, convention: str) -> None:
     path = chain(elbow(), "tip")
-    reference = disguised(dh_table(elbow(), "tip"), seed).to_convention(convention)
+    reference = to_convention(disguised(dh_table(elbow(), "tip"), seed), convention)
     found = compare(path, reference)
     assert found.exact
     assert found.differences == ()

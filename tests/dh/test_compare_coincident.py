@@ -14,6 +14,7 @@ from tests.random_chains import rotation, shift
 from urdfkin.chain import chain
 from urdfkin.dh import dh_table
 from urdfkin.dh.compare import compare
+from urdfkin.dh.convert import to_convention
 from urdfkin.tree import KinematicTree
 
 pytestmark = pytest.mark.slow
@@ -45,7 +46,7 @@ def nearly_coincident(seed: int) -> KinematicTree:
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 def test_a_urdfs_own_table_agrees_exactly_however_near_its_axes_are(seed: int, convention: str) -> None:
     tree = nearly_coincident(seed)
-    reference = disguised(dh_table(tree, "tip"), seed).to_convention(convention)
+    reference = to_convention(disguised(dh_table(tree, "tip"), seed), convention)
     found = compare(chain(tree, "tip"), reference)
     assert found.exact
     assert found.differences == ()

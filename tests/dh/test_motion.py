@@ -12,6 +12,7 @@ from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.chain import chain
 from urdfkin.dh.make import dh_table
+from urdfkin.dh.motion import acceleration, jacobian, velocity
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.tree import KinematicTree
 
@@ -28,8 +29,8 @@ def test_jacobian_and_acceleration_agree_with_pinocchio(tree: KinematicTree, con
     rates = np.abs(path.coupling.matrix).sum(initial=1.0) * 3.0
     reach = table.span + rates + float(np.linalg.norm(table.base[:3, 3]))
     bound = 20 * EPS * (1 + len(table.rows)) * reach
-    J, vel = table.jacobian(q_own), table.velocity(q_own, v_own)
-    acc = table.acceleration(q_own, v_own, a_own)
+    J, vel = jacobian(table, q_own), velocity(table, q_own, v_own)
+    acc = acceleration(table, q_own, v_own, a_own)
     for i in range(len(q)):
         expected = oracle.jacobian(q[i], "tip")
         assert np.abs(J[i] - expected[:, columns]).max(initial=0.0) <= bound * rates
@@ -41,10 +42,10 @@ def test_batches_broadcast_and_lengths_are_checked() -> None:
     link = shift(0.3, 0.0, 0.1) @ rotation("x", 1.0)
     table = dh_table(arm(link, link, link), "tip")
     q = np.zeros((4, 1, 3))
-    assert table.jacobian(q).shape == (4, 1, 6, 3)
-    assert table.acceleration(q, np.ones((5, 3)), np.ones(3)).shape == (4, 5, 6)
-    assert table.velocity({"j1": 0.1}, np.ones(3)).shape == (6,)
+    assert jacobian(table, q).shape == (4, 1, 6, 3)
+    assert acceleration(table, q, np.ones((5, 3)), np.ones(3)).shape == (4, 5, 6)
+    assert velocity(table, {"j1": 0.1}, np.ones(3)).shape == (6,)
     with pytest.raises(InputError, match="v needs 3 values"):
-        table.velocity(q, np.ones(2))
+        velocity(table, q, np.ones(2))
     with pytest.raises(UnknownNameError, match="unknown reference"):
-        table.jacobian(q, "sideways")
+        jacobian(table, q, "sideways")

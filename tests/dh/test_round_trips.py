@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, trees
 from urdfkin.chain import chain
+from urdfkin.dh.convert import to_convention
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.table import DHTable
+from urdfkin.dh.to_tree import to_tree
 from urdfkin.errors import InputError
 from urdfkin.tree import FloatArray, JointKind, KinematicTree, Mimic
 
@@ -41,8 +43,8 @@ def test_one_convention_to_the_other_and_back_is_the_same_table(
 ) -> None:
     table = dh_table(tree, "tip", convention=convention, last=last)
     other = "modified" if convention == "standard" else "standard"
-    there = table.to_convention(other)
-    back = there.to_convention(convention)
+    there = to_convention(table, other)
+    back = to_convention(there, convention)
     q = configurations(len(table.joint_names))
     assert there.convention == other
     assert agree(table.placement(q), there.placement(q), table, q)
@@ -54,7 +56,7 @@ def test_one_convention_to_the_other_and_back_is_the_same_table(
 @settings(max_examples=40)
 def test_a_table_as_a_tree_places_the_tip_alike_in_pinocchio(tree: KinematicTree, convention: str) -> None:
     table = dh_table(tree, "tip", convention=convention)
-    robot = table.to_tree()
+    robot = to_tree(table)
     tip = robot.links[robot.frame_link("tip")]
     q = configurations(robot.nq, 4)
     own = chain(robot, tip).coupling.select(robot, q)
@@ -70,7 +72,7 @@ def test_a_table_as_a_tree_places_the_tip_alike_in_pinocchio(tree: KinematicTree
 @settings(max_examples=40)
 def test_a_table_from_the_tree_of_a_table_is_as_exact(tree: KinematicTree, convention: str) -> None:
     table = dh_table(tree, "tip", convention=convention)
-    again = dh_table(table.to_tree(), "tip", convention=convention)
+    again = dh_table(to_tree(table), "tip", convention=convention)
     q = configurations(len(table.joint_names))
     assert agree(table.placement(q), again.placement(q), table, q)
 
@@ -89,7 +91,7 @@ def test_the_stanford_arm_survives_the_way_to_a_tree_and_back_cell_by_cell() -> 
     kinds = {"R": JointKind.REVOLUTE, "P": JointKind.PRISMATIC}
     rows = tuple(DHRow(*row[:4], kinds[row[4]], f"j{i}") for i, row in enumerate(STANFORD))
     table = DHTable(Convention.STANDARD, rows)
-    again = dh_table(table.to_tree(), "tip")
+    again = dh_table(to_tree(table), "tip")
     assert same_cells(table, again)
     np.testing.assert_allclose(again.base, np.eye(4), atol=1e-15)
     np.testing.assert_allclose(again.tool, np.eye(4), atol=1e-15)
@@ -98,7 +100,7 @@ def test_the_stanford_arm_survives_the_way_to_a_tree_and_back_cell_by_cell() -> 
 def test_a_leader_off_the_path_stays_a_coordinate_in_the_tree() -> None:
     row = DHRow(0.3, 0.0, 0.0, 0.0, JointKind.REVOLUTE, "follower", mimic=Mimic("far", 2.0, 0.1))
     table = DHTable(Convention.STANDARD, (row,))
-    robot = table.to_tree()
+    robot = to_tree(table)
     assert table.joint_names == ("far",)
     assert robot.nq == 1
     q = np.array([[0.2]])

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tests.text.robots import close, motion, robot
+from urdfkin.dh import motion as motion_of
 from urdfkin.motion import interorigin_vector
 from urdfkin.rotation.arrays import FloatArray
 
@@ -145,4 +146,4 @@ def test_the_elbows_standard_table_has_the_rows_of_figure_7_16() -> None:
     found = [(row.a, row.d, row.alpha, row.theta) for row in table.rows]
     expected = [(float(row.a), float(row.d), float(row.alpha), 0.0) for row in MOVING.rows]
     assert close(found, expected)
-    assert close(table.jacobian(MOVING.q), jacobian())
+    assert close(motion_of.jacobian(table, MOVING.q), jacobian())

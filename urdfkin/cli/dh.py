@@ -126,11 +126,11 @@ def command(
     Exit 0: verified, or the compared table agrees. 1: a disagreement. 2: bad input. 3: not checked, or a
     strict table that loses more to rounding than the robot itself.
     """
-    from urdfkin.cli.dh_work import Work, run, table_robot  # noqa: PLC0415  keeps --help fast
+    from urdfkin.cli.dh_work import Work, run  # noqa: PLC0415  keeps --help fast
+    from urdfkin.dh.read import is_table_file  # noqa: PLC0415
 
-    is_table = Path(robot).suffix in (".toml", ".json", ".csv")
-    _refuse_idle(context, is_table, options)
-    loaded = table_robot(robot, verify) if is_table else load_robot(robot, mimic, root_joint, verify=verify)
+    _refuse_idle(context, is_table_file(robot), options)
+    loaded = load_robot(robot, mimic, root_joint, verify=verify)
     with compiling():
         code = run(Work(robot=loaded, output=output, **options))
     context.exit(code)

@@ -12,7 +12,7 @@ import numpy as np
 
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.output import write_file
-from urdfkin.dh import DHTable, Units, export, read_table, units_of
+from urdfkin.dh import DHTable, Units, export, units_of
 from urdfkin.dh.compare import CellDifference, Comparison, compare, comparison_text
 from urdfkin.dh.digits import last_digits
 from urdfkin.dh.export.mapping import to_mapping
@@ -21,13 +21,14 @@ from urdfkin.dh.hint import snap_hint
 from urdfkin.dh.printed import printed, printed_tree
 from urdfkin.dh.read import read_mapping, table_of
 from urdfkin.dh.references import reference_path
+from urdfkin.dh.to_tree import to_urdf
 from urdfkin.dh.tree_parameters import tree_parameters
 from urdfkin.errors import InputError
 from urdfkin.oracle import version
 from urdfkin.robot import Robot
-from urdfkin.tables import SAMPLES, verified, verified_tree
 from urdfkin.verification.sampling import draw
 from urdfkin.verification.tables import TableCheck
+from urdfkin.verification.verifier import TABLE_SAMPLES
 
 #: Forms that can hold several tables one after the other.
 _SEVERAL = ("terminal", "markdown", "latex", "json")
@@ -69,11 +70,6 @@ class Work:
             "millimetres" if self.millimetres else "metres",
             self.digits,
         )
-
-
-def table_robot(path: str, verify: bool) -> Robot:
-    """The robot that a table file describes."""
-    return read_table(path).to_robot(verify=verify)
 
 
 def run(work: Work) -> int:
@@ -119,7 +115,7 @@ def _tips(work: Work) -> list[str | None]:
 
 def _table(work: Work, tip: str | None) -> tuple[DHTable, TableCheck | None]:
     robot, table = work.robot, _made(work, tip, work.snap)
-    return table, verified(robot, table) if robot.verify else None
+    return table, robot.verifier.table(table) if robot.verifier.policy else None
 
 
 def _made(work: Work, tip: str | None, snap: float) -> DHTable:
@@ -141,7 +137,7 @@ def _made(work: Work, tip: str | None, snap: float) -> DHTable:
 
 def _written(work: Work, table: DHTable, check: TableCheck | None) -> str:
     if work.format_ == "urdf":
-        return table.to_urdf()
+        return to_urdf(table)
     if work.format_ == "svg":
         from urdfkin.dh.drawing import drawing  # noqa: PLC0415  needs an extra
 
@@ -182,10 +178,10 @@ def _tree(work: Work) -> int:
         text = write_tree(parameters, work.format_, work.units)
     else:
         raise InputError(f"--tree has no form {work.format_!r}", remedy="say terminal, markdown, csv or json")
-    check = verified_tree(work.robot, parameters, SAMPLES) if work.robot.verify else None
+    check = work.robot.verifier.tree_parameters(parameters) if work.robot.verifier.policy else None
     if work.format_ in _READ:
         text += f"\n{check or check_line(None)}\n"
-        q = draw(work.robot.tree, SAMPLES, np.random.default_rng(1), with_special=True).q
+        q = draw(work.robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
         text += f"{printed_tree(parameters, work.units, q)}\n"
     else:
         say(str(check or check_line(None)), err=True)

@@ -9,49 +9,89 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.dh.table import DHTable
 from urdfkin.dh.to_tree import free_tree
 from urdfkin.recursion.evaluate import accelerations, jacobians, velocities
 from urdfkin.recursion.plan import Plan, make_plan
 from urdfkin.reference import Reference
 from urdfkin.tree import FloatArray
 
-if TYPE_CHECKING:
-    from urdfkin.dh.table import DHTable
 
-
+@lru_cache(maxsize=64)
 def plan_of(table: DHTable) -> Plan:
-    """The walk over the table's frames to its tip."""
+    """The walk over a table's frames to its tip."""
     tree = free_tree(table)
     return make_plan(tree, [len(tree.links) - 1])
 
 
-def jacobian(table: DHTable, q: ArrayLike | Mapping[str, float], reference: Reference | str) -> FloatArray:
-    """(..., 6, coordinates); see `DHTable.jacobian`."""
+def jacobian(
+    table: DHTable,
+    q: ArrayLike | Mapping[str, float],
+    reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
+) -> FloatArray:
+    """(..., 6, coordinates) Jacobian of the tip in the base frame, [linear; angular]: 7.85.
+
+    Args:
+        table: Any table.
+        q: (..., coordinates) in the order of `joint_names`, rad or m, or a mapping by name.
+        reference: As everywhere; the world is the table's base frame.
+
+    Raises:
+        InputError: `q` has the wrong length.
+    """
     shape, (values,) = _flat(table, table.coupling.values(q))
-    J = jacobians(table.plan, values, Reference.of(reference))[:, 0] @ table.coupling.matrix
+    J = jacobians(plan_of(table), values, Reference.of(reference))[:, 0] @ table.coupling.matrix
     return np.ascontiguousarray(J.reshape(*shape, 6, len(table.joint_names)))
 
 
 def velocity(
-    table: DHTable, q: ArrayLike | Mapping[str, float], v: ArrayLike, reference: Reference | str
+    table: DHTable,
+    q: ArrayLike | Mapping[str, float],
+    v: ArrayLike,
+    reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FloatArray:
-    """(..., 6); see `DHTable.velocity`."""
+    """(..., 6) velocity of the tip in the base frame, [linear; angular]: 7.127, 7.128.
+
+    Args:
+        table: Any table.
+        q: (..., coordinates), rad or m, or a mapping by name.
+        v: (..., coordinates), rad/s or m/s; batches broadcast.
+        reference: As everywhere; the world is the table's base frame.
+
+    Raises:
+        InputError: an array has the wrong length.
+    """
     shape, (values, rates) = _flat(table, table.coupling.values(q), _rates(table, v, "v"))
-    return velocities(table.plan, values, rates, Reference.of(reference)).reshape(*shape, 6)
+    return velocities(plan_of(table), values, rates, Reference.of(reference)).reshape(*shape, 6)
 
 
 def acceleration(
-    table: DHTable, q: ArrayLike | Mapping[str, float], v: ArrayLike, a: ArrayLike, reference: Reference | str
+    table: DHTable,
+    q: ArrayLike | Mapping[str, float],
+    v: ArrayLike,
+    a: ArrayLike,
+    reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FloatArray:
-    """(..., 6); see `DHTable.acceleration`."""
+    """(..., 6) classical acceleration of the tip in the base frame, [linear; angular]: 7.129, 7.130.
+
+    Args:
+        table: Any table.
+        q: (..., coordinates), rad or m, or a mapping by name.
+        v: (..., coordinates), rad/s or m/s.
+        a: (..., coordinates), rad/s^2 or m/s^2; batches broadcast.
+        reference: As everywhere; the world is the table's base frame.
+
+    Raises:
+        InputError: an array has the wrong length.
+    """
     arrays = (table.coupling.values(q), _rates(table, v, "v"), _rates(table, a, "a"))
     shape, (values, rates, rates_of_rates) = _flat(table, *arrays)
-    found = accelerations(table.plan, values, rates, rates_of_rates, Reference.of(reference))
+    found = accelerations(plan_of(table), values, rates, rates_of_rates, Reference.of(reference))
     return found.reshape(*shape, 6)
 
 

@@ -8,7 +8,7 @@ import os
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from urdfkin.dh.digits import Literal
 from urdfkin.dh.rows import table_from_mapping
@@ -17,6 +17,17 @@ from urdfkin.dh.written_row import ORDER
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.files import read_text
 from urdfkin.printable import from_csv_cell
+
+
+def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
+    """Whether a robot's source is the path of a table, by its name.
+
+    >>> is_table_file("arm.toml"), is_table_file("arm.urdf"), is_table_file("<robot/>")
+    (True, False, False)
+    """
+    if isinstance(source, str) and source.lstrip().startswith("<"):
+        return False
+    return isinstance(source, str | os.PathLike) and Path(source).suffix.lower() in _PARSERS
 
 
 def read_table(path: str | os.PathLike[str]) -> DHTable:

@@ -16,7 +16,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,18 +24,15 @@ from urdfkin.coupling import Coupling, coupling_of
 from urdfkin.dh.row import Convention, DHRow, convention_of
 from urdfkin.dh.statement import SnapStatement
 from urdfkin.errors import InputError
-from urdfkin.reference import Reference
 from urdfkin.roundings import EPS, of_rows
-from urdfkin.tree import FloatArray, KinematicTree, frozen
-
-if TYPE_CHECKING:
-    from urdfkin.recursion.plan import Plan
-    from urdfkin.robot import Robot
+from urdfkin.tree import FloatArray, frozen
 
 
 @dataclass(frozen=True, eq=False)
 class DHTable:
-    """A Denavit-Hartenberg table that computes.
+    """A Denavit-Hartenberg table: data, and the products of its own matrices.
+
+    `urdfkin.load` makes a robot of it; `urdfkin.dh` has its motion and its other forms.
 
     Attributes:
         convention: Standard or modified.
@@ -160,105 +156,6 @@ class DHTable:
             [0.0, 2.0, 0.0]
         """
         return np.ascontiguousarray(self.frames(q)[..., -1, :, :] @ self.tool)
-
-    # -- motion: the text's recursion on the table's frames ------------------------------------------
-
-    @cached_property
-    def plan(self) -> Plan:
-        """The recursion's walk over the table's frames, made once."""
-        from urdfkin.dh.motion import plan_of  # noqa: PLC0415 - compiles; only who asks for motion pays
-
-        return plan_of(self)
-
-    def jacobian(
-        self, q: ArrayLike | Mapping[str, float], reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
-    ) -> FloatArray:
-        """(..., 6, coordinates) Jacobian of the tip in the base frame, [linear; angular]: 7.85.
-
-        Args:
-            q: (..., coordinates) in the order of `joint_names`, rad or m, or a mapping by name.
-            reference: As everywhere; the world is the table's base frame.
-
-        Raises:
-            InputError: `q` has the wrong length.
-        """
-        from urdfkin.dh import motion  # noqa: PLC0415
-
-        return motion.jacobian(self, q, reference)
-
-    def velocity(
-        self,
-        q: ArrayLike | Mapping[str, float],
-        v: ArrayLike,
-        reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
-    ) -> FloatArray:
-        """(..., 6) velocity of the tip in the base frame, [linear; angular]: 7.127, 7.128.
-
-        Args:
-            q: (..., coordinates), rad or m, or a mapping by name.
-            v: (..., coordinates), rad/s or m/s; batches broadcast.
-            reference: As everywhere; the world is the table's base frame.
-
-        Raises:
-            InputError: an array has the wrong length.
-        """
-        from urdfkin.dh import motion  # noqa: PLC0415
-
-        return motion.velocity(self, q, v, reference)
-
-    def acceleration(
-        self,
-        q: ArrayLike | Mapping[str, float],
-        v: ArrayLike,
-        a: ArrayLike,
-        reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
-    ) -> FloatArray:
-        """(..., 6) classical acceleration of the tip in the base frame, [linear; angular]: 7.129, 7.130.
-
-        Args:
-            q: (..., coordinates), rad or m, or a mapping by name.
-            v: (..., coordinates), rad/s or m/s.
-            a: (..., coordinates), rad/s^2 or m/s^2; batches broadcast.
-            reference: As everywhere; the world is the table's base frame.
-
-        Raises:
-            InputError: an array has the wrong length.
-        """
-        from urdfkin.dh import motion  # noqa: PLC0415
-
-        return motion.acceleration(self, q, v, a, reference)
-
-    # -- other forms ---------------------------------------------------------------------------------
-
-    def to_convention(self, convention: str) -> DHTable:
-        """The same motion in the other convention; raises InputError for an unknown name."""
-        from urdfkin.dh.convert import to_convention  # noqa: PLC0415
-
-        return to_convention(self, convention)
-
-    def to_tree(self) -> KinematicTree:
-        """The robot that the table describes, its joints standing on the table's frames."""
-        from urdfkin.dh.to_tree import to_tree  # noqa: PLC0415
-
-        return to_tree(self)
-
-    # The way back to a robot ends above this package: the two imports wait until they are called.
-
-    def to_urdf(self) -> str:
-        """A URDF of the table's robot, without shapes and masses; see `to_tree` for names and limits."""
-        from urdfkin.urdf.writer import to_urdf  # noqa: PLC0415
-
-        return to_urdf(self.to_tree())
-
-    def to_robot(self, *, verify: bool = True) -> Robot:
-        """The table's robot, its base frame the root, its tip the leaf.
-
-        Args:
-            verify: Whether every result is held against Pinocchio's.
-        """
-        from urdfkin.from_table import robot_from_table  # noqa: PLC0415
-
-        return robot_from_table(self, verify=verify)
 
 
 def _rigid(T: ArrayLike, where: str) -> FloatArray:

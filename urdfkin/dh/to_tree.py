@@ -16,6 +16,7 @@ import numpy as np
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.table import DHTable
 from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.urdf.writer import to_urdf as write_urdf
 
 #: A sliding joint that no file bounds: a kilometre either way, m and m/s and N.
 UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
@@ -45,6 +46,11 @@ def to_tree(table: DHTable) -> KinematicTree:
             joint = Joint(leader, kind, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), limit)
             joints.append((joint, here[0], _new(f"{leader}_link", here)))
     return build_tree(table.robot, here[0], joints)
+
+
+def to_urdf(table: DHTable) -> str:
+    """A URDF of the table's robot, without shapes and masses; see `to_tree` for names and limits."""
+    return write_urdf(to_tree(table))
 
 
 def free_tree(table: DHTable) -> KinematicTree:

@@ -11,7 +11,9 @@ from concurrent.futures import Executor
 from pathlib import Path
 
 from urdfkin.demands import switch, whole_number
+from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
+from urdfkin.loading import load
 from urdfkin.origin import Origin
 from urdfkin.recursion.announcing import load_kernels
 from urdfkin.robot import Robot
@@ -27,7 +29,7 @@ from urdfkin.validation.workers import Processes
 
 
 def validate(
-    robots: Source | Robot | Sequence[Source | Robot],
+    robots: Source | DHTable | Robot | Sequence[Source | DHTable | Robot],
     *,
     samples: int = 1000,
     seed: int = 0,
@@ -105,7 +107,7 @@ def _engine(jobs: int, isolate: bool, executor: Executor | None) -> Engine:
 
 
 def _subjects(
-    robots: Sequence[Source | Robot],
+    robots: Sequence[Source | DHTable | Robot],
     mimic: bool | None,
     root_joint: str | None,
     xacro_args: Mapping[str, object] | None,
@@ -121,7 +123,7 @@ def _subjects(
     return subjects, failures
 
 
-def _called(robot: Source | Robot) -> str:
+def _called(robot: Source | DHTable | Robot) -> str:
     """What to call a robot whose text cannot be had."""
     if isinstance(robot, str | os.PathLike):
         return str(robot) if isinstance(robot, str) else as_word(Path(robot))
@@ -129,11 +131,13 @@ def _called(robot: Source | Robot) -> str:
 
 
 def _subject(
-    robot: Source | Robot,
+    robot: Source | DHTable | Robot,
     mimic: bool | None,
     root_joint: str | None,
     xacro_args: Mapping[str, object] | None = None,
 ) -> Subject:
+    if isinstance(robot, DHTable):
+        robot = load(robot, mimic=mimic, root_joint=root_joint)
     if isinstance(robot, Robot):
         return Subject.of(robot)
     if is_xacro(robot):
