@@ -23,6 +23,7 @@ from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Literal
 
 from urdfkin.errors import UnknownNameError
+from urdfkin.forking import importing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,7 +47,9 @@ def later(home: str) -> Callable[..., Any]:
     module, _, name = home.partition(":")
 
     def call(*arguments: Any, **options: Any) -> Any:
-        return attrgetter(name)(import_module(module))(*arguments, **options)
+        with importing:
+            found = import_module(module)
+        return attrgetter(name)(found)(*arguments, **options)
 
     return call
 
