@@ -18,7 +18,11 @@ from urdfkin.interpreter import not_reading
 from urdfkin.printable import printable
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    import matplotlib.axes
+    import matplotlib.figure
+
+    Axes = matplotlib.axes.Axes
+    Figure = matplotlib.figure.Figure
 
 #: Colours in a drawing that stand for the page's own: what to draw with -> what the page gets.
 PAGE_COLOURS = {

@@ -14,7 +14,7 @@ from urdfkin.roundings import EPS
 from urdfkin.tree import FloatArray
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from urdfkin.figure import Axes
 
 #: Draws into axes: motion and seconds.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]

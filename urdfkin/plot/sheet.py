@@ -17,7 +17,7 @@ from urdfkin.robot import Robot
 from urdfkin.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from urdfkin.figure import Figure
 
 _PANEL = (5.2, 2.3)
 #: Letters of the foot that an inch has room for.

@@ -17,7 +17,7 @@ from urdfkin.report.document import Check, Robot
 from urdfkin.report.words import of_quantity, quantities, quantity_name, units, worst
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from urdfkin.figure import Axes
 
 #: What lies below is drawn as exact: a hundredth of a rounding.
 _LEFT = 1e-2
