@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import Any
 
 #: The highest equation number of the chapter.
@@ -104,8 +104,7 @@ def misprints() -> tuple[Misprint, ...]:
 
 
 def _read(name: str) -> dict[str, Any]:
-    text = (resources.files("urdfkin.equations") / "data" / f"{name}.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
+    return tomllib.loads((Path(__file__).with_name("data") / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def _section(data: dict[str, Any]) -> Section:
