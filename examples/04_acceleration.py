@@ -6,7 +6,7 @@ Learn: accelerations are classical, and the parts of 7.130 add up to the whole.
 import numpy as np
 
 import urdfkin
-from urdfkin.recursion.breakdown import KINDS
+from urdfkin.compiled.breakdown import KINDS
 
 robot = urdfkin.load("polar")  # the chapter's: a turning joint and a sliding one on it
 q = np.array([0.4, 0.5])  # rad, m

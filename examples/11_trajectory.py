@@ -6,8 +6,8 @@ Learn: motions from rest to rest, one call for a frame's whole motion, and Pinoc
 import numpy as np
 
 import urdfkin
-from urdfkin.frame_motion import frame_motion
-from urdfkin.trajectory import line
+from urdfkin.motion.frame_motion import frame_motion
+from urdfkin.motion.trajectory import line
 
 robot = urdfkin.load("ur5")
 start = np.array([0.0, -1.5, 1.2, -1.0, -1.5, 0.0])

@@ -26,14 +26,14 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
 import urdfkin
-from urdfkin.call import Call
-from urdfkin.catalogue import catalogue
-from urdfkin.reference import Reference
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.roundings import EPS
-from urdfkin.tree import FloatArray
-from urdfkin.verification.quantities import Quantity, walked
-from urdfkin.verification.verifier import bound_of
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.verify.call import Call
+from urdfkin.verify.quantities import Quantity, walked
+from urdfkin.verify.verifier import bound_of
 
 #: Lengths of batches: less than a block of eight, one, more, and many with a rest.
 LENGTHS = (1, 2, 7, 8, 9, 100)

@@ -32,7 +32,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that i
 
 from scripts.fuzzing import GOOD, Case, robots
 from scripts.fuzzing.mutations import LARGEST, mutant
-from urdfkin.catalogue import catalogue
+from urdfkin.urdf.catalogue import catalogue
 
 #: What a worker answers when it is ready; the first use compiles, which may take a while.
 READY, FIRST_WAIT = "ready", 300.0

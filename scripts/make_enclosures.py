@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 import urdfkin
-from urdfkin.enclosure import Enclosure, Enclosures
-from urdfkin.oracle import version
 from urdfkin.robot import Robot
+from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
+from urdfkin.verify.pinocchio import version
 
 PAGE = Path(__file__).parents[1] / "docs" / "enclosures.md"
 #: Arms, a hand with followers, humanoids, a quadruped, a hobby arm.
@@ -52,7 +52,7 @@ That the equations are the right ones is *not* in the proof: Pinocchio's agreeme
 are whole numbers, and mpmath's sums, products, quotients and whole powers of intervals, which are exact and
 rounded once. Sine and cosine are sums of Taylor's series with its remainder, roots are closed in by Heron's
 rule, and the rotation that a base's nine-digit matrix means by Newton's steps with what they leave
-(`urdfkin/exact/intervals.py`); mpmath's own come without a proof.
+(`urdfkin/verify/exact/intervals.py`); mpmath's own come without a proof.
 
 ## How wide, how many inside
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from urdfkin.equations import table
+from urdfkin.kinematics.registry import table
 
 PAGE = Path(__file__).parents[1] / "docs" / "equations.md"
 

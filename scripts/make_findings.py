@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from urdfkin.catalogue import catalogue
 from urdfkin.lint import DEFAULT_LIMITS, Finding, Severity, check
 from urdfkin.lint.escape import shortened
 from urdfkin.lint.pages import RULES
 from urdfkin.lint.pages import page as page_of
 from urdfkin.lint.reporter import WRITTEN_OUT
+from urdfkin.urdf.catalogue import catalogue
 
 PAGE = Path(__file__).parents[1] / "docs" / "findings.md"
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 import urdfkin
-from urdfkin.exact.vectors import DIGITS
-from urdfkin.judge import Judgement, Line, judge
-from urdfkin.oracle import version
-from urdfkin.verification.sampling import draw_base
+from urdfkin.validation.judgement import Judgement, Line, judge
+from urdfkin.verify.exact.vectors import DIGITS
+from urdfkin.verify.pinocchio import version
+from urdfkin.verify.sampling import draw_base
 
 PAGE = Path(__file__).parents[1] / "docs" / "judge.md"
 #: Name, and what kind of robot it is.
@@ -76,9 +76,9 @@ urdfkin is the nearer in {nearer}. The ratio of typical errors, urdfkin's over P
 What the judge has changed: results in LOCAL used to be computed in the world's axes and turned back, which on
 the Allegro hand was 2.4 times as far off as Pinocchio (0.30 against 0.12 eps*scale); then all motion was
 computed in the links' own axes and turned to the world's, which was 1.2 to 1.4 times as far off as computing
-it there. Each is now computed in the axes in which it is asked for (`urdfkin/recursion/axes.py`), with fused
+it there. Each is now computed in the axes in which it is asked for (`urdfkin/compiled/axes.py`), with fused
 multiply-adds. Sine and cosine were off by 0.34 and 0.37 units in the last place in root mean square, where
-correct rounding is by 0.29: they now keep what rounding takes from their argument (`recursion/sine.py`)."""
+correct rounding is by 0.29: they now keep what rounding takes from their argument (`compiled/sine.py`)."""
     ]
     for name, judgement in judgements.items():
         parts += [f"## {name}", _table(judgement.lines)]

@@ -14,9 +14,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import urdfkin
-from urdfkin.motion import MovingFrame, link_endpoint, link_endpoint_velocity, point_acceleration
-from urdfkin.recursion.breakdown import KINDS
-from urdfkin.rotation import (
+from urdfkin.compiled.breakdown import KINDS
+from urdfkin.kinematics.bodies import MovingFrame, link_endpoint, link_endpoint_velocity, point_acceleration
+from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.kinematics.rotation import (
     angular_velocity_from_euler_rates,
     euler_condition,
     integrate_orientation,
@@ -27,7 +28,6 @@ from urdfkin.rotation import (
     rotation_of,
     turning_vector_rate,
 )
-from urdfkin.rotation.arrays import FloatArray
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 INK, QUIET = "#1b2a3a", "#8a97a6"

@@ -10,7 +10,7 @@ from itertools import count
 import numpy as np
 
 from urdfkin.kinematics.arithmetic import bound
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 _NEW = count()
 
@@ -19,7 +19,7 @@ _NEW = count()
 class Counted:
     """A double; what each rounding so far did to it at most, in u = eps/2, to first order; whether sums fuse.
 
-    A product that is fused waits for the sum that it meets, as in `urdfkin.recursion.numbers`.
+    A product that is fused waits for the sum that it meets, as in `urdfkin.compiled.numbers`.
     """
 
     value: float

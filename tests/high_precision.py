@@ -12,7 +12,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from urdfkin.rotation.arrays import FloatArray
+from urdfkin.kinematics.inputs import FloatArray
 
 #: Work with this many digits wherever `mp` is used.
 mp = mpmath.mp.clone()

@@ -15,7 +15,7 @@ from tests.high_precision import (
     rate,
     second_rate,
 )
-from urdfkin.motion import MovingFrame
+from urdfkin.kinematics.bodies import MovingFrame
 
 #: The moment at which the tests look.
 T = 0.7

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from urdfkin.rotation import exp_rotation, quaternion_of
-from urdfkin.rotation.arrays import FloatArray
-from urdfkin.tree import Joint, JointKind, KinematicTree, Mimic, build_tree
+from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.kinematics.rotation import exp_rotation, quaternion_of
+from urdfkin.model.tree import Joint, JointKind, KinematicTree, Mimic, build_tree
 
 
 def pose(generator: np.random.Generator) -> FloatArray:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from urdfkin.tree import FloatArray, JointKind, KinematicTree
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 
 
 class TreeOracle:

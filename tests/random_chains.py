@@ -7,7 +7,7 @@ import math
 import numpy as np
 from hypothesis import strategies as st
 
-from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree
 
 TURNS = np.array([0.0, math.pi / 2, math.pi, -math.pi / 2])
 

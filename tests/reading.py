@@ -3,7 +3,7 @@
 from urdfkin.lint import UrdfError
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.runner import read_urdf
-from urdfkin.tree import KinematicTree
+from urdfkin.model.tree import KinematicTree
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.records import RobotRecord
 

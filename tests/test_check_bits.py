@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scripts import check_bits
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray
 
 ROBOTS = ("polar", "planar_two_link")
 

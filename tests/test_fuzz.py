@@ -16,10 +16,10 @@ from scripts.fuzzing.judge import Outcome
 from scripts.fuzzing.judge import judge as judge_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
 from tests.lint.cases.arm import arm, fixed
+from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.errors import OracleError
-from urdfkin.oracle import Oracle
-from urdfkin.prepared import PreparedFrame
-from urdfkin.rotation.arrays import FloatArray
+from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.verify.pinocchio import Oracle
 
 pytestmark = pytest.mark.slow
 

@@ -8,9 +8,9 @@ import pytest
 
 import urdfkin
 from tests.reading import tree_of
-from urdfkin.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
+from urdfkin.model.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.verification.verifier import NotVerifiedWarning
+from urdfkin.verify.verifier import NotVerifiedWarning
 
 pytestmark = pytest.mark.slow
 

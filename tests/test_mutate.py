@@ -74,13 +74,11 @@ def test_what_no_test_looks_at_survives_and_what_one_does_is_noticed(
     what: str, word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (mutant,) = [
-        m
-        for m in mutants(["verification/certificate"])
-        if m.what == what and m.place.endswith("Comparison.agrees")
+        m for m in mutants(["verify/certificate"]) if m.what == what and m.place.endswith("Comparison.agrees")
     ]
     test = tmp_path / "test_one.py"
     test.write_text(
-        "from urdfkin.verification.certificate import Comparison\n"
+        "from urdfkin.verify.certificate import Comparison\n"
         "def test_a_share_above_one_disagrees():\n    assert not Comparison(1, 9.0, 1.4, ()).agrees\n",
         encoding="utf-8",
     )
@@ -89,7 +87,7 @@ def test_what_no_test_looks_at_survives_and_what_one_does_is_noticed(
 
 
 #: Quick to ask about, and to be relied on by everything that is handed out or reported.
-PARTS = ["validation/outcome", "validation/tally", "verification/certificate", "dh/statement"]
+PARTS = ["validation/outcome", "validation/tally", "verify/certificate", "dh/statement"]
 SEED = int(os.environ.get("URDFKIN_MUTATION_SEED", "1"))
 
 

@@ -7,12 +7,12 @@ import pytest
 
 import urdfkin
 from tests.laws.subjects import robot_of, state
+from urdfkin.compiled.registers import LANES
 from urdfkin.errors import InputError, NotFiniteError
-from urdfkin.frame_motion import frame_motion
-from urdfkin.recursion.base import BaseMotion
-from urdfkin.recursion.registers import LANES
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.tree import FloatArray
+from urdfkin.motion.frame_motion import frame_motion
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray
 
 Compute = Callable[..., object]
 

@@ -12,15 +12,15 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as command
 from tests.robots.odd_urdfs import urdf_of
-from urdfkin import roundings
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.oracle import Oracle
-from urdfkin.recursion.base import BaseMotion
-from urdfkin.reference import Reference
+from urdfkin.kinematics import roundings
+from urdfkin.kinematics.rotation import exp_rotation
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
-from urdfkin.rotation import exp_rotation
-from urdfkin.verification import choosing, verifier
-from urdfkin.verification.certificate import Comparison
+from urdfkin.verify import choosing, verifier
+from urdfkin.verify.certificate import Comparison
+from urdfkin.verify.pinocchio import Oracle
 
 
 @pytest.fixture
@@ -172,7 +172,7 @@ def test_what_pinocchio_cannot_check_is_handed_out_with_a_warning_and_never_as_v
 
 
 def test_a_result_that_is_no_number_is_a_disagreement(monkeypatch: pytest.MonkeyPatch, panda: Robot) -> None:
-    from urdfkin.recursion import evaluate  # noqa: PLC0415
+    from urdfkin.compiled import evaluate  # noqa: PLC0415
 
     monkeypatch.setattr(evaluate, "jacobians", lambda plan, q, *_, **__: np.full((len(q), 1, 6, 8), np.nan))
     with pytest.raises(urdfkin.VerificationError, match="disagrees"):

@@ -13,38 +13,38 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from urdfkin.chain import FrameChain
     from urdfkin.dh import DHRow, DHTable, read_table, table_from_rows
     from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
     from urdfkin.lint import Finding, UrdfError, UrdfWarning, check
     from urdfkin.loading import load
-    from urdfkin.recursion.base import BaseMotion
-    from urdfkin.reference import Reference
+    from urdfkin.model.base_motion import BaseMotion
+    from urdfkin.model.chain import FrameChain
+    from urdfkin.model.reference import Reference
     from urdfkin.robot import Robot
     from urdfkin.validation.campaign import validate
-    from urdfkin.verification.certificate import Certificate, VerificationError
-    from urdfkin.verification.tables import TableError
-    from urdfkin.verification.verifier import NotVerifiedWarning
+    from urdfkin.verify.certificate import Certificate, VerificationError
+    from urdfkin.verify.tables import TableError
+    from urdfkin.verify.verifier import NotVerifiedWarning
 
 # Loaded when first asked for: `import urdfkin` needs no numpy, no Pinocchio and no compiler.
 _HOMES = {
-    "BaseMotion": "urdfkin.recursion.base",
-    "Certificate": "urdfkin.verification.certificate",
+    "BaseMotion": "urdfkin.model.base_motion",
+    "Certificate": "urdfkin.verify.certificate",
     "DHRow": "urdfkin.dh",
     "DHTable": "urdfkin.dh",
     "Finding": "urdfkin.lint",
-    "FrameChain": "urdfkin.chain",
+    "FrameChain": "urdfkin.model.chain",
     "InputError": "urdfkin.errors",
-    "NotVerifiedWarning": "urdfkin.verification.verifier",
-    "Reference": "urdfkin.reference",
+    "NotVerifiedWarning": "urdfkin.verify.verifier",
+    "Reference": "urdfkin.model.reference",
     "Robot": "urdfkin.robot",
     "SourceError": "urdfkin.errors",
-    "TableError": "urdfkin.verification.tables",
+    "TableError": "urdfkin.verify.tables",
     "UnknownNameError": "urdfkin.errors",
     "UrdfError": "urdfkin.lint",
     "UrdfWarning": "urdfkin.lint",
     "UrdfkinError": "urdfkin.errors",
-    "VerificationError": "urdfkin.verification.certificate",
+    "VerificationError": "urdfkin.verify.certificate",
     "check": "urdfkin.lint",
     "load": "urdfkin.loading",
     "read_table": "urdfkin.dh",

@@ -10,19 +10,19 @@ from urdfkin.dh.read import is_table_file, read_table
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.to_tree import to_urdf
 from urdfkin.errors import InputError
-from urdfkin.files import at_home
-from urdfkin.from_table import demand_the_tables
 from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rules.axes import tilts
 from urdfkin.lint.runner import read_urdf
-from urdfkin.origin import Origin
+from urdfkin.model.tree import with_tilts
 from urdfkin.robot import Robot
-from urdfkin.sources import Source, Text, as_word, read_source
-from urdfkin.tree import with_tilts
+from urdfkin.system.files import at_home
+from urdfkin.urdf.origin import Origin
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.remembering import remembered_tree
-from urdfkin.verification.choosing import Verify, checked_choice
+from urdfkin.urdf.sources import Source, Text, as_word, read_source
+from urdfkin.verify.choosing import Verify, checked_choice
+from urdfkin.verify.made_of_table import demand_the_tables
 
 
 def load(

@@ -12,31 +12,31 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin import configuration
-from urdfkin.call import Call
-from urdfkin.chain import FrameChain, chain
-from urdfkin.demands import choice, real_number, shown, switch, whole_number, word, words
+from urdfkin.compiled.batch import in_parts
+from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_joints
+from urdfkin.compiled.plan import Plan, make_plan
+from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
-from urdfkin.frame_names import LinkFrame
+from urdfkin.errors.demands import choice, real_number, shown, switch, whole_number, word, words
+from urdfkin.kinematics.bodies.representation import QUATERNION
+from urdfkin.kinematics.inputs import scalars
+from urdfkin.kinematics.rotation.euler_rates import NEAREST
 from urdfkin.lint import Finding
-from urdfkin.motion.representation import QUATERNION
-from urdfkin.origin import Origin
-from urdfkin.prepared import PreparedFrame
-from urdfkin.recursion.base import BaseMotion
-from urdfkin.recursion.batch import in_parts
-from urdfkin.recursion.breakdown import KINDS, AccelerationBreakdown, moving_joints
-from urdfkin.recursion.plan import Plan, make_plan
-from urdfkin.reference import Reference
-from urdfkin.rotation.arrays import scalars
-from urdfkin.rotation.euler_rates import NEAREST
-from urdfkin.tree import FloatArray, KinematicTree
-from urdfkin.verification.bounds import nearest_singularity
-from urdfkin.verification.certificate import Certificate
-from urdfkin.verification.choosing import Verify
-from urdfkin.verification.quantities import (
+from urdfkin.model import configuration
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.frame_names import LinkFrame
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.urdf.origin import Origin
+from urdfkin.verify.bounds import nearest_singularity
+from urdfkin.verify.call import Call
+from urdfkin.verify.certificate import Certificate
+from urdfkin.verify.choosing import Verify
+from urdfkin.verify.quantities import (
     ACCELERATION_BREAKDOWN,
     ANALYTICAL_JACOBIAN,
     JACOBIAN,
@@ -45,11 +45,11 @@ from urdfkin.verification.quantities import (
     quantity,
     walked,
 )
-from urdfkin.verification.sampling import sample
-from urdfkin.verification.verifier import Verifier
+from urdfkin.verify.sampling import sample
+from urdfkin.verify.verifier import Verifier
 
 if TYPE_CHECKING:
-    from urdfkin.enclosure import Enclosures
+    from urdfkin.verify.exact.enclosure import Enclosures
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: More than these no array can hold, on any machine.
@@ -394,7 +394,7 @@ class Robot:
         """The manipulator Jacobian J = C^-1 J_v (7.122): derivatives of position and orientation by q.
 
         It is checked against Pinocchio's rotation and Jacobian, with the rates of the orientation's numbers
-        by a way of their own (`urdfkin.verification.line_of_nodes`). The bound grows as 1 / s^2, s being the
+        by a way of their own (`urdfkin.verify.line_of_nodes`). The bound grows as 1 / s^2, s being the
         sine or cosine of the middle angle: near the singularity that many digits are lost.
 
         Args:
@@ -521,7 +521,7 @@ class Robot:
         >>> bool((proof.jacobian.error(J) < 4e-16).all())
         True
         """
-        from urdfkin.enclosure import enclose  # noqa: PLC0415  loads mpmath
+        from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  loads mpmath
 
         return enclose(self, (q, v, a), frame, reference, base, digits)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from scripts.benchmarking.subject import Subject
 from scripts.benchmarking.timing import TOLERANCE, Work
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 
 @dataclass(frozen=True)

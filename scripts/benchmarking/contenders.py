@@ -18,7 +18,7 @@ from scripts.benchmarking import generated, peers
 from scripts.benchmarking.calls import Calls
 from scripts.benchmarking.subject import QUANTITIES, Subject
 from scripts.benchmarking.timing import Work
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 ONE = "urdfkin, 1 thread"
 FRESH = "urdfkin, 1 thread, no out="

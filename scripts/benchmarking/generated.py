@@ -21,10 +21,10 @@ import numpy as np
 
 from scripts.benchmarking.subject import Subject
 from scripts.benchmarking.timing import Work
+from urdfkin.compiled import sine
+from urdfkin.compiled.plan import Motion, Plan, Step
 from urdfkin.kinematics import equations
-from urdfkin.recursion import sine
-from urdfkin.recursion.plan import Motion, Plan, Step
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 GENERATED = "generated for this robot, 1 thread"
 COMPILER = "cc"
@@ -64,7 +64,7 @@ def columns(plan: Plan, x: Any, sines: Any, cosines: Any, eq: Any = equations) -
 def acceleration(
     plan: Plan, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
 ) -> tuple[Any, Any]:
-    """7.127 to 7.130 in each link's own axes, as in `recursion.walk`: (linear, angular) in the world's."""
+    """7.127 to 7.130 in each link's own axes, as in `compiled.walk`: (linear, angular) in the world's."""
     R, w, alpha, acc = np.eye(3).tolist(), [0.0] * 3, [0.0] * 3, [0.0] * 3
 
     def turned(S: Any) -> tuple[Any, ...]:

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from urdfkin.compiled import axes, outputs, walk
+from urdfkin.compiled.plan import Plan
+from urdfkin.compiled.program import KEPT_ROWS, WIDTH, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
-from urdfkin.recursion import axes, outputs, walk
-from urdfkin.recursion.plan import Plan
-from urdfkin.recursion.program import KEPT_ROWS, WIDTH, Head, Op, program_of
 
-#: Reduction 10, z and 1 - z/2 with what they lose 8, two polynomials 20, last steps 13 (`recursion.sine`).
+#: Reduction 10, z and 1 - z/2 with what they lose 8, two polynomials 20, last steps 13 (`compiled.sine`).
 _SINE_COSINE = 51
 
 

@@ -18,9 +18,9 @@ from scripts.benchmarking import generated
 from scripts.benchmarking.calls import Calls
 from scripts.benchmarking.subject import Subject, bare_urdf
 from scripts.benchmarking.timing import Work
+from urdfkin.compiled.plan import Step
 from urdfkin.kinematics.arithmetic import bound
-from urdfkin.recursion.plan import Step
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 #: Takes [angular; linear] to [linear; angular].
 LINEAR_FIRST = [3, 4, 5, 0, 1, 2]

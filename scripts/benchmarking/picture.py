@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from urdfkin.figure import new_figure, save, style
+from urdfkin.view.figure import new_figure, save, style
 
 #: Okabe and Ito's colours, which differ for every kind of eye; then other libraries and the floor in greys.
 OURS, THEIRS, CEILING, OTHERS, FLOOR = "#0072B2", "#D55E00", "#009E73", "#999999", "#CCCCCC"

@@ -23,7 +23,7 @@ from scripts.benchmarking.contenders import (
 )
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, chain_urdf
 from scripts.benchmarking.timing import Row, Table, Work, agree, measure
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 #: Pinocchio's own part of a check.
 OWN = "Pinocchio's own calls, Python loop"

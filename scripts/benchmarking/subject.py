@@ -11,9 +11,9 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 import urdfkin
-from urdfkin.recursion.plan import Plan
+from urdfkin.compiled.plan import Plan
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray
 
 #: The quantities of the tables.
 QUANTITIES = ("jacobian", "acceleration")

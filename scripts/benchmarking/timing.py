@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 #: What results may differ by, in m, rad, m/s^2, rad/s^2: a guard against other work, no measure of accuracy.
 TOLERANCE = 1e-9

@@ -1,6 +1,6 @@
 """Where the time goes: a batch's parts and a single call's, each measured by leaving it out.
 
-A walk is a program of a few instructions (`urdfkin.recursion.program`), so that a part is left out by leaving
+A walk is a program of a few instructions (`urdfkin.compiled.program`), so that a part is left out by leaving
 its instructions out: what the whole takes longer is what the part takes. A single call is taken apart from
 outside: an empty function of Python's, a call that is refused, and so on.
 """
@@ -16,12 +16,12 @@ import numpy as np
 from scripts.benchmarking.calls import Calls
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
 from scripts.benchmarking.timing import Work, times
-from urdfkin.recursion import cores
-from urdfkin.recursion.program import WIDTH, Head, Op, Program, program_of
-from urdfkin.recursion.single import single
-from urdfkin.recursion.task import Task, scratch
-from urdfkin.reference import Reference
-from urdfkin.tree import FloatArray
+from urdfkin.compiled import cores
+from urdfkin.compiled.program import WIDTH, Head, Op, Program, program_of
+from urdfkin.compiled.single import single
+from urdfkin.compiled.task import Task, scratch
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
 
 #: The parts of a batch, in the order in which they come to what came before: the instructions of each.
 PARTS: Mapping[str, frozenset[Op]] = {

@@ -12,8 +12,8 @@ import numpy as np
 
 from urdfkin import BaseMotion, Reference
 from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNameError
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray
 
 #: Frames of one robot that are asked about together, and one by one.
 TOGETHER, ALONE = 12, 2

@@ -14,7 +14,7 @@ from scripts.fuzzing.asking import MismatchError, ask, ask_prepared
 from urdfkin.errors import RangeError, UrdfkinError
 from urdfkin.lint import Finding, Severity, UrdfError
 from urdfkin.robot import Robot
-from urdfkin.verification.verifier import NotVerifiedWarning
+from urdfkin.verify.verifier import NotVerifiedWarning
 
 #: Findings about sizes that arithmetic cannot carry: a result that is no number is no surprise after them.
 _SIZES = {"URDF526", "URDF603", "URDF606"}

@@ -7,7 +7,7 @@ from functools import cache
 
 from scripts.mutating.selection import ROOT
 
-#: - `urdfkin.tree.build_tree`: `1  ->  2`: why it does not matter.
+#: - `urdfkin.model.tree.build_tree`: `1  ->  2`: why it does not matter.
 _ARGUMENT = re.compile(r"^- `(?P<place>[\w.]+)`: `(?P<what>[^`]+)`: (?P<why>\S.+)$", re.MULTILINE)
 
 

@@ -16,7 +16,7 @@ _COMPILED = {
 }  # fmt: skip
 
 
-_OF_ROBOTS = ("test_robot.py", "verification", "laws")
+_OF_ROBOTS = ("test_robot.py", "verify", "laws")
 
 
 def files(parts: list[str]) -> list[Path]:

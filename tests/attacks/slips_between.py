@@ -42,24 +42,24 @@ from tests.reading import tree_of
 from urdfkin import BaseMotion
 from urdfkin.dh import table_from_rows
 from urdfkin.errors import OracleError
-from urdfkin.origin import Origin
+from urdfkin.kinematics.rotation import exp_rotation
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.rotation import exp_rotation
-from urdfkin.tree import FloatArray
+from urdfkin.urdf.origin import Origin
 
 #: Where a user's numbers pass on their way to the result, and on their way to Pinocchio.
 MODULES = (
-    "asked", "call", "chain", "configuration", "coupling", "dh.to_tree", "followers",
-    "frame_names", "from_table", "motion.representation", "oracle", "oracle_base",
-    "oracle_frames", "oracle_layout", "recursion.base", "recursion.batch", "recursion.evaluate",
-    "recursion.plan", "recursion.program", "reference", "robot",
-    "rotation.aligning", "rotation.arrays", "rotation.euler", "rotation.euler_rates",
-    "rotation.nearest", "rotation.quaternion", "rotation.quaternion_rates", "tree",
-    "urdf.reader", "urdf.skeleton", "urdf.writer", "verification.bounds",
-    "verification.analytical", "verification.certificate", "verification.choosing",
-    "verification.line_of_nodes",
-    "verification.magnitudes", "verification.quantities", "verification.tables",
-    "verification.verifier",
+    "verify.asked", "verify.call", "model.chain", "model.configuration", "model.coupling", "dh.to_tree",
+    "verify.followers", "model.frame_names", "verify.made_of_table", "kinematics.bodies.representation",
+    "verify.pinocchio", "verify.pinocchio_base", "verify.pinocchio_frames", "verify.pinocchio_layout",
+    "model.base_motion", "compiled.batch", "compiled.evaluate", "compiled.plan", "compiled.program",
+    "model.reference", "robot", "kinematics.rotation.aligning", "kinematics.inputs",
+    "kinematics.rotation.euler", "kinematics.rotation.euler_rates", "kinematics.rotation.nearest",
+    "kinematics.rotation.quaternion", "kinematics.rotation.quaternion_rates", "model.tree", "urdf.reader",
+    "urdf.skeleton", "urdf.writer", "verify.bounds", "verify.analytical", "verify.certificate",
+    "verify.choosing", "verify.line_of_nodes",
+    "verify.magnitudes", "verify.quantities", "verify.tables",
+    "verify.verifier",
 )  # fmt: skip
 
 #: A result is the right one when it is off by less than this share of the largest number.

@@ -15,14 +15,14 @@ import pytest
 
 import urdfkin
 from urdfkin.errors import RepresentationSingularityError
-from urdfkin.motion import representation as module
-from urdfkin.recursion.base import BaseMotion
+from urdfkin.kinematics.bodies import representation as module
+from urdfkin.kinematics.rotation.euler import SEQUENCES, rotation_from_euler
+from urdfkin.kinematics.rotation.quaternion import quaternion_of
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.rotation.euler import SEQUENCES, rotation_from_euler
-from urdfkin.rotation.quaternion import quaternion_of
-from urdfkin.roundings import EPS
-from urdfkin.tree import FloatArray
-from urdfkin.verification.line_of_nodes import euler_jacobian, quaternion_jacobian
+from urdfkin.verify.line_of_nodes import euler_jacobian, quaternion_jacobian
 
 REPRESENTATIONS = (*SEQUENCES, "quaternion")
 FREE = '<robot name="free"><link name="body"/></robot>'
@@ -192,8 +192,8 @@ def test_a_quaternions_rates_keep_its_length() -> None:
 # -- mutants -----------------------------------------------------------------------------------------
 
 MODULES = (
-    "motion.representation", "rotation.euler_rates", "rotation.quaternion_rates", "rotation.euler",
-    "rotation.quaternion",
+    "kinematics.bodies.representation", "kinematics.rotation.euler_rates",
+    "kinematics.rotation.quaternion_rates", "kinematics.rotation.euler", "kinematics.rotation.quaternion",
 )  # fmt: skip
 #: Functions that no analytical Jacobian calls: what is wrong there is another test's business.
 ELSEWHERE = {
@@ -284,7 +284,7 @@ def in_place(name: str, wrong: ast.Module) -> Iterator[None]:
 
 
 def _forget() -> None:
-    importlib.import_module("urdfkin.rotation.euler")._sequence.cache_clear()
+    importlib.import_module("urdfkin.kinematics.rotation.euler")._sequence.cache_clear()
 
 
 def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | None:

@@ -6,13 +6,13 @@ import pytest
 
 import urdfkin
 from tests.reading import tree_of
-from urdfkin.followers import rules_of_text
-from urdfkin.origin import Origin
-from urdfkin.recursion.evaluate import placements
-from urdfkin.recursion.plan import make_plan
+from urdfkin.compiled.evaluate import placements
+from urdfkin.compiled.plan import make_plan
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.tree import freed
 from urdfkin.robot import Robot
-from urdfkin.roundings import EPS
-from urdfkin.tree import freed
+from urdfkin.urdf.origin import Origin
+from urdfkin.verify.followers import rules_of_text
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 

@@ -7,12 +7,12 @@ import pytest
 
 import urdfkin
 from tests.cli.running import urdfkin as command
-from urdfkin.recursion import breakdown
-from urdfkin.recursion.base import BaseMotion
-from urdfkin.recursion.breakdown import AccelerationBreakdown
+from urdfkin.compiled import breakdown
+from urdfkin.compiled.breakdown import AccelerationBreakdown
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.roundings import EPS
-from urdfkin.tree import FloatArray
 
 REFERENCES = ("local", "world", "local_world_aligned")
 

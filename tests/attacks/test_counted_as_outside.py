@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from urdfkin.roundings import EPS
+from urdfkin.kinematics.roundings import EPS
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.tally import tally
-from urdfkin.verification.bounds import Bound
-from urdfkin.verification.certificate import Comparison
+from urdfkin.verify.bounds import Bound
+from urdfkin.verify.certificate import Comparison
 
 ALLOWED = 64.0
 

@@ -16,7 +16,7 @@ from urdfkin.cli import crash
 from urdfkin.errors import InputError
 from urdfkin.report import html, junit
 from urdfkin.validation import campaign
-from urdfkin.verification.tables import TableError
+from urdfkin.verify.tables import TableError
 
 
 def _raising(error: BaseException) -> Callable[..., Any]:

@@ -103,7 +103,7 @@ def test_compiling_runs_nothing_there(
 def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from urdfkin.recursion import announcing  # noqa: PLC0415
+    from urdfkin.compiled import announcing  # noqa: PLC0415
 
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend("")  # as in `python -c`
@@ -129,7 +129,7 @@ def test_numba_takes_no_settings_from_there(tmp_path: Path) -> None:
         f"cache_dir: {tmp_path}\ndisable_jit: 1\ncache_locator_classes: evil.Locator\n"
     )
     code = (
-        "import os; from urdfkin.recursion.compiling import _config as c; c.reload_config(); print("
+        "import os; from urdfkin.compiled.compiling import _config as c; c.reload_config(); print("
         "repr(c.CACHE_DIR), c.DISABLE_JIT, repr(getattr(c, 'CACHE_LOCATOR_CLASSES', '')), os.getcwd())"
     )
     environ = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}

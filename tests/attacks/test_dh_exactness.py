@@ -12,14 +12,14 @@ import urdfkin
 from tests.cli.running import urdfkin as command
 from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
-from urdfkin.chain import chain
 from urdfkin.dh import DHTable, dh_table, export
 from urdfkin.dh.hint import noisy_cells
 from urdfkin.errors import InputError
-from urdfkin.roundings import EPS
-from urdfkin.tree import JointKind, KinematicTree, Mimic
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import JointKind, KinematicTree, Mimic
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.verification.tables import TableCheck, TableError
+from urdfkin.verify.tables import TableCheck, TableError
 
 #: A file that writes a right angle with twelve digits: 2.07e-13 rad off, between parallel axes 0.1 m apart.
 TWELVE_DIGITS = math.pi - 3.14159265359

@@ -13,7 +13,7 @@ import pytest
 
 from tests.reading import tree_of
 from urdfkin.lint import Finding, PinocchioReading, Severity, check_text
-from urdfkin.tree import JointKind, KinematicTree
+from urdfkin.model.tree import JointKind, KinematicTree
 
 #: Slot -> what may stand there; the first is plain.
 SLOTS: dict[str, list[str]] = {

@@ -12,9 +12,9 @@ import pytest
 
 import urdfkin
 from tests.cli import running
-from urdfkin import files
 from urdfkin.errors import SourceError
-from urdfkin.files import read_bytes
+from urdfkin.system import files
+from urdfkin.system.files import read_bytes
 
 ARM = (
     '<robot name="Ärmchen"><link name="a"/><link name="Hand Größe 3 手"/>'

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import urdfkin
 from urdfkin.robot import Robot
-from urdfkin.verification.sampling import draw
+from urdfkin.verify.sampling import draw
 
 
 def gripper(kind: str, bounds: tuple[float, float], *rules: tuple[float, float, float, float]) -> Robot:

@@ -73,12 +73,12 @@ CASES = {
         thread.join()
         """,
     "an entry in the ledger, while another thread makes one": """
-        from urdfkin.verification import certificate
+        from urdfkin.verify import certificate
         held(certificate._entering)
         fork(lambda: (robot.placement(q[:3], "tool0"), robot.certificate()))
         """,
     "a kernel, while another thread compiles one": """
-        from urdfkin.recursion import compiling
+        from urdfkin.compiled import compiling
         held(compiling._compiling)
         fork(lambda: robot.placement(q[:3], "tool0"))
         """,
@@ -131,7 +131,7 @@ def test_every_lock_and_pool_of_the_package_is_made_for_forks() -> None:
         if name in path.read_text(encoding="utf-8") and path.parent.name != "validation"
     }
     assert found == {
-        "forking.py: threading.RLock",
-        "recursion/batch.py: ThreadPoolExecutor",  # forgotten in the child
+        "system/forking.py: threading.RLock",
+        "compiled/batch.py: ThreadPoolExecutor",  # forgotten in the child
         "view/viewer.py: threading.RLock",  # a server that does not fork
     }

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.exact.decimals import read_exact
-from urdfkin.exact.vectors import mp
-from urdfkin.judge import judge
+from urdfkin.validation.judgement import judge
+from urdfkin.verify.exact.decimals import read_exact
+from urdfkin.verify.exact.vectors import mp
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 

@@ -21,14 +21,14 @@ import pytest
 
 from tests.cli.running import process
 from tests.reading import records
-from urdfkin import keeping
-from urdfkin.keeping import CacheWarning, kept_folder
-from urdfkin.recursion import compiling
-from urdfkin.recursion.compiling import NUMBERS, Kernel
-from urdfkin.sealed import keep, kept
-from urdfkin.sources import read_source
+from urdfkin.compiled import compiling
+from urdfkin.compiled.compiling import NUMBERS, Kernel
+from urdfkin.system import keeping
+from urdfkin.system.keeping import CacheWarning, kept_folder
+from urdfkin.system.sealed import keep, kept
 from urdfkin.urdf import remembering
 from urdfkin.urdf.remembering import remembered_tree
+from urdfkin.urdf.sources import read_source
 
 
 @pytest.fixture(autouse=True)
@@ -133,7 +133,7 @@ def no_room(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     def refuse(*_: object, **__: object) -> None:
         raise OSError(code, os.strerror(code))
 
-    monkeypatch.setattr("urdfkin.sealed.tempfile.NamedTemporaryFile", refuse)
+    monkeypatch.setattr("urdfkin.system.sealed.tempfile.NamedTemporaryFile", refuse)
     return code
 
 

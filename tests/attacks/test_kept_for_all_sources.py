@@ -8,9 +8,12 @@ from typing import Any
 
 import pytest
 
-from urdfkin import keeping, kinematics, recursion, tree, urdf
-from urdfkin.keeping import kept_folder
-from urdfkin.recursion import compiling
+from urdfkin import compiled as recursion
+from urdfkin import kinematics, urdf
+from urdfkin.compiled import compiling
+from urdfkin.model import tree
+from urdfkin.system import keeping
+from urdfkin.system.keeping import kept_folder
 from urdfkin.urdf import remembering
 
 

@@ -13,13 +13,13 @@ import pytest
 import urdfkin
 from urdfkin import BaseMotion
 from urdfkin.errors import InputError
-from urdfkin.oracle_base import free_flyer, free_flyer_rates, nearest_quaternion
-from urdfkin.recursion import base as recursion_base
-from urdfkin.recursion.base import STILL_STATE
-from urdfkin.rotation import exp_rotation, nearest_rotation
-from urdfkin.roundings import EPS, ROUNDINGS
-from urdfkin.tree import FloatArray
-from urdfkin.verification.magnitudes import magnitudes
+from urdfkin.kinematics.rotation import exp_rotation, nearest_rotation
+from urdfkin.kinematics.roundings import EPS, ROUNDINGS
+from urdfkin.model import base_motion as recursion_base
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.tree import FloatArray
+from urdfkin.verify.magnitudes import magnitudes
+from urdfkin.verify.pinocchio_base import free_flyer, free_flyer_rates, nearest_quaternion
 
 ARM = (
     '<robot name="arm"><link name="a"/><link name="b"/><joint name="j" type="continuous"><parent link="a"/>'

@@ -17,10 +17,10 @@ import urdfkin
 from scripts.fuzzing.robots import LIKE_OURS as POOL
 from urdfkin import BaseMotion
 from urdfkin.errors import InputError, OracleError, UnknownNameError
-from urdfkin.frame_names import JointFrame, LinkFrame
-from urdfkin.judge import judge
+from urdfkin.model.frame_names import JointFrame, LinkFrame
+from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
-from urdfkin.tree import KinematicTree
+from urdfkin.validation.judgement import judge
 
 #: What links and joints are called here.
 ASKED = (*POOL, *(f"{prefix}:{name}" for prefix in ("link", "joint") for name in POOL))

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.recursion import batch
-from urdfkin.recursion.registers import LANES
+from urdfkin.compiled import batch
+from urdfkin.compiled.registers import LANES
+from urdfkin.motion.trajectory import line
 from urdfkin.robot import Robot
-from urdfkin.trajectory import line
 
 ODD: dict[str, Any] = {
     "None": None,

@@ -26,13 +26,12 @@ from markdown_it import MarkdownIt
 import urdfkin
 from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
 from urdfkin.dh import DHTable, export
-from urdfkin.dh.drawing import drawing
 from urdfkin.dh.export.latex import escaped
 from urdfkin.dh.export.tree import write_tree
 from urdfkin.dh.read import read_table
 from urdfkin.dh.tree_parameters import tree_parameters
 from urdfkin.dh.units import Units
-from urdfkin.printable import csv_cell, from_csv_cell, markdown_code, markdown_text
+from urdfkin.errors.printable import csv_cell, from_csv_cell, markdown_code, markdown_text
 from urdfkin.report.compare import compare
 from urdfkin.report.comparison import markdown_of
 from urdfkin.report.document import Document, asset
@@ -40,6 +39,7 @@ from urdfkin.report.html import as_html
 from urdfkin.report.junit import as_junit
 from urdfkin.report.markdown import as_markdown
 from urdfkin.validation.campaign import validate
+from urdfkin.view.dh_drawing import drawing
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.lint.finding.UrdfWarning")
 

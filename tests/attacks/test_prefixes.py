@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 import urdfkin
 from tests.lint.cases.arm import arm
-from urdfkin.judge import judge
 from urdfkin.lint import Finding, Severity
 from urdfkin.robot import Robot
+from urdfkin.validation.judgement import judge
 from urdfkin.view.shapes import shapes
 
 UNDECLARED = "URDF214"

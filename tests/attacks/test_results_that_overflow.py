@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import urdfkin
+from urdfkin.compiled.plan import LARGE
+from urdfkin.compiled.registers import LANES
 from urdfkin.errors import NotFiniteError, RangeError
-from urdfkin.recursion.base import BaseMotion
-from urdfkin.recursion.plan import LARGE
-from urdfkin.recursion.registers import LANES
+from urdfkin.model.base_motion import BaseMotion
 from urdfkin.robot import Robot
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")

@@ -13,14 +13,14 @@ from typing import Any
 import pytest
 
 import urdfkin
-from urdfkin.oracle import Oracle, OracleError
-from urdfkin.recursion import evaluate
-from urdfkin.recursion.plan import make_plan
+from urdfkin.compiled import evaluate
+from urdfkin.compiled.plan import make_plan
 from urdfkin.validation import chunk as chunk_module
 from urdfkin.validation import comparing, memory
 from urdfkin.validation.campaign import _subject, validate
 from urdfkin.validation.chunk import chunks, run_chunk
 from urdfkin.validation.outcome import Verdict
+from urdfkin.verify.pinocchio import Oracle, OracleError
 
 GB = 10**9
 

@@ -21,7 +21,7 @@ from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, chunks, run_chunk
 from urdfkin.validation.engine import Here, OnExecutor, Task
 from urdfkin.validation.outcome import Verdict, outcome
-from urdfkin.validation.report import ValidationReport
+from urdfkin.validation.results import ValidationReport
 
 ROBOTS = ["double_pendulum", "ur5", "planar_two_link"]
 ROOT = Path(__file__).parents[2]

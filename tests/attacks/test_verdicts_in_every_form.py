@@ -20,7 +20,7 @@ from urdfkin.report.markdown import as_markdown
 from urdfkin.report.terminal import print_report
 from urdfkin.validation import chains as chains_module
 from urdfkin.validation.campaign import validate
-from urdfkin.verification.tables import TableCheck
+from urdfkin.verify.tables import TableCheck
 
 
 def _outside(_: pytest.MonkeyPatch) -> Document:

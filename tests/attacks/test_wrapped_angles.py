@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 import urdfkin
 from tests.cli import running
-from urdfkin.frame_motion import frame_motion
-from urdfkin.plot.sheet import foot
+from urdfkin.kinematics.rotation.quaternion import rotation_of
+from urdfkin.motion.frame_motion import frame_motion
+from urdfkin.motion.trajectory import Trajectory, read_trajectory
 from urdfkin.robot import Robot
-from urdfkin.rotation.quaternion import rotation_of
-from urdfkin.trajectory import Trajectory, read_trajectory
+from urdfkin.view.plot.sheet import foot
 
 JOINT = (
     '<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'

@@ -14,7 +14,7 @@ import pytest
 from tests.cli.running import process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.cli import cli, commands
-from urdfkin.resources import robots_dir
+from urdfkin.system.resources import robots_dir
 
 #: Heavy, or needless where nothing is computed.
 HEAVY = {"numpy", "numba", "llvmlite", "pinocchio", "yourdfpy", "trimesh", "lxml", "scipy", "rich"}

@@ -11,11 +11,11 @@ import pytest
 import urdfkin as library
 from tests.cli.running import process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
-from urdfkin.catalogue import catalogue
 from urdfkin.dh import read_table
 from urdfkin.dh.references import references
-from urdfkin.tree import FloatArray
-from urdfkin.verification.sampling import sample
+from urdfkin.model.tree import FloatArray
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.verify.sampling import sample
 
 QUANTITIES = {
     "placement": "q",

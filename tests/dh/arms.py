@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree
 
 
 def arm(*steps: FloatArray, kinds: str = "", tip: FloatArray | None = None) -> KinematicTree:

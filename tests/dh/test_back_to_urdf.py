@@ -17,10 +17,10 @@ from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows, to_tree, 
 from urdfkin.dh.references import references
 from urdfkin.errors import InputError
 from urdfkin.loading import load
-from urdfkin.tree import FloatArray, KinematicTree
+from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.urdf import writer
 from urdfkin.validation.campaign import validate
-from urdfkin.verification.tables import TableError
+from urdfkin.verify.tables import TableError
 
 EPS = float(np.finfo(np.float64).eps)
 

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 from tests.dh.arms import arm
 from tests.random_chains import configurations, rotation, shift, trees
-from urdfkin.chain import chain
 from urdfkin.dh import DHTable, dh_table, table_from_rows, units_of
 from urdfkin.dh.compare import compare, comparison_text
 from urdfkin.dh.convert import to_convention
 from urdfkin.errors import InputError
-from urdfkin.tree import FloatArray, KinematicTree
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import FloatArray, KinematicTree
 
 pytestmark = pytest.mark.slow
 

@@ -11,11 +11,11 @@ import pytest
 from tests.dh.arms import arm
 from tests.dh.test_compare import disguised
 from tests.random_chains import rotation, shift
-from urdfkin.chain import chain
 from urdfkin.dh import dh_table
 from urdfkin.dh.compare import compare
 from urdfkin.dh.convert import to_convention
-from urdfkin.tree import KinematicTree
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import KinematicTree
 
 pytestmark = pytest.mark.slow
 

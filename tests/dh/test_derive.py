@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from tests.dh.arms import arm
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, trees
-from urdfkin.chain import FrameChain, chain
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.row import Convention
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.tree import FloatArray, KinematicTree
+from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.tree import FloatArray, KinematicTree
 
 EPS = float(np.finfo(np.float64).eps)
 CONVENTIONS = ("standard", "modified")

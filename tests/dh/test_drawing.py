@@ -10,8 +10,8 @@ import pytest
 from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
 from urdfkin.dh import dh_table
-from urdfkin.dh.drawing import drawing
 from urdfkin.errors import InputError
+from urdfkin.view.dh_drawing import drawing
 
 pytest.importorskip("matplotlib")
 LINK = shift(0.3, 0.1, 0.2) @ rotation("x", 1.0)

@@ -18,7 +18,7 @@ from tests.random_chains import configurations, rotation, shift
 from urdfkin.dh import FORMATS, dh_table, export, table_from_rows, units_of
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.tree import FloatArray, KinematicTree, Mimic
+from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
 
 EPS = float(np.finfo(np.float64).eps)
 LINK = shift(0.3, 0.1, 0.2) @ rotation("x", 1.0) @ rotation("z", 0.4)

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from tests.dh.arms import arm
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, trees
-from urdfkin.chain import chain
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.motion import acceleration, jacobian, velocity
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.tree import KinematicTree
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import KinematicTree
 
 EPS = float(np.finfo(np.float64).eps)
 

@@ -15,7 +15,7 @@ from tests.random_chains import trees
 from urdfkin.dh import dh_table, export, read_table, table_from_mapping, table_from_rows
 from urdfkin.dh.read import table_from_text
 from urdfkin.errors import InputError, SourceError
-from urdfkin.tree import KinematicTree
+from urdfkin.model.tree import KinematicTree
 
 ROWS = [[0.0, "pi/2", 0.3, 0.0, "R"], [0.4, 0.0, 0.0, -1.0, "P"]]
 

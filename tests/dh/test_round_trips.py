@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, trees
-from urdfkin.chain import chain
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.to_tree import to_tree
 from urdfkin.errors import InputError
-from urdfkin.tree import FloatArray, JointKind, KinematicTree, Mimic
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic
 
 conventions = st.sampled_from(["standard", "modified"])
 

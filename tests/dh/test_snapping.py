@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from tests.dh.arms import arm
 from tests.random_chains import configurations, rotation, shift, trees
-from urdfkin.chain import chain
 from urdfkin.dh import DHTable, dh_table
 from urdfkin.dh.snapping import rotation_angle
-from urdfkin.tree import FloatArray, KinematicTree
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import FloatArray, KinematicTree
 
 EPS = float(np.finfo(np.float64).eps)
 

@@ -10,11 +10,11 @@ import pytest
 
 from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
-from urdfkin.chain import chain
 from urdfkin.dh import dh_table
 from urdfkin.dh.snapping import _change, _snap_pose, rotation_angle, row_of_constant
 from urdfkin.dh.statement import SnapChange, SnapStatement
-from urdfkin.tree import Joint, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit, build_tree
 
 OFF = 1e-5
 

@@ -16,7 +16,7 @@ from urdfkin.dh import dh_table, units_of
 from urdfkin.dh.export.tree import as_mapping, write_tree
 from urdfkin.dh.tree_parameters import tree_parameters
 from urdfkin.errors import InputError
-from urdfkin.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
+from urdfkin.model.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
 
 EPS = float(np.finfo(np.float64).eps)
 

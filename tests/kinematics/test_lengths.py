@@ -10,18 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.strategies import rotations, trees
+from urdfkin.compiled.evaluate import accelerations, placements, velocities
+from urdfkin.compiled.plan import make_plan
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import VECTORS
 from urdfkin.kinematics.arrays import chapter as on_vectors
 from urdfkin.kinematics.lengths import chapter as on_lengths
 from urdfkin.kinematics.lengths import counted, norm, product
-from urdfkin.recursion.base import STILL_STATE
-from urdfkin.recursion.evaluate import accelerations, placements, velocities
-from urdfkin.recursion.plan import make_plan
-from urdfkin.roundings import EPS, SMALLEST
-from urdfkin.tree import FloatArray, KinematicTree
-from urdfkin.verification.magnitudes import magnitudes
-from urdfkin.verification.sampling import draw
+from urdfkin.kinematics.roundings import EPS, SMALLEST
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.verify.magnitudes import magnitudes
+from urdfkin.verify.sampling import draw
 
 #: Every equation of motion; a rotation made of a sine and a cosine has no length.
 EQUATIONS = sorted(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from urdfkin import Reference
-from urdfkin.prepared import PreparedFrame
+from urdfkin.compiled.prepared import PreparedFrame
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray
 
 
 def by_the_robot(

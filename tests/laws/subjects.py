@@ -8,8 +8,8 @@ import pinocchio as pin
 import urdfkin
 from tests.robots.against_pinocchio import coupling, model_of
 from tests.robots.odd_urdfs import urdf_of
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray
 
 EPS = np.finfo(np.float64).eps
 

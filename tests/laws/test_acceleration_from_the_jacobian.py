@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.catalogue import catalogue
-from urdfkin.recursion import evaluate
-from urdfkin.recursion.base import STILL_STATE
-from urdfkin.reference import Reference
-from urdfkin.roundings import EPS
-from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import Bound
-from urdfkin.verification.magnitudes import magnitudes
-from urdfkin.verification.quantities import ACCELERATION, JACOBIAN, JACOBIAN_RATE
+from urdfkin.compiled import evaluate
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.verify.bounds import Bound
+from urdfkin.verify.magnitudes import magnitudes
+from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, JACOBIAN_RATE
 
 
 def room(bound: Bound) -> FloatArray:

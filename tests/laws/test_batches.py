@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 from tests.laws.subjects import NAMES, robot_of, state
 from urdfkin import load
+from urdfkin.compiled.batch import PART
+from urdfkin.compiled.registers import LANES
 from urdfkin.errors import InputError, NotFiniteError, RangeError, RepresentationSingularityError
-from urdfkin.recursion.base import BaseMotion
-from urdfkin.recursion.batch import PART
-from urdfkin.recursion.registers import LANES
-from urdfkin.reference import Reference
+from urdfkin.kinematics.rotation.euler import euler_of
+from urdfkin.kinematics.rotation.euler_rates import singularity_distance
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.rotation.euler import euler_of
-from urdfkin.rotation.euler_rates import singularity_distance
-from urdfkin.tree import FloatArray
 
 Compute = Callable[[Robot, FloatArray, FloatArray, FloatArray], FloatArray]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.laws.subjects import EPS, NAMES, moved, robot_of, rotation_vector, state
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 STEPS = 2.0 ** -np.arange(3.0, 26.0)
 

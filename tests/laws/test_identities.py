@@ -7,11 +7,11 @@ from scipy.spatial.transform import Rotation
 from tests.laws.subjects import EPS, NAMES, robot_of, state
 from tests.robots.odd_urdfs import Urdf
 from urdfkin import load
-from urdfkin.recursion.base import BaseMotion
-from urdfkin.reference import Reference
+from urdfkin.kinematics.rotation import exp_rotation
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
-from urdfkin.rotation import exp_rotation
-from urdfkin.tree import FloatArray, JointKind
 
 LOCAL, WORLD, ALIGNED = Reference
 #: Room for the rounding of a law's own arithmetic, in eps of the largest number that enters it.

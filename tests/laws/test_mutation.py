@@ -12,14 +12,14 @@ import pytest
 import urdfkin
 from tests.laws.subjects import robot_of
 from tests.reading import tree_of
-from urdfkin.exact import recursion
-from urdfkin.judge import judge
+from urdfkin.compiled.plan import make_plan
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import VECTORS
-from urdfkin.oracle import Oracle
-from urdfkin.origin import Origin
-from urdfkin.recursion.plan import make_plan
 from urdfkin.robot import Robot
+from urdfkin.urdf.origin import Origin
+from urdfkin.validation.judgement import judge
+from urdfkin.verify.exact import recursion
+from urdfkin.verify.pinocchio import Oracle
 
 #: The relative change of a term.
 FACTOR = "1.0000000001"

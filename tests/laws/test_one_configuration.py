@@ -10,9 +10,9 @@ import urdfkin
 from tests.laws.everything import by_the_robot, differing, on_its_way_alone, prepared
 from tests.laws.subjects import NAMES, robot_of, state
 from tests.robots.odd_urdfs import Urdf
-from urdfkin.recursion.registers import LANES
+from urdfkin.compiled.registers import LANES
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray
 
 #: Rows of a block, of the next, and of one that was filled up.
 SAMPLES = 2 * LANES + 3

@@ -6,8 +6,8 @@ from types import ModuleType
 
 import pytest
 
-from urdfkin.catalogue import catalogue
 from urdfkin.lint import Severity, check
+from urdfkin.urdf.catalogue import catalogue
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "make_findings.py"
 

@@ -13,11 +13,11 @@ from jsonschema import Draft202012Validator
 
 from tests.report.documents import arms, failing, hostile
 from urdfkin.errors import InputError, SourceError
-from urdfkin.judge import judge
 from urdfkin.loading import load
 from urdfkin.report.document import Document, schema
 from urdfkin.report.reading import checked, read_document
 from urdfkin.validation.campaign import validate
+from urdfkin.validation.judgement import judge
 
 REFUSED = b'<?xml version="1.0"?><robot name="r"><link name="a"/><joint name="j" type="bent"/></robot>'
 

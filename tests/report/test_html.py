@@ -13,11 +13,11 @@ from typing import cast
 import pytest
 
 from tests.report.documents import HOSTILE_JOINT, HOSTILE_LINK, HOSTILE_ROBOT, arms, failing, hostile
-from urdfkin.catalogue import examples
 from urdfkin.report import html as html_module
 from urdfkin.report.document import Document
 from urdfkin.report.html import as_html
 from urdfkin.report.pages import angle
+from urdfkin.urdf.catalogue import examples
 from urdfkin.validation.campaign import validate
 
 pytestmark = pytest.mark.slow

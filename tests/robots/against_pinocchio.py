@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from urdfkin.reference import Reference
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray
 
 REFERENCES = {
     Reference.LOCAL: pin.LOCAL,

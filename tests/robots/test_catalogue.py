@@ -11,13 +11,13 @@ import pytest
 
 import urdfkin
 from tests.robots.against_pinocchio import ask, model_of
-from urdfkin.catalogue import catalogue, examples
-from urdfkin.reference import Reference
-from urdfkin.resources import example_robots_dir
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import JointKind
 from urdfkin.robot import Robot
-from urdfkin.tree import JointKind
+from urdfkin.system.resources import example_robots_dir
+from urdfkin.urdf.catalogue import catalogue, examples
 from urdfkin.validation.outcome import Verdict
-from urdfkin.verification.quantities import QUANTITIES
+from urdfkin.verify.quantities import QUANTITIES
 
 #: Pinocchio 4.1 builds no model with mimic=True of these: it does not find their leaders.
 WITHOUT_MIMIC_MODEL = frozenset({"alex_psyonic_hands", "romeo", "talos", "talos_box"})
@@ -44,7 +44,7 @@ def test_it_holds_every_urdf_of_example_robot_data_but_the_one_that_is_none() ->
 
 def test_it_is_found_without_importing_pinocchio() -> None:
     code = (
-        "import sys; from urdfkin.catalogue import catalogue; "
+        "import sys; from urdfkin.urdf.catalogue import catalogue; "
         "assert all(entry.path.is_file() for entry in catalogue().values()); "
         "print(sorted({'pinocchio', 'example_robot_data', 'yourdfpy', 'numpy', 'numba'} & set(sys.modules)))"
     )

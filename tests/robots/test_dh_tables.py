@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from urdfkin.catalogue import examples
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.noise import left_out
+from urdfkin.kinematics.roundings import EPS
 from urdfkin.loading import load
-from urdfkin.roundings import EPS
+from urdfkin.urdf.catalogue import examples
 
 #: Tables of each robot that is checked in the fast subset.
 FAST = {"ur5", "panda", "xarm7", "kinova", "so101", "tiago"}

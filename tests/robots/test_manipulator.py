@@ -6,9 +6,9 @@ import pytest
 import urdfkin
 from tests.odd_tree import pose
 from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNameError
-from urdfkin.reference import Reference
-from urdfkin.rotation import SEQUENCES
-from urdfkin.tree import FloatArray
+from urdfkin.kinematics.rotation import SEQUENCES
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
 
 ROBOTS = ("panda", "ur5", "allegro_left_hand", "polar", "iris_simple")
 
@@ -51,7 +51,7 @@ def test_all_frames_are_those_asked_for_one_by_one() -> None:
 
 
 def test_a_wrong_rate_of_the_jacobian_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    from urdfkin.recursion import evaluate  # noqa: PLC0415  to be replaced
+    from urdfkin.compiled import evaluate  # noqa: PLC0415  to be replaced
 
     original = evaluate.jacobian_rates
     monkeypatch.setattr(evaluate, "jacobian_rates", lambda *x, **y: original(*x, **y) * (1.0 + 1e-10))
@@ -64,7 +64,7 @@ def test_a_wrong_rate_of_the_jacobian_is_caught(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("representation", [*SEQUENCES, "quaternion"])
 def test_the_manipulator_jacobian_predicts_the_change_of_the_pose(representation: str) -> None:
-    from urdfkin.motion import orientation_of  # noqa: PLC0415
+    from urdfkin.kinematics.bodies import orientation_of  # noqa: PLC0415
 
     robot = urdfkin.load("ur5")
     q, v, step = robot.sample(1, 7)[0], np.random.default_rng(8).normal(size=6), 1e-4

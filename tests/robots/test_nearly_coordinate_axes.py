@@ -10,10 +10,10 @@ import pinocchio as pin
 import pytest
 
 import urdfkin
+from urdfkin.kinematics.roundings import EPS
 from urdfkin.lint import Severity, check
+from urdfkin.model.tree import FloatArray, KinematicTree, freed, with_tilts
 from urdfkin.robot import Robot
-from urdfkin.roundings import EPS
-from urdfkin.tree import FloatArray, KinematicTree, freed, with_tilts
 
 KINDS = {"revolute": "R", "continuous": "RUB", "prismatic": "P"}
 AXES = np.eye(3)

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 import urdfkin
 from tests.robots.against_pinocchio import ask
 from tests.robots.odd_urdfs import NAMES, random_tree, urdf_of
-from urdfkin.reference import Reference
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray
 from urdfkin.validation.outcome import Verdict
-from urdfkin.validation.report import RobotReport
-from urdfkin.verification.quantities import QUANTITIES
+from urdfkin.validation.results import RobotReport
+from urdfkin.verify.quantities import QUANTITIES
 
 pytestmark = pytest.mark.slow
 

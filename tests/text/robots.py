@@ -19,9 +19,9 @@ from tests.high_precision import (
     second_rate,
     turn,
 )
+from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.loading import load
 from urdfkin.robot import Robot
-from urdfkin.rotation.arrays import FloatArray
 
 HALF_PI = mp.pi / 2
 

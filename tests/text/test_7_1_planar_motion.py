@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tests.high_precision import array, column, mp, rate
-from tests.rotation.strategies import ROUNDING
-from urdfkin.motion import (
+from tests.kinematics.rotation.strategies import ROUNDING
+from urdfkin.kinematics.bodies import (
     link_endpoint,
     link_endpoint_velocity,
     planar_rotation,

@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.high_precision import about, array, column, mp, rate, turn
-from tests.rotation.strategies import ROUNDING
-from urdfkin.rotation import (
+from tests.kinematics.rotation.strategies import ROUNDING
+from urdfkin.kinematics.rotation import (
     angular_velocity_about,
     circular_velocity,
     rotation_about,

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from tests.high_precision import about, angular_velocity, array, column, mp, rate, turn
-from tests.rotation.strategies import ROUNDING
-from urdfkin.motion import MovingFrame, compose, point_position
-from urdfkin.rotation import (
+from tests.kinematics.rotation.strategies import ROUNDING
+from urdfkin.kinematics.bodies import MovingFrame, compose, point_position
+from urdfkin.kinematics.rotation import (
     add_angular_velocities,
     angular_velocity_about,
     angular_velocity_of,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.high_precision import about, angular_velocity, array, column, mp, rate, turn
-from tests.rotation.strategies import ROUNDING
+from tests.kinematics.rotation.strategies import ROUNDING
 from urdfkin.errors import RepresentationSingularityError
-from urdfkin.rotation import (
+from urdfkin.kinematics.rotation import (
     angular_velocity_from_euler_rates,
     angular_velocity_from_quaternion_rates,
     euler_rate_inverse,

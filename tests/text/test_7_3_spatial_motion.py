@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from tests.high_precision import array, column, mp, rate
+from tests.kinematics.rotation.strategies import ROUNDING
 from tests.moving import ORIENTATIONS, ORIGINS, T, frame
-from tests.rotation.strategies import ROUNDING
-from urdfkin.motion import compose, point_position, point_velocity
+from urdfkin.kinematics.bodies import compose, point_position, point_velocity
 
 P = column(mp.mpf(3) / 10, mp.mpf(11) / 10, -mp.mpf(7) / 10)
 

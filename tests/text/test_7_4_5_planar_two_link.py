@@ -7,9 +7,14 @@ import numpy as np
 
 from tests.high_precision import array, mp
 from tests.text.robots import close, motion, robot
-from urdfkin.motion import jacobian_column, joint_angular_velocity, link_endpoint_velocity, planar_rotation
-from urdfkin.rotation import rotation_about
-from urdfkin.rotation.arrays import FloatArray
+from urdfkin.kinematics.bodies import (
+    jacobian_column,
+    joint_angular_velocity,
+    link_endpoint_velocity,
+    planar_rotation,
+)
+from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.kinematics.rotation import rotation_about
 
 A1, A2 = 0.5, 0.4
 MOVING = motion("planar_two_link", 3)

@@ -4,8 +4,8 @@ import numpy as np
 
 from tests.text.robots import close, motion, robot
 from urdfkin.dh import motion as motion_of
-from urdfkin.motion import interorigin_vector, interorigin_velocity, joint_angular_velocity
-from urdfkin.rotation.arrays import FloatArray
+from urdfkin.kinematics.bodies import interorigin_vector, interorigin_velocity, joint_angular_velocity
+from urdfkin.kinematics.inputs import FloatArray
 
 MOVING = motion("polar", 4)
 Q, V = MOVING.q, MOVING.v

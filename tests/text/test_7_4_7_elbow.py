@@ -11,8 +11,8 @@ import numpy as np
 
 from tests.text.robots import close, motion, robot
 from urdfkin.dh import motion as motion_of
-from urdfkin.motion import interorigin_vector
-from urdfkin.rotation.arrays import FloatArray
+from urdfkin.kinematics.bodies import interorigin_vector
+from urdfkin.kinematics.inputs import FloatArray
 
 D1, A2, D4 = 0.6, 0.5, 0.45
 MOVING = motion("elbow", 5)

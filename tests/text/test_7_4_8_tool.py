@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.text.robots import close, motion, robot
-from urdfkin.motion import frame_velocity, tool_velocity
+from urdfkin.kinematics.bodies import frame_velocity, tool_velocity
 
 MOVING = motion("elbow", 6)
 #: The tool of robots/elbow.urdf lies 0.15 m along z6.

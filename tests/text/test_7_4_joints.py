@@ -8,13 +8,13 @@ import pytest
 
 from tests.high_precision import array, mp
 from tests.text.robots import close, motion, only, robot
-from urdfkin.motion import (
+from urdfkin.kinematics.bodies import (
     interorigin_vector,
     interorigin_velocity,
     jacobian_column,
     joint_angular_velocity,
 )
-from urdfkin.rotation.arrays import FloatArray
+from urdfkin.kinematics.inputs import FloatArray
 
 ELBOW, POLAR = motion("elbow"), motion("polar", 2)
 #: The URDF's link of each joint: its frame has link i's angular velocity and lies at O_{i-1}.

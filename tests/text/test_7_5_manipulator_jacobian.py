@@ -11,15 +11,15 @@ import pytest
 from tests.high_precision import array, column, mp, rate
 from tests.text.robots import Motion, close, motion, only, robot
 from urdfkin.errors import RepresentationSingularityError
-from urdfkin.motion import (
+from urdfkin.kinematics.bodies import (
     analytical_jacobian,
     pose_rates,
     representation_matrix,
     velocity_jacobian,
     velocity_of_pose_rates,
 )
-from urdfkin.rotation import euler_of, euler_rate_matrix
-from urdfkin.rotation.arrays import FloatArray
+from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.kinematics.rotation import euler_of, euler_rate_matrix
 
 MOVING = motion("elbow", 7)
 R_06 = MOVING.rotation(6)

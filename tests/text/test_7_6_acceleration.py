@@ -5,10 +5,15 @@ from typing import Any
 import numpy as np
 
 from tests.high_precision import array, column, mp, rate, second_rate
+from tests.kinematics.rotation.strategies import ROUNDING
 from tests.moving import ORIENTATIONS, ORIGINS, T, frame, point
-from tests.rotation.strategies import ROUNDING
-from urdfkin.motion import MovingFrame, planar_rotation_derivative, point_acceleration, point_velocity
-from urdfkin.rotation import rotation_about
+from urdfkin.kinematics.bodies import (
+    MovingFrame,
+    planar_rotation_derivative,
+    point_acceleration,
+    point_velocity,
+)
+from urdfkin.kinematics.rotation import rotation_about
 
 
 def moving(t: Any) -> Any:

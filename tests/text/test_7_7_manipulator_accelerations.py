@@ -5,10 +5,10 @@ import pytest
 
 from tests.high_precision import array, mp
 from tests.text.robots import Motion, close, motion, robot
-from urdfkin.motion import interorigin_velocity, joint_angular_velocity
-from urdfkin.recursion.base import BaseMotion
-from urdfkin.rotation import exp_rotation
-from urdfkin.rotation.arrays import FloatArray
+from urdfkin.kinematics.bodies import interorigin_velocity, joint_angular_velocity
+from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.kinematics.rotation import exp_rotation
+from urdfkin.model.base_motion import BaseMotion
 
 ELBOW, POLAR, PLANAR = motion("elbow", 8), motion("polar", 9), motion("planar_two_link", 10)
 ENDS = {"elbow": "wrist", "polar": "slider", "planar_two_link": "tip"}

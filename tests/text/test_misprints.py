@@ -3,10 +3,10 @@
 import numpy as np
 
 from tests.high_precision import array, column, mp, rate, turn
+from tests.kinematics.rotation.strategies import ROUNDING
 from tests.moving import ORIENTATIONS, ORIGINS, T, frame, point
-from tests.rotation.strategies import ROUNDING
 from tests.text.robots import close, motion, robot
-from urdfkin.motion import (
+from urdfkin.kinematics.bodies import (
     analytical_jacobian,
     compose,
     jacobian_column,
@@ -14,8 +14,14 @@ from urdfkin.motion import (
     point_acceleration,
     velocity_jacobian,
 )
-from urdfkin.recursion.base import BaseMotion
-from urdfkin.rotation import euler_rate_matrix, quaternion_of, quaternion_rates, rotation_about, skew
+from urdfkin.kinematics.rotation import (
+    euler_rate_matrix,
+    quaternion_of,
+    quaternion_rates,
+    rotation_about,
+    skew,
+)
+from urdfkin.model.base_motion import BaseMotion
 
 
 def test_omega_zyz_is_singular_at_pi_as_well_as_at_zero() -> None:

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from tests.mutation import slightly_wrong
-from urdfkin.equations import LOST, equations, explain, misprints, table
-from urdfkin.equations.registry import LAST
 from urdfkin.errors import UrdfkinError
+from urdfkin.kinematics.registry import LOST, equations, explain, misprints, table
+from urdfkin.kinematics.registry.entries import LAST
 
 ROOT = Path(__file__).parents[2]
 

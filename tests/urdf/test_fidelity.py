@@ -11,7 +11,7 @@ import pytest
 import urdfkin
 from tests.lint.cases.arm import LIMIT, arm, fixed
 from urdfkin.robot import Robot
-from urdfkin.verification.verifier import NotVerifiedWarning
+from urdfkin.verify.verifier import NotVerifiedWarning
 
 TIP = "link:tool"
 

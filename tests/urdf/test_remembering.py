@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.reading import records, tree_of
-from urdfkin.keeping import CacheWarning
-from urdfkin.sources import read_source
-from urdfkin.tree import KinematicTree
+from urdfkin.model.tree import KinematicTree
+from urdfkin.system.keeping import CacheWarning
 from urdfkin.urdf import remembering
 from urdfkin.urdf.remembering import remembered_tree
+from urdfkin.urdf.sources import read_source
 
 
 @pytest.fixture(autouse=True)

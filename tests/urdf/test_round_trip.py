@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from tests.reading import tree_of
 from tests.strategies import rotation, rotations, trees
 from urdfkin.errors import InputError
+from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.lint import Severity, UrdfWarning, check_text
 from urdfkin.loading import load
-from urdfkin.rotation import rpy_of
-from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
 from urdfkin.urdf.skeleton import rpy_of_quaternion
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.verification.verifier import NotVerifiedWarning
+from urdfkin.verify.verifier import NotVerifiedWarning
 
 EPS = float(np.finfo(float).eps)
 

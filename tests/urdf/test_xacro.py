@@ -10,9 +10,9 @@ import pytest
 
 import urdfkin
 from urdfkin.errors import InputError, SourceError
-from urdfkin.sources import read_source
 from urdfkin.urdf import xacro
 from urdfkin.urdf.packages import find_package
+from urdfkin.urdf.sources import read_source
 from urdfkin.urdf.xacro import XacroError, expand
 
 pytestmark = pytest.mark.slow

@@ -10,12 +10,12 @@ import pytest
 
 import urdfkin
 from urdfkin.dh import dh_table
-from urdfkin.oracle import Oracle
 from urdfkin.validation import chains as chains_module
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chains import MOST, chains_of
 from urdfkin.validation.clock import Clock, total
 from urdfkin.validation.outcome import Verdict
+from urdfkin.verify.pinocchio import Oracle
 
 
 def test_the_chains_of_a_catalogues_robot_are_its_limbs_checked_in_both_conventions() -> None:

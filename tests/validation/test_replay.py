@@ -12,7 +12,7 @@ from tests.cli.running import urdfkin as command
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.robot import Robot
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.report import RobotReport
+from urdfkin.validation.results import RobotReport
 
 #: A link is called as a joint elsewhere, so that a replay line has to say which it means.
 TEXT = """<robot name="r"><link name="base"/><link name="b"/><link name="turn"/>

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from urdfkin.roundings import EPS
+from urdfkin.kinematics.roundings import EPS
 from urdfkin.validation.tally import HISTOGRAM_EDGES, Inputs, Tally, histogram_bin, percentile, tally
-from urdfkin.verification.bounds import Bound
+from urdfkin.verify.bounds import Bound
 
 FRAMES = ("a", "b", "c")
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.frame_motion import FrameMotion, frame_motion
-from urdfkin.rotation import rotation_of
+from urdfkin.kinematics.rotation import rotation_of
+from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.view.overlays import acceleration_arrows, jacobian_arrows, velocity_ellipsoid
-from urdfkin.view.words import numbers
+from urdfkin.view.readings import numbers
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.rotation import rotation_from_rpy
+from urdfkin.kinematics.rotation import rotation_from_rpy
 from urdfkin.view.meshes import mesh
 from urdfkin.view.shapes import mesh_file, shapes
 

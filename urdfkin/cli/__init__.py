@@ -16,7 +16,7 @@ from urdfkin.cli import streams
 from urdfkin.cli.crash import run
 from urdfkin.cli.door import guard
 from urdfkin.errors import UnknownNameError
-from urdfkin.verification.quantities import by_command
+from urdfkin.verify.quantities import by_command
 
 #: Command name -> (module that holds `command`, one-line summary), in the order of the help page, before and
 #: after the commands that compute a quantity.

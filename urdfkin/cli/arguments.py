@@ -14,12 +14,12 @@ from urdfkin.cli.door import say
 from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.numbers import Whole
 from urdfkin.errors import InputError, SourceError
-from urdfkin.files import read_standard_input, read_text
-from urdfkin.numerals import whole
+from urdfkin.errors.numerals import whole
+from urdfkin.system.files import read_standard_input, read_text
 
 if TYPE_CHECKING:
+    from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
-    from urdfkin.tree import FloatArray
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -158,7 +158,7 @@ def _values(robot: Robot, letter: str, text: str, rng: Any) -> FloatArray:
     """(n, width) for one option."""
     import numpy as np  # noqa: PLC0415
 
-    from urdfkin.verification.sampling import sample  # noqa: PLC0415
+    from urdfkin.verify.sampling import sample  # noqa: PLC0415
 
     names = robot.coordinate_names if letter == "q" else robot.rate_names
     if text == "neutral":
@@ -169,7 +169,7 @@ def _values(robot: Robot, letter: str, text: str, rng: Any) -> FloatArray:
         return sample(robot.tree, n, rng) if letter == "q" else rng.standard_normal((n, len(names)))
     if text.startswith("@"):
         return _read_csv(Path(text[1:]), letter, names)
-    from urdfkin.columns import numbers  # noqa: PLC0415
+    from urdfkin.motion.columns import numbers  # noqa: PLC0415
 
     return np.array([numbers(text.split(","), f"--{letter}", names)])
 
@@ -185,7 +185,7 @@ def _read_csv(path: Path, letter: str, names: Sequence[str]) -> FloatArray:
     """A batch, one sample a line; a first line of names may put the columns in any order."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
-    from urdfkin.columns import read_columns  # noqa: PLC0415
+    from urdfkin.motion.columns import read_columns  # noqa: PLC0415
 
     text = _standard_input() if str(path) == "-" else read_text(path)
     columns = read_columns(text, str(path), f"--{letter}", names)

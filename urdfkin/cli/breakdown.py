@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.door import say
+from urdfkin.cli.listing import print_named
 from urdfkin.cli.output import check_line, console, write_file
-from urdfkin.cli.tables import print_named
-from urdfkin.printable import csv_cell, json_text
-from urdfkin.verification.quantities import SIX
+from urdfkin.errors.printable import csv_cell, json_text
+from urdfkin.verify.quantities import SIX
 
 if TYPE_CHECKING:
-    from urdfkin.recursion.breakdown import AccelerationBreakdown
-    from urdfkin.tree import FloatArray
+    from urdfkin.compiled.breakdown import AccelerationBreakdown
+    from urdfkin.model.tree import FloatArray
 
 _COLUMNS = ("joint", "kind", "lin x", "lin y", "lin z", "ang x", "ang y", "ang z")
 #: How many samples of a batch the table shows.
@@ -47,7 +47,7 @@ def emit_breakdown(
 
 def _rows(parts: AccelerationBreakdown, sample: int) -> Iterator[tuple[str, str, FloatArray]]:
     """(joint, kind, six numbers) of one sample; parts that are exactly zero are left out."""
-    from urdfkin.recursion.breakdown import KINDS  # noqa: PLC0415  keeps --help fast
+    from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  keeps --help fast
 
     if parts.base[sample].any():
         yield "base", "moving base", parts.base[sample]
@@ -79,7 +79,7 @@ def _cells(six: FloatArray, noise: float) -> list[str]:
 
 
 def _as_json(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> bytes:
-    from urdfkin.recursion.breakdown import KINDS  # noqa: PLC0415
+    from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415
 
     certificate = inputs.robot.certificate()
     document = {

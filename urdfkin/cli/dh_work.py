@@ -24,11 +24,11 @@ from urdfkin.dh.references import reference_path
 from urdfkin.dh.to_tree import to_urdf
 from urdfkin.dh.tree_parameters import tree_parameters
 from urdfkin.errors import InputError
-from urdfkin.oracle import version
 from urdfkin.robot import Robot
-from urdfkin.verification.sampling import draw
-from urdfkin.verification.tables import TableCheck
-from urdfkin.verification.verifier import TABLE_SAMPLES
+from urdfkin.verify.pinocchio import version
+from urdfkin.verify.sampling import draw
+from urdfkin.verify.tables import TableCheck
+from urdfkin.verify.verifier import TABLE_SAMPLES
 
 #: Forms that can hold several tables one after the other.
 _SEVERAL = ("terminal", "markdown", "latex", "json")
@@ -139,7 +139,7 @@ def _written(work: Work, table: DHTable, check: TableCheck | None) -> str:
     if work.format_ == "urdf":
         return to_urdf(table)
     if work.format_ == "svg":
-        from urdfkin.dh.drawing import drawing  # noqa: PLC0415  needs an extra
+        from urdfkin.view.dh_drawing import drawing  # noqa: PLC0415  needs an extra
 
         return drawing(table)
     text = export(table, work.format_, work.units)

@@ -13,7 +13,7 @@ from typing import Any, TextIO
 
 import click
 
-from urdfkin.printable import escape, printable
+from urdfkin.errors.printable import escape, printable
 
 #: What rich writes to a terminal: colours, and moves of the cursor for a bar.
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from urdfkin.equations import explain as explain_equation
+from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.lint.explain import explain
 from urdfkin.lint.pages import RULES, find_rule, page
 

@@ -12,8 +12,8 @@ import click
 from urdfkin.cli.arguments import load_robot, robot_argument
 
 if TYPE_CHECKING:
+    from urdfkin.model.tree import Joint
     from urdfkin.robot import Robot
-    from urdfkin.tree import Joint
 
 EXAMPLE = "urdfkin info panda"
 
@@ -30,7 +30,7 @@ def command(robot: str, mimic: bool | None, root_joint: str | None, format_: str
     """
     loaded = load_robot(robot, mimic, root_joint)
     if format_ == "json":
-        from urdfkin.description import describe  # noqa: PLC0415  keeps --help fast
+        from urdfkin.validation.description import describe  # noqa: PLC0415  keeps --help fast
 
         json.dump(describe(loaded), sys.stdout, indent=2, allow_nan=False)
         click.echo()
@@ -39,8 +39,8 @@ def command(robot: str, mimic: bool | None, root_joint: str | None, format_: str
 
 
 def _print(robot: Robot) -> None:
+    from urdfkin.cli.listing import fits, make_table, print_named  # noqa: PLC0415
     from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
-    from urdfkin.cli.tables import fits, make_table, print_named  # noqa: PLC0415
 
     tree, out = robot.tree, console()
     out.print(

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from urdfkin.cli.door import say
 
 if TYPE_CHECKING:
-    from urdfkin.judge import Judgement
     from urdfkin.robot import Robot
-    from urdfkin.validation.report import ValidationReport
+    from urdfkin.validation.judgement import Judgement
+    from urdfkin.validation.results import ValidationReport
 
 
 def judge_all(
@@ -51,10 +51,10 @@ def _judged(
 ) -> Judgement | None:
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
-    from urdfkin.judge import judge  # noqa: PLC0415
     from urdfkin.lint import UrdfWarning  # noqa: PLC0415  keeps --help fast
     from urdfkin.loading import load  # noqa: PLC0415
-    from urdfkin.verification.sampling import draw_base  # noqa: PLC0415
+    from urdfkin.validation.judgement import judge  # noqa: PLC0415
+    from urdfkin.verify.sampling import draw_base  # noqa: PLC0415
 
     try:
         with warnings.catch_warnings():

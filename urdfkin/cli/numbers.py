@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from urdfkin.numerals import decimal, remedy, whole
+from urdfkin.errors.numerals import decimal, remedy, whole
 
 
 class Whole(click.IntRange):

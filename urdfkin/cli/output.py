@@ -17,18 +17,18 @@ import click
 
 from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.door import say
-from urdfkin.cli.tables import make_table, print_named
+from urdfkin.cli.listing import make_table, print_named
 from urdfkin.errors import SourceError
-from urdfkin.numerals import whole
-from urdfkin.printable import csv_cell, json_text
+from urdfkin.errors.numerals import whole
+from urdfkin.errors.printable import csv_cell, json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from urdfkin.tree import FloatArray
-    from urdfkin.verification.certificate import Certificate
-    from urdfkin.verification.quantities import Quantity
+    from urdfkin.model.tree import FloatArray
+    from urdfkin.verify.certificate import Certificate
+    from urdfkin.verify.quantities import Quantity
 
 FORMATS = ("table", "json", "csv", "npy")
 #: Columns beyond which a table gets no wider: padding takes memory.
@@ -55,7 +55,7 @@ output_option = click.option(
 @contextmanager
 def compiling() -> Iterator[None]:
     """Say what takes so long when the recursion is compiled, once on a machine."""
-    from urdfkin.recursion.announcing import announced  # noqa: PLC0415  keeps --help fast
+    from urdfkin.compiled.announcing import announced  # noqa: PLC0415  keeps --help fast
 
     message = "urdfkin: compiling the recursion for this machine, once; some ten seconds ..."
     with announced(lambda: say(message, err=True)):

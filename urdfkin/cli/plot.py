@@ -15,10 +15,10 @@ from urdfkin.cli.reports import check_writable
 from urdfkin.errors import InputError
 
 if TYPE_CHECKING:
+    from urdfkin.motion.trajectory import Trajectory
     from urdfkin.robot import Robot
-    from urdfkin.trajectory import Trajectory
 
-#: They repeat `urdfkin.plot.panels.PANELS`, whose import --help does not need.
+#: They repeat `urdfkin.view.plot.panels.PANELS`, whose import --help does not need.
 PANELS = (
     *("position", "orientation", "velocity", "angular-velocity", "acceleration", "angular-acceleration"),
     *("parts", "singular-values", "manipulability", "disagreement"),
@@ -75,10 +75,10 @@ def command(
     """
     if (trajectory is None) == (end is None):
         raise click.UsageError("say --trajectory FILE.csv, or --to VALUES for a line")
-    from urdfkin.figure import save  # noqa: PLC0415  keeps --help fast
-    from urdfkin.frame_motion import frame_motion  # noqa: PLC0415
-    from urdfkin.plot.sheet import foot, sheet  # noqa: PLC0415
-    from urdfkin.trajectory import read_trajectory  # noqa: PLC0415
+    from urdfkin.motion.frame_motion import frame_motion  # noqa: PLC0415
+    from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415
+    from urdfkin.view.figure import save  # noqa: PLC0415  keeps --help fast
+    from urdfkin.view.plot.sheet import foot, sheet  # noqa: PLC0415
 
     check_writable(output)
     loaded = load_robot(robot, mimic, root_joint)
@@ -97,7 +97,7 @@ def command(
 
 def _line(robot: Robot, start: str, end: str, duration: float, samples: int, seed: int) -> Trajectory:
     from urdfkin.cli.arguments import read_inputs  # noqa: PLC0415
-    from urdfkin.trajectory import line  # noqa: PLC0415
+    from urdfkin.motion.trajectory import line  # noqa: PLC0415
 
     ends = [read_inputs(robot, None, seed, text).q for text in (start, end)]
     if any(len(q) != 1 for q in ends):

@@ -21,7 +21,7 @@ from urdfkin.cli.arguments import (
 )
 from urdfkin.cli.breakdown import emit_breakdown
 from urdfkin.cli.output import compiling, emit, exit_code, format_option, output_option
-from urdfkin.verification.quantities import ACCELERATION_BREAKDOWN, Quantity
+from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
 
 _ROBOT = (
     "ROBOT is a path (a table, .toml, .json or .csv, is made a robot), a name that `urdfkin robots` lists, or"

@@ -7,7 +7,7 @@ import sys
 
 import click
 
-from urdfkin.catalogue import Entry, catalogue
+from urdfkin.urdf.catalogue import Entry, catalogue
 
 EXAMPLE = "urdfkin robots --family arm"
 
@@ -29,8 +29,8 @@ def command(family: str | None, format_: str) -> None:
         json.dump([_as_dict(entry) for entry in entries], sys.stdout, indent=2)
         click.echo()
         return
+    from urdfkin.cli.listing import print_named  # noqa: PLC0415
     from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
-    from urdfkin.cli.tables import print_named  # noqa: PLC0415
 
     rows = ((entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries)
     out = console()

@@ -7,7 +7,7 @@ from typing import Any, TextIO, cast
 from rich.console import Console
 
 from urdfkin.cli.door import Door
-from urdfkin.printable import printable
+from urdfkin.errors.printable import printable
 
 
 class Terminal(Console):

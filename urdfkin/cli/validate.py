@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 
-from urdfkin.catalogue import examples
 from urdfkin.cli.arguments import xacro_args, xacro_option
 from urdfkin.cli.judgement import judge_all
 from urdfkin.cli.numbers import Whole
 from urdfkin.cli.output import compiling, console
 from urdfkin.cli.reports import check_writable, report_options, write_reports
 from urdfkin.cli.stopping import stoppable
-from urdfkin.printable import printable
+from urdfkin.errors.printable import printable
+from urdfkin.urdf.catalogue import examples
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot

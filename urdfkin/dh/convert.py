@@ -16,7 +16,7 @@ import numpy as np
 from urdfkin.dh.elements import as_step
 from urdfkin.dh.row import Convention, convention_of
 from urdfkin.dh.table import DHTable
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 
 def to_convention(table: DHTable, convention: str) -> DHTable:

@@ -16,7 +16,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from urdfkin.chain import ChainJoint, FrameChain
 from urdfkin.dh.elements import as_step, between_axes
 from urdfkin.dh.noise import Noise, noises, tilt_of
 from urdfkin.dh.normals import (
@@ -30,8 +29,9 @@ from urdfkin.dh.normals import (
 from urdfkin.dh.row import Convention, DHRow, convention_of
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.roundings import ENTRY, EPS
-from urdfkin.tree import FloatArray
+from urdfkin.kinematics.roundings import ENTRY, EPS
+from urdfkin.model.chain import ChainJoint, FrameChain
+from urdfkin.model.tree import FloatArray
 
 #: x is turned round when |theta| exceeds a right angle by more than this (rad): 1.5708 and 1.571 do not.
 RIGHT_ANGLE_SLACK = 1e-3

@@ -15,8 +15,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.roundings import ANGLE, EPS
-from urdfkin.tree import FloatArray
+from urdfkin.kinematics.roundings import ANGLE, EPS
+from urdfkin.model.tree import FloatArray
 
 
 def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from urdfkin.dh.elements import nearest_twelfth
 from urdfkin.dh.table import DHTable
-from urdfkin.roundings import ANGLE, EPS
+from urdfkin.kinematics.roundings import ANGLE, EPS
 
 #: Radians off a multiple of 15 degrees, and metres for each metre of span, that look like such rounding.
 LARGEST = 1e-4

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from urdfkin.errors import RangeError
-from urdfkin.tree import Joint
+from urdfkin.model.tree import Joint
 
 #: Metres: beyond it squares of sums, of which common normals and the bounds of the check are made, overflow.
 LONGEST = 1e150

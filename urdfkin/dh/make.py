@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
-from urdfkin.chain import chain
 from urdfkin.dh.derive import choices_of, derive
 from urdfkin.dh.lengths import demand_squares
 from urdfkin.dh.snapping import checked_tolerance, row_of_constant, snap_chain, snap_thetas, statement
 from urdfkin.dh.table import DHTable
-from urdfkin.tree import KinematicTree
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import KinematicTree
 
 
 def dh_table(

@@ -1,7 +1,7 @@
 """Velocity, Jacobian and acceleration of a table: the text's recursion run on its own frames.
 
 Equations 7.85 and 7.127 to 7.130, with d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). The recursion exists once
-(`urdfkin.recursion`); it runs here on the tree whose joints stand on the table's frames. Followers are free
+(`urdfkin.compiled`); it runs here on the tree whose joints stand on the table's frames. Followers are free
 joints there, and the coupling values = G q + g is applied outside: J = J_rows G.
 """
 
@@ -14,12 +14,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.compiled.evaluate import accelerations, jacobians, velocities
+from urdfkin.compiled.plan import Plan, make_plan
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.to_tree import free_tree
-from urdfkin.recursion.evaluate import accelerations, jacobians, velocities
-from urdfkin.recursion.plan import Plan, make_plan
-from urdfkin.reference import Reference
-from urdfkin.tree import FloatArray
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
 
 
 @lru_cache(maxsize=64)

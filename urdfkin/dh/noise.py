@@ -1,10 +1,10 @@
 """What of a chain's constants is rounding: a tilt or an offset below this is none.
 
 Two correct programs that read one URDF do not get the same constant pose between two joint axes, and what
-wrote the file was a program as well, which may have kept fifteen digits of each angle. `urdfkin.roundings`
-counts both. So angles of fourteen or fifteen digits (1.5707963267949 is 15 eps off a right angle,
-3.14159265358979 as much) are round. One of twelve digits, 900 eps off and more, is not: what makes that one
-round is `snap`, which says what it moves.
+wrote the file was a program as well, which may have kept fifteen digits of each angle.
+`urdfkin.kinematics.roundings` counts both. So angles of fourteen or fifteen digits (1.5707963267949 is 15 eps
+off a right angle, 3.14159265358979 as much) are round. One of twelve digits, 900 eps off and more, is not:
+what makes that one round is `snap`, which says what it moves.
 
 A tilt below this is zero in a table: no row is spent on it, and no foot stands at its inverse. It is counted
 by `left_out`, by which a table may then differ.
@@ -15,9 +15,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from urdfkin.chain import FrameChain
-from urdfkin.roundings import AXES, CONSTANT, EPS, SUMMED, WRITTEN
-from urdfkin.tree import FloatArray
+from urdfkin.kinematics.roundings import AXES, CONSTANT, EPS, SUMMED, WRITTEN
+from urdfkin.model.chain import FrameChain
+from urdfkin.model.tree import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,8 +20,8 @@ import numpy as np
 
 from urdfkin.dh.elements import between_axes, wrapped
 from urdfkin.dh.noise import Noise, noise_of, tilt_of
-from urdfkin.roundings import ANGLE, DIGITS, EPS, SUMMED
-from urdfkin.tree import FloatArray
+from urdfkin.kinematics.roundings import ANGLE, DIGITS, EPS, SUMMED
+from urdfkin.model.tree import FloatArray
 
 #: Below this tilt (rad) a pair is nearly parallel: the feet would magnify errors in the URDF a hundredfold.
 NEARLY_PARALLEL = 1e-2

@@ -15,8 +15,8 @@ from urdfkin.dh.rows import table_from_mapping
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.written_row import ORDER
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.files import read_text
-from urdfkin.printable import from_csv_cell
+from urdfkin.errors.printable import from_csv_cell
+from urdfkin.system.files import read_text
 
 
 def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from urdfkin.errors import UnknownNameError
-from urdfkin.files import exists
-from urdfkin.resources import robots_dir
+from urdfkin.system.files import exists
+from urdfkin.system.resources import robots_dir
 
 
 def references() -> dict[str, Path]:

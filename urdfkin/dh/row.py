@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.errors import InputError
-from urdfkin.tree import FloatArray, JointKind, Limit, Mimic
+from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic
 
 
 class Convention(StrEnum):

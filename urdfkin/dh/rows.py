@@ -29,7 +29,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units, read_number, units_of
 from urdfkin.dh.written_row import name_of, refuse_other_order, written_row
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),

@@ -14,16 +14,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.chain import ChainJoint, FrameChain, chain, steps_between
-from urdfkin.demands import real_number
 from urdfkin.dh.elements import nearest_twelfth, wrapped
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.statement import SnapChange, SnapStatement
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
-from urdfkin.rotation.euler import coordinate_rotation
-from urdfkin.roundings import EPS, TURN
-from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
+from urdfkin.errors.demands import real_number
+from urdfkin.kinematics.rotation.euler import coordinate_rotation
+from urdfkin.kinematics.roundings import EPS, TURN
+from urdfkin.model.chain import ChainJoint, FrameChain, chain, steps_between
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
 #: Half of 15 degrees is where the next multiple begins; a tolerance must stay clear of it.
 LARGEST_TOLERANCE = math.pi / 36.0

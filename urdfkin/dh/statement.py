@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from urdfkin.tree import FloatArray
+    from urdfkin.model.tree import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,12 +20,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.coupling import Coupling, coupling_of
 from urdfkin.dh.row import Convention, DHRow, convention_of
 from urdfkin.dh.statement import SnapStatement
 from urdfkin.errors import InputError
-from urdfkin.roundings import EPS, of_rows
-from urdfkin.tree import FloatArray, frozen
+from urdfkin.kinematics.roundings import EPS, of_rows
+from urdfkin.model.coupling import Coupling, coupling_of
+from urdfkin.model.tree import FloatArray, frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ class DHTable:
     def rounding(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
         """(...,) metres: what rounding may do to `placement(q)`; divided by `span`, radians.
 
-        What the rows round (`urdfkin.roundings`), and their angles, times the lever arm.
+        What the rows round (`urdfkin.kinematics.roundings`), and their angles, times the lever arm.
         """
         values = np.abs(self.coupling.values(q))
         turns = np.array([row.kind.turns for row in self.rows], dtype=bool)
@@ -150,7 +150,7 @@ class DHTable:
 
         Example:
             >>> import math
-            >>> from urdfkin.tree import JointKind
+            >>> from urdfkin.model.tree import JointKind
             >>> arm = DHTable(Convention.STANDARD, (DHRow(2.0, 0.0, 0.0, 0.0, JointKind.REVOLUTE, "j"),))
             >>> arm.placement([math.pi / 2])[:3, 3].round(12).tolist()
             [0.0, 2.0, 0.0]

@@ -15,7 +15,7 @@ import numpy as np
 
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.table import DHTable
-from urdfkin.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
 from urdfkin.urdf.writer import to_urdf as write_urdf
 
 #: A sliding joint that no file bounds: a kilometre either way, m and m/s and N.

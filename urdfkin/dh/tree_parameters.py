@@ -21,16 +21,16 @@ from functools import cached_property
 
 import numpy as np
 
-from urdfkin.chain import motion_about_z
 from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
 from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.dh.lengths import demand_squares
 from urdfkin.dh.noise import Noise, noise_of, tilt_of
 from urdfkin.dh.normals import NearParallel, Step, cleaned_angle, cleaned_length, step_between
 from urdfkin.errors import InputError
-from urdfkin.rotation import axis_aligning
-from urdfkin.roundings import EPS, of_rows
-from urdfkin.tree import FloatArray, JointKind, KinematicTree, frozen
+from urdfkin.kinematics.rotation import axis_aligning
+from urdfkin.kinematics.roundings import EPS, of_rows
+from urdfkin.model.chain import motion_about_z
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
 
 _SIGMA = {
     JointKind.REVOLUTE: 0,

@@ -11,7 +11,7 @@ import numpy as np
 from urdfkin.dh.row import DHRow
 from urdfkin.dh.units import Angles, Units, cell_in_si, read_number
 from urdfkin.errors import InputError
-from urdfkin.tree import JointKind, Limit, Mimic
+from urdfkin.model.tree import JointKind, Limit, Mimic
 
 #: What a list has in this order, with "R" or "P" behind it if it says so; beta has no place there.
 ORDER = ("a", "alpha", "d", "theta")

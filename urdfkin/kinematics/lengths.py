@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.kinematics.arithmetic import bound
-from urdfkin.roundings import SMALLEST
+from urdfkin.kinematics.roundings import SMALLEST
 
 FloatArray = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from urdfkin.printable import printable
+from urdfkin.errors.printable import printable
 
 #: Longest piece of a file that is quoted in a message.
 QUOTED = 60

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import textwrap
 
+from urdfkin.errors.printable import printable
 from urdfkin.lint.pages import page
 from urdfkin.lint.rule import Rule
-from urdfkin.printable import printable
 
 #: Longest line of an example that is shown whole.
 _WIDEST = 100

@@ -12,8 +12,8 @@ from enum import Enum
 from typing import Any
 
 from urdfkin.errors import UrdfkinError
+from urdfkin.errors.printable import printable
 from urdfkin.lint.escape import shortened
-from urdfkin.printable import printable
 
 
 class Severity(Enum):

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
+from urdfkin.errors.nearest import nearest
 from urdfkin.lint.finding import Finding, Severity
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
 from urdfkin.lint.rule import Rule
-from urdfkin.nearest import nearest
 from urdfkin.urdf.element import Element
 
 #: How many misspelt names of a file get suggestions, from how many names and after how much comparing.

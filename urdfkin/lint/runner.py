@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from urdfkin.demands import switch, word
+from urdfkin.errors.demands import switch, word
 from urdfkin.lint.finding import Finding
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
 from urdfkin.lint.reporter import Reporter
@@ -27,8 +27,8 @@ from urdfkin.lint.rules.shapes import check_shapes
 from urdfkin.lint.rules.structure import check_structure
 from urdfkin.lint.rules.suspicious import check_suspicious
 from urdfkin.lint.rules.vocabulary import check_vocabulary
-from urdfkin.sources import Source, Text, read_source
 from urdfkin.urdf.records import RobotRecord
+from urdfkin.urdf.sources import Source, Text, read_source
 
 
 def check(

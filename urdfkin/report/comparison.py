@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from urdfkin.printable import markdown_text as text
+from urdfkin.errors.printable import markdown_text as text
 from urdfkin.report.compare import Change, Comparison, figures
 from urdfkin.report.document import Document, Units
 from urdfkin.report.markdown import LIMIT, shortened

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urdfkin.figure import FIRST, GRID, SECOND, TEXT, THIRD, inline_svg, label, new_figure, style
 from urdfkin.report.document import Check, Robot
 from urdfkin.report.words import of_quantity, quantities, quantity_name, units, worst
+from urdfkin.view.figure import FIRST, GRID, SECOND, TEXT, THIRD, inline_svg, label, new_figure, style
 
 if TYPE_CHECKING:
-    from urdfkin.figure import Axes
+    from urdfkin.view.figure import Axes
 
 #: What lies below is drawn as exact: a hundredth of a rounding.
 _LEFT = 1e-2

@@ -6,7 +6,6 @@ from datetime import datetime
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from urdfkin.figure import installed
 from urdfkin.report import pages
 from urdfkin.report.distributions import distributions
 from urdfkin.report.document import Document, Robot, asset, outcome_of
@@ -24,6 +23,7 @@ from urdfkin.report.words import (
     worst,
 )
 from urdfkin.validation.portrait import chain_disagreement
+from urdfkin.view.figure import installed
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import cast
 
 from urdfkin.errors import InputError
-from urdfkin.files import read_bytes
 from urdfkin.report.consistency import contradictions
 from urdfkin.report.document import Document, schema
-from urdfkin.validation.report import SCHEMA
+from urdfkin.system.files import read_bytes
+from urdfkin.validation.results import SCHEMA
 
 #: How many contradictions of a report are told.
 _SHOWN = 3

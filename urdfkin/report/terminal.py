@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from urdfkin.printable import printable
+from urdfkin.errors.printable import printable
 from urdfkin.report.document import Check, Document, Judgement, Robot, outcome_of
 from urdfkin.report.words import (
     SIDES,

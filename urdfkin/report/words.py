@@ -7,7 +7,7 @@ from typing import Literal
 
 from urdfkin.report.document import Check, Document, Judged, Judgement, Robot, Units
 from urdfkin.validation.outcome import Verdict
-from urdfkin.verification.quantities import QUANTITIES
+from urdfkin.verify.quantities import QUANTITIES
 
 SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
 #: Worse verdicts first.

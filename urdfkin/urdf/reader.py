@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.tree import (
+from urdfkin.model.tree import (
     FloatArray,
     Joint,
     JointKind,

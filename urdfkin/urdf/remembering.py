@@ -13,10 +13,10 @@ import pickle
 from functools import cache
 from pathlib import Path
 
-from urdfkin import tree
-from urdfkin.keeping import kept_folder
-from urdfkin.sealed import damaged, keep, kept
-from urdfkin.tree import KinematicTree
+from urdfkin.model import tree
+from urdfkin.model.tree import KinematicTree
+from urdfkin.system.keeping import kept_folder
+from urdfkin.system.sealed import damaged, keep, kept
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.records import RobotRecord
 from urdfkin.urdf.skeleton import skeleton

@@ -11,9 +11,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from urdfkin.rotation.arrays import FloatArray
-from urdfkin.rotation.euler import rpy_of
-from urdfkin.rotation.quaternion import rotation_of
+from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.kinematics.rotation.euler import rpy_of
+from urdfkin.kinematics.rotation.quaternion import rotation_of
 from urdfkin.urdf.records import JointRecord, LimitRecord, RobotRecord
 from urdfkin.urdf.writer import attribute, numbers
 

@@ -10,8 +10,8 @@ import math
 from collections.abc import Iterable
 
 from urdfkin.errors import InputError
-from urdfkin.rotation.euler import rpy_of
-from urdfkin.tree import Joint, JointKind, KinematicTree, Limit
+from urdfkin.kinematics.rotation.euler import rpy_of
+from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit
 
 #: Kinds whose position limits a URDF must give.
 _BOUNDED = (JointKind.REVOLUTE, JointKind.PRISMATIC)
@@ -29,7 +29,7 @@ def to_urdf(tree: KinematicTree) -> str:
     Raises:
         InputError: a revolute or prismatic joint without finite limits, or a name that XML cannot hold.
 
-    >>> from urdfkin.tree import build_tree
+    >>> from urdfkin.model.tree import build_tree
     >>> print(to_urdf(build_tree("stone", "only", [])))
     <robot name="stone">
       <link name="only"/>

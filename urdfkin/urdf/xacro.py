@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import SourceError, UrdfkinError
-from urdfkin.interpreter import own_python
+from urdfkin.system.interpreter import own_python
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.packages import VARIABLES
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 from urdfkin.errors import UrdfkinError
 from urdfkin.lint import UrdfError
-from urdfkin.oracle import OracleError
 from urdfkin.validation.chunk import Chunk, ChunkResult, Subject, run_chunk
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait, as_data
+from urdfkin.verify.pinocchio import OracleError
 
 
 @dataclass(frozen=True, slots=True)

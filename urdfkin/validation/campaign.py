@@ -10,21 +10,21 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 
-from urdfkin.demands import switch, whole_number
+from urdfkin.compiled.announcing import load_kernels
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
+from urdfkin.errors.demands import switch, whole_number
 from urdfkin.loading import load
-from urdfkin.origin import Origin
-from urdfkin.recursion.announcing import load_kernels
 from urdfkin.robot import Robot
-from urdfkin.sources import Source, as_word, is_xacro, read_source
+from urdfkin.urdf.origin import Origin
+from urdfkin.urdf.sources import Source, as_word, is_xacro, read_source
 from urdfkin.validation import memory
 from urdfkin.validation.answer import Failure, failure, traced, unforeseen
 from urdfkin.validation.chunk import Subject, chunks
 from urdfkin.validation.engine import Engine, Here, OnExecutor, Task
 from urdfkin.validation.gathering import Gathering, Progress
 from urdfkin.validation.outcome import Verdict
-from urdfkin.validation.report import ValidationReport
+from urdfkin.validation.results import ValidationReport
 from urdfkin.validation.workers import Processes
 
 

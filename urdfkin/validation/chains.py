@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.catalogue import catalogue
 from urdfkin.dh import DHRow, DHTable
 from urdfkin.dh.make import dh_table
 from urdfkin.errors import InputError
-from urdfkin.oracle import Oracle
 from urdfkin.robot import Robot
-from urdfkin.verification.sampling import draw
-from urdfkin.verification.tables import check_table
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.sampling import draw
+from urdfkin.verify.tables import check_table
 
 #: A robot with more leaves shows this many chains; `urdfkin dh --all` gives them all.
 MOST = 12

@@ -13,19 +13,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from urdfkin.catalogue import catalogue
 from urdfkin.lint import UrdfWarning
 from urdfkin.loading import load
-from urdfkin.oracle import Oracle, OracleError
-from urdfkin.origin import Origin
+from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
-from urdfkin.tree import KinematicTree
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.origin import Origin
 from urdfkin.validation import memory
 from urdfkin.validation.clock import Clock
 from urdfkin.validation.comparing import tallies
 from urdfkin.validation.portrait import Portrait
 from urdfkin.validation.tally import Key, Tally
-from urdfkin.verification.sampling import Samples, draw
+from urdfkin.verify.pinocchio import Oracle, OracleError
+from urdfkin.verify.sampling import Samples, draw
 
 #: Samples in a chunk: small enough to spread a single robot over many workers.
 CHUNK_SAMPLES = 25

@@ -13,18 +13,18 @@ from functools import reduce
 
 import numpy as np
 
-from urdfkin.oracle import Oracle
-from urdfkin.recursion.base import STILL_STATE
-from urdfkin.recursion.plan import make_plan
-from urdfkin.reference import Reference
+from urdfkin.compiled.plan import make_plan
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, KinematicTree, freed
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray, KinematicTree, freed
 from urdfkin.validation.clock import Clock
 from urdfkin.validation.tally import Inputs, Key, Tally, tally
-from urdfkin.verification.bounds import Bound
-from urdfkin.verification.magnitudes import magnitudes
-from urdfkin.verification.quantities import SCREWS, walked
-from urdfkin.verification.sampling import Samples
+from urdfkin.verify.bounds import Bound
+from urdfkin.verify.magnitudes import magnitudes
+from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.quantities import SCREWS, walked
+from urdfkin.verify.sampling import Samples
 
 #: How large an array of a block may be, bytes; some ten arrays of this size are there at a time.
 BLOCK_BYTES = 32 * 2**20

@@ -13,7 +13,7 @@ from urdfkin.validation.clock import total
 from urdfkin.validation.engine import Task
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
-from urdfkin.validation.report import RobotReport
+from urdfkin.validation.results import RobotReport
 from urdfkin.validation.tally import Key, Tally
 
 #: Called after each chunk with (chunks done, chunks in all, the robot's source).

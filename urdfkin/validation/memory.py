@@ -10,9 +10,9 @@ import resource
 from collections.abc import Iterator
 from pathlib import Path
 
-from urdfkin.oracle import OracleError
-from urdfkin.tree import KinematicTree
+from urdfkin.model.tree import KinematicTree
 from urdfkin.validation.comparing import BLOCK_BYTES, frame_bytes
+from urdfkin.verify.pinocchio import OracleError
 
 #: How much of the free memory a validation keeps to.
 SHARE = 0.5

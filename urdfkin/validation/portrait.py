@@ -9,11 +9,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from urdfkin.description import describe
 from urdfkin.lint import Finding
-from urdfkin.oracle import Oracle
 from urdfkin.robot import Robot
 from urdfkin.validation.chains import chains_of
+from urdfkin.validation.description import describe
+from urdfkin.verify.pinocchio import Oracle
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class Portrait:
     """A robot for the reader of a report.
 
     Attributes:
-        model: As `urdfkin.description.describe` gives it; None if the robot could not be read.
+        model: As `urdfkin.validation.description.describe` gives it; None if the robot could not be read.
         findings: As `Finding.as_dict` gives them.
         chains: Denavit-Hartenberg tables of its chains, both conventions each.
     """

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urdfkin.tree import FloatArray
-from urdfkin.verification.bounds import Bound, result_k
-from urdfkin.verification.worst import worst_of_each
+from urdfkin.model.tree import FloatArray
+from urdfkin.verify.bounds import Bound, result_k
+from urdfkin.verify.worst import worst_of_each
 
 #: Edges of the histogram of disagreements, in eps * scale: ten bins a decade from 0.001 to 100,000.
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)

@@ -17,7 +17,7 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from typing import cast
 
-from urdfkin.interpreter import own_python
+from urdfkin.system.interpreter import own_python
 from urdfkin.validation.answer import Answer, Failure
 from urdfkin.validation.engine import Enter, Task, lost
 from urdfkin.validation.outcome import Verdict

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urdfkin.frame_motion import FrameMotion
-from urdfkin.recursion.breakdown import KINDS
-from urdfkin.rotation import quaternion_of
-from urdfkin.tree import FloatArray
+from urdfkin.compiled.breakdown import KINDS
+from urdfkin.kinematics.rotation import quaternion_of
+from urdfkin.model.tree import FloatArray
+from urdfkin.motion.frame_motion import FrameMotion
 
 #: The colour of each part of the acceleration, 0 to 255, and of their sum.
 PART_COLOURS = {

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.forking import lock_over_forks
+from urdfkin.system.forking import lock_over_forks
 from urdfkin.view.gate import HEADERS, Gate, policy
 
 LOOPBACK = "127.0.0.1"

@@ -11,12 +11,12 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from urdfkin.catalogue import catalogue
-from urdfkin.plain_xml import plain_xml
+from urdfkin.kinematics.rotation import rotation_from_rpy
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.rotation import rotation_from_rpy
-from urdfkin.tree import FloatArray
+from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.packages import find_package, split_uri
+from urdfkin.urdf.plain_xml import plain_xml
 
 #: The colour of what has none, as people expect metal.
 GREY = (0.72, 0.74, 0.78, 1.0)

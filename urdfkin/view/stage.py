@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from urdfkin.dh.table import DHTable
+from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray, KinematicTree
 from urdfkin.view.meshes import mesh
 from urdfkin.view.overlays import Arrows, Ellipsoid, scalar_first
 from urdfkin.view.shapes import GREY, Shape, shapes

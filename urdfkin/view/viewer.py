@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.configuration import checked
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
-from urdfkin.frame_motion import FrameMotion, frame_motion
-from urdfkin.printable import markdown_text
-from urdfkin.reference import Reference
+from urdfkin.errors.printable import markdown_text
+from urdfkin.model.configuration import checked
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.robot import Robot
-from urdfkin.tree import FloatArray
 from urdfkin.view.overlays import acceleration_arrows, jacobian_arrows, velocity_ellipsoid
+from urdfkin.view.readings import legend, numbers
 from urdfkin.view.stage import Stage
-from urdfkin.view.words import legend, numbers
 
 _REFERENCES = tuple(reference.name.lower() for reference in Reference)
 

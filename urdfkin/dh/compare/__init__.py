@@ -1,6 +1,6 @@
 """Does a URDF agree with the vendor's table?"""
 
-from urdfkin.dh.compare.compare import TOLERANCE, compare
+from urdfkin.dh.compare.agreement import TOLERANCE, compare
 from urdfkin.dh.compare.result import CellDifference, Comparison
 from urdfkin.dh.compare.text import comparison_text
 

@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urdfkin.chain import FrameChain
 from urdfkin.dh.elements import along_axis
 from urdfkin.dh.normals import FAR_FEET, NEARLY_PARALLEL, NearParallel, Step, step_between
 from urdfkin.dh.row import DHRow
 from urdfkin.dh.table import DHTable
-from urdfkin.tree import FloatArray
+from urdfkin.model.chain import FrameChain
+from urdfkin.model.tree import FloatArray
 
 #: Sign patterns that are kept at each joint.
 BEAM = 128

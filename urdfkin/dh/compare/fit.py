@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urdfkin.dh.elements import along_axis, between_axes
-from urdfkin.rotation import exp_rotation, log_rotation
-from urdfkin.tree import FloatArray
+from urdfkin.kinematics.rotation import exp_rotation, log_rotation
+from urdfkin.model.tree import FloatArray
 
 #: Cells in the order in which they act: theta, d, a, alpha, beta.
 CELLS = ("theta", "d", "a", "alpha", "beta")

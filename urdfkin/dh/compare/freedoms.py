@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from urdfkin.dh.compare.fit import Model, columns, errors, moved
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 _ROUNDS = 60
 #: Of the largest singular value: where damping starts, what a success leaves of it, and where it ends.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from urdfkin.dh.table import DHTable
-from urdfkin.roundings import EPS, of_a_fit
+from urdfkin.kinematics.roundings import EPS, of_a_fit
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,11 +9,11 @@ import numpy as np
 
 from urdfkin.dh.compare.result import CellDifference, Comparison, TakenUp
 from urdfkin.dh.elements import nearest_twelfth
+from urdfkin.dh.export.cells import added, pose_lines
 from urdfkin.dh.export.terminal import aligned
-from urdfkin.dh.export.words import added, pose_lines
 from urdfkin.dh.row import DHRow
 from urdfkin.dh.units import Units
-from urdfkin.printable import printable
+from urdfkin.errors.printable import printable
 
 
 def comparison_text(found: Comparison, units: Units) -> str:

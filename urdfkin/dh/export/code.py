@@ -5,9 +5,9 @@ from __future__ import annotations
 import keyword
 import re
 
-from urdfkin.dh.export.words import formula
+from urdfkin.dh.export.cells import formula
 from urdfkin.dh.table import DHTable
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 
 def identifier(name: str) -> str:

@@ -9,7 +9,7 @@ import json
 from urdfkin.dh.export.mapping import to_mapping
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
-from urdfkin.printable import csv_cell
+from urdfkin.errors.printable import csv_cell
 
 COLUMNS = (
     *("joint", "kind", "sense", "a", "alpha", "d", "theta", "beta"),

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 
-from urdfkin.dh.export.words import at_most, cells, is_identity
+from urdfkin.dh.export.cells import at_most, cells, is_identity
 from urdfkin.dh.row import Convention
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Angles, Units
-from urdfkin.printable import printable
-from urdfkin.tree import FloatArray
+from urdfkin.errors.printable import printable
+from urdfkin.model.tree import FloatArray
 
 _FORMULA = {
     Convention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",

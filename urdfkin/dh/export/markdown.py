@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from urdfkin.dh.export.words import cells, formula, headings, is_identity, pose_lines, snap_lines
+from urdfkin.dh.export.cells import cells, formula, headings, is_identity, pose_lines, snap_lines
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
-from urdfkin.printable import markdown_code, markdown_text
+from urdfkin.errors.printable import markdown_code, markdown_text
 
 
 def write(table: DHTable, units: Units) -> str:

@@ -6,7 +6,7 @@ from urdfkin.dh.export.code import header, identifier, numbers, row_numbers
 from urdfkin.dh.row import Convention
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
-from urdfkin.tree import FloatArray
+from urdfkin.model.tree import FloatArray
 
 _BODY = """
 T = base;

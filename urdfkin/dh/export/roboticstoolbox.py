@@ -10,7 +10,7 @@ from urdfkin.dh.snapping import LARGEST_TOLERANCE
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
-from urdfkin.roundings import EPS
+from urdfkin.kinematics.roundings import EPS
 
 
 def write(table: DHTable, units: Units) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 from urdfkin.dh.export.mapping import to_mapping
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
-from urdfkin.printable import escape
+from urdfkin.errors.printable import escape
 
 
 def write(table: DHTable, units: Units) -> str:

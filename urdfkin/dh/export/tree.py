@@ -8,11 +8,11 @@ from collections.abc import Callable
 from dataclasses import asdict, fields
 from typing import Any
 
+from urdfkin.dh.export.cells import added
 from urdfkin.dh.export.terminal import aligned
-from urdfkin.dh.export.words import added
 from urdfkin.dh.tree_parameters import TreeParameters, TreeRow
 from urdfkin.dh.units import Units
-from urdfkin.printable import csv_cell, markdown_code, printable
+from urdfkin.errors.printable import csv_cell, markdown_code, printable
 
 FORMULA = "T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r), i = a(j)"
 

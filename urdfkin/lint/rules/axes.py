@@ -26,7 +26,7 @@ ROUNDING = 2e-4
 #: What Pinocchio takes for a coordinate axis: Eigen's isApprox compares squares with the square of this.
 _SNAPPED = 1e-12
 
-#: A tilt that turns vectors by no more than the two roundings that `verification.bounds` grants Pinocchio for
+#: A tilt that turns vectors by no more than the two roundings that `verify.bounds` grants Pinocchio for
 #: an axis, which it does not use for a coordinate axis.
 _TILT = 2.0**-52
 

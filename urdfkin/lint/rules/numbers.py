@@ -11,10 +11,10 @@ import math
 import re
 from dataclasses import dataclass
 
+from urdfkin.errors.numerals import DECIMAL
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, REFUSES, WARNING, Rule
-from urdfkin.numerals import DECIMAL
 from urdfkin.urdf.element import Element
 
 BAD_NUMBER = Rule("URDF301", "bad-number", ERROR)

@@ -1,0 +1,111 @@
+"""Kernels work with addresses: they write what is theirs and nothing beside it, and read nothing beyond."""
+
+import gc
+import pickle
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.laws.subjects import robot_of, state
+from urdfkin.compiled import evaluate
+from urdfkin.compiled.plan import Plan, make_plan
+from urdfkin.compiled.program import program_of
+from urdfkin.compiled.registers import LANES
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+
+#: No number that a walk computes.
+GUARD = -1.2345678901234567e308
+#: Numbers before and behind; more than a block of lanes writes for one configuration.
+ZONE = 4096
+COUNTS = (0, 1, LANES - 1, LANES, LANES + 1, 2 * LANES + 1)
+
+
+def guarded(shape: tuple[int, ...], filled: float | FloatArray = GUARD) -> tuple[FloatArray, FloatArray]:
+    """An array of that shape in the middle of a larger one, and all of it."""
+    size = int(np.prod(shape))
+    memory = np.full(size + 2 * ZONE + 1, GUARD)
+    inside = memory[ZONE + 1 : ZONE + 1 + size].reshape(shape)  # at an odd address
+    inside[...] = filled
+    return inside, memory
+
+
+def kept(memory: FloatArray) -> bool:
+    """Whether the guards stand as they stood."""
+    return bool((memory[: ZONE + 1] == GUARD).all() and (memory[-ZONE:] == GUARD).all())
+
+
+def outputs(robot: Robot) -> Iterator[tuple[str, tuple[int, ...], tuple[str, ...]]]:
+    """A method, the shape of its result, and its reference."""
+    yield "placement", (4, 4), ()
+    for reference in ("local", "world", "local_world_aligned"):
+        yield "velocity", (6,), (reference,)
+        yield "jacobian", (6, robot.nv), (reference,)
+        yield "acceleration", (6,), (reference,)
+
+
+@pytest.mark.parametrize("n", COUNTS)
+@pytest.mark.parametrize("name", ["panda", "planar_and_floating_in_the_middle", "mimic_hand_40_sliding"])
+def test_a_batch_is_written_to_its_last_number_and_no_further(name: str, n: int) -> None:
+    robot = robot_of(name)
+    q, v, a = (guarded(x.shape, x)[0] for x in state(robot, n, 1))
+    for method, own, reference in [*outputs(robot), ("jacobian_rate", (6, robot.nv), ("world",))]:
+        inputs = {"velocity": (q, v), "jacobian_rate": (q, v), "acceleration": (q, v, a)}.get(method, (q,))
+        out, memory = guarded((n, *own))
+        assert getattr(robot, method)(*inputs, robot.tip_frame, *reference, out=out) is out
+        assert kept(memory), method
+        assert not (out == GUARD).any(), method
+
+
+@pytest.mark.parametrize("name", ["panda", "tree_8", "mimic_hand_40_sliding"])
+def test_a_single_configuration_is_written_to_its_last_number_and_no_further(name: str) -> None:
+    robot = robot_of(name)
+    q, v, a = (guarded(x.shape[1:], x[0])[0] for x in state(robot, 1, 2))
+    for method, own, reference in outputs(robot):
+        inputs = {"velocity": (q, v), "acceleration": (q, v, a)}.get(method, (q,))
+        out, memory = guarded(own)
+        assert getattr(robot.prepare(robot.tip_frame, *reference), method)(*inputs, out=out) is out
+        assert kept(memory), method
+        assert not (out == GUARD).any(), method
+
+
+@pytest.mark.parametrize("n", COUNTS)
+def test_so_are_all_frames_and_each_part_of_each_thread(n: int) -> None:
+    robot = robot_of("tree_8")
+    q, v, a = state(robot, n, 3)
+    plan = robot.plan(range(len(robot.link_names)))
+    for threads in (1, 3):
+        out, memory = guarded((n, len(plan.frames), 6, plan.nv))
+        evaluate.jacobians(plan, q, out=out, threads=threads)
+        assert kept(memory)
+        assert not (out == GUARD).any()
+        six, memory = guarded((n, len(plan.frames), 6))
+        evaluate.accelerations(plan, q, v, a, Reference.LOCAL, out=six, threads=threads)
+        assert kept(memory)
+        assert not (six == GUARD).any()
+
+
+def test_a_plan_comes_back_from_a_pickle_with_addresses_of_its_own() -> None:
+    robot = urdfkin.load("a1", verify=False)
+    links = [robot.tree.frame_link(frame) for frame in ("FR_foot", "RL_hip", "trunk")]
+    q, v, a = state(robot, 21, 4)
+    plan = make_plan(robot.tree, links)
+    expected = [evaluate.jacobians(plan, q), evaluate.accelerations(plan, q, v, a)]
+    program = program_of(plan, turned=False)
+    text = pickle.dumps(plan)
+    again: Plan = pickle.loads(text)
+    anew = program_of(again, turned=False)
+    assert not set(program.addresses) & set(anew.addresses)
+    assert anew.words.tolist() == program.words.tolist()
+    assert anew.constants.tolist() == program.constants.tolist()
+    del plan, program
+    gc.collect()
+    rubbish = [np.full(256, -1) for _ in range(200)]  # over what the first plan left
+    found = [evaluate.jacobians(again, q), evaluate.accelerations(again, q, v, a)]
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert len(rubbish) == 200
+    assert not any(x.flags.writeable for x in (again.steps, again.geometry, again.leaders))

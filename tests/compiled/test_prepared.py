@@ -1,0 +1,391 @@
+"""A prepared frame does what the robot's long way does, with the same result or the same error."""
+
+from __future__ import annotations
+
+import copy
+import ctypes
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.laws.everything import differing
+from tests.laws.subjects import robot_of, state
+from urdfkin import Reference
+from urdfkin.compiled.prepared import PreparedFrame
+from urdfkin.compiled.single import arrays_are_known, one_configuration, single
+from urdfkin.compiled.task import Task
+from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+
+FRAME = "panda_hand"
+
+
+@pytest.fixture(scope="module")
+def panda() -> Robot:
+    return urdfkin.load("panda", verify=False)
+
+
+def outcome(compute: Callable[[], FloatArray]) -> FloatArray | str:
+    """The result, or the error's type and words."""
+    try:
+        return compute()
+    except UrdfkinError as error:
+        return f"{type(error).__name__}: {error}"
+
+
+def ways(
+    robot: Robot, frame: str, method: str, inputs: tuple[Any, ...], **out: Any
+) -> list[FloatArray | str]:
+    """A method by a prepared frame, by the robot as it comes, and by the robot's long way."""
+    fast, by_robot = getattr(robot.prepare(frame, "local"), method), getattr(robot, method)
+    reference = () if method == "placement" else ("local",)
+    return [
+        outcome(lambda: fast(*inputs, **out)),
+        outcome(lambda: by_robot(*inputs, frame, *reference, verify=False, **out)),
+        outcome(lambda: by_robot(*inputs, frame, *reference, verify=False, threads=1, **out)),
+    ]
+
+
+def agree(outcomes: list[FloatArray | str]) -> bool:
+    """Whether all are the same error, or the same array to the last bit."""
+    first = outcomes[0]
+    if isinstance(first, str):
+        return all(isinstance(other, str) and other == first for other in outcomes)
+    return not any(isinstance(other, str) or differing(first, other) for other in outcomes[1:])
+
+
+METHODS = {"placement": 1, "velocity": 2, "jacobian": 1, "acceleration": 3}
+
+_SPACED = np.zeros((8, 3))
+_SPACED[:, 1] = np.linspace(-1.0, 1.0, 8)
+_PACKED = np.zeros(8, dtype=np.dtype([("flag", "i1"), ("x", "f8")]))
+_PACKED["x"] = 0.25
+_READ_ONLY = np.linspace(-1.0, 1.0, 8)
+_READ_ONLY.setflags(write=False)
+
+#: What an array of 8 numbers may be given as.
+GIVEN: dict[str, Any] = {
+    "a list": [0.1] * 8,
+    "a tuple of whole numbers": (1,) * 8,
+    "a list of NumPy's numbers": list(np.full(8, 0.1, dtype=np.float32)),
+    "float32": np.full(8, 0.1, dtype=np.float32),
+    "float16": np.full(8, 0.1, dtype=np.float16),
+    "longdouble": np.full(8, 0.1, dtype=np.longdouble),
+    "int64": np.arange(8),
+    "bool": np.ones(8, dtype=bool),
+    "objects": np.full(8, 0.1).astype(object),
+    "of the other byte order": np.full(8, 0.1, dtype=">f8"),
+    "every third number": _SPACED[:, 1],
+    "reversed": np.linspace(-1.0, 1.0, 8)[::-1],
+    "not aligned": _PACKED["x"],
+    "read-only": _READ_ONLY,
+    "one of another process": pickle.loads(pickle.dumps(np.full(8, 0.1))),
+    "a batch": np.full((3, 8), 0.1),
+    "a batch of none": np.zeros((0, 8)),
+    "a column": np.zeros((8, 1)),
+    "too short": np.zeros(7),
+    "too long": np.zeros(9),
+    "empty": np.zeros(0),
+    "an empty list": [],
+    "an empty set": set(),
+    "a number": 1.0,
+    "an array without axes": np.array(1.0),
+    "none": None,
+    "text": "12345678",
+    "texts": ["1"] * 8,
+    "complex": np.zeros(8, dtype=complex),
+    "dates": np.zeros(8, dtype="M8[s]"),
+    "a ragged list": [[1.0, 2.0], [3.0]],
+    "too large for a float": [10**400] * 8,
+    "an integer too large for anything": 10**400,
+    "nan": np.array([0, 0, np.nan, 0, 0, 0, 0, 0.0]),
+    "inf off the path": np.array([0, 0, 0, 0, 0, 0, 0, np.inf]),
+    "a list with nan": [0.0] * 7 + [float("nan")],
+}
+
+
+@pytest.mark.parametrize("given", GIVEN)
+@pytest.mark.parametrize("method", METHODS)
+def test_whatever_is_given(panda: Robot, method: str, given: str) -> None:
+    usual = [np.linspace(-0.5, 0.9, 8), np.linspace(1.0, -1.0, 8), np.full(8, 0.3)][: METHODS[method]]
+    for place in range(len(usual)):
+        inputs = tuple(GIVEN[given] if i == place else x for i, x in enumerate(usual))
+        assert agree(ways(panda, FRAME, method, inputs)), place
+
+
+_FROZEN = np.zeros((6, 8))
+_FROZEN.setflags(write=False)
+
+#: What a Jacobian may be asked to be written into.
+OUTS: dict[str, Any] = {
+    "right": np.full((6, 8), np.nan),
+    "of the wrong shape": np.zeros((8, 6)),
+    "flat": np.zeros(48),
+    "of a batch": np.zeros((1, 6, 8)),
+    "float32": np.zeros((6, 8), dtype=np.float32),
+    "of the other byte order": np.zeros((6, 8), dtype=">f8"),
+    "in columns": np.zeros((6, 8), order="F"),
+    "every second number": np.zeros((6, 16))[:, ::2],
+    "read-only": _FROZEN,
+    "a list": [[0.0] * 8] * 6,
+    "an empty list": [],
+    "a number": 1.0,
+}
+
+
+@pytest.mark.parametrize("out", OUTS)
+def test_whatever_it_is_written_into(panda: Robot, out: str) -> None:
+    q = np.linspace(-0.5, 0.9, 8)
+    outcomes = ways(panda, FRAME, "jacobian", (q,), out=OUTS[out])
+    assert agree(outcomes)
+    if out == "right":
+        assert not np.isnan(OUTS[out]).any()
+    else:
+        assert str(outcomes[0]).startswith("InputError: out must be a writable C-contiguous float64 array")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_out_is_what_comes_back(panda: Robot, method: str) -> None:
+    inputs = [x[0] for x in state(panda, 1, 1)][: METHODS[method]]
+    fast = getattr(panda.prepare(FRAME), method)
+    expected = fast(*inputs)
+    out = np.full_like(expected, np.nan)
+    assert fast(*inputs, out=out) is out
+    assert not differing(out, expected)
+    listed = np.full_like(expected, np.nan)
+    assert fast(*(x.tolist() for x in inputs), out=listed) is listed
+    assert not differing(listed, expected)
+
+
+def test_an_out_that_shares_memory_with_an_input_is_refused_and_left_alone() -> None:
+    robot = urdfkin.load("ur5", verify=False)
+    memory = np.linspace(-1.0, 1.0, 60)
+    before = memory.copy()
+    words = "out must not share memory with q, v or a"
+    for reference in Reference:
+        fast, q = robot.prepare("tool0", reference), np.ones(6)
+        for start in (0, 1, 5):
+            inside = memory[start : start + 6]
+            with pytest.raises(InputError, match=words):
+                fast.velocity(q, memory[:6], out=inside)
+            with pytest.raises(InputError, match=words):
+                fast.velocity(memory[:6], q, out=inside)
+            with pytest.raises(InputError, match=words):
+                fast.acceleration(q, q, memory[:6], out=inside)
+        for start in (1, 20, 41):
+            with pytest.raises(InputError, match=words):
+                fast.jacobian(memory[start : start + 6], out=memory[6:42].reshape(6, 6))
+    for start in (1, 8, 21):
+        with pytest.raises(InputError, match=words):
+            robot.prepare("tool0").placement(memory[start : start + 6], out=memory[6:22].reshape(4, 4))
+    assert (memory == before).all()
+    # Side by side is not shared.
+    robot.prepare("tool0").velocity(np.ones(6), memory[:6], out=memory[6:12])
+    robot.prepare("tool0").velocity(np.ones(6), memory[12:18], out=memory[6:12])
+
+
+def test_results_are_the_callers_own(panda: Robot) -> None:
+    for method, count in METHODS.items():
+        inputs = [x[0] for x in state(panda, 1, 2)][:count]
+        fast = getattr(panda.prepare(FRAME), method)
+        results = [fast(*inputs) for _ in range(4)]
+        expected = results[0].copy()
+        results[1][...] = 7.0
+        assert not differing(results[0], expected)
+        assert not differing(fast(*inputs), expected)
+        for i, one in enumerate(results):
+            assert one.flags.writeable
+            assert one.flags.c_contiguous
+            assert not any(np.shares_memory(one, other) for other in results[i + 1 :])
+
+
+@pytest.mark.parametrize("root_joint", [None, "floating"])
+@pytest.mark.parametrize("name", ["floating_root", "planar_and_floating_in_the_middle", "a1"])
+def test_a_floating_joints_quaternion_is_made_exact(name: str, root_joint: str | None) -> None:
+    robot = robot_of(name, root_joint=root_joint if name == "a1" else None)
+    q, v, a = (x[0] for x in state(robot, 1, 3))
+    for method, count in METHODS.items():
+        inputs = (q, v, a)[:count]
+        assert agree(ways(robot, robot.tip_frame, method, inputs))
+        nearly = (q * (1.0 + 4e-7), v, a)[:count]  # nothing but a quaternion minds
+        assert agree(ways(robot, robot.tip_frame, method, nearly))
+        off = (q * 1.01, v, a)[:count]
+        outcomes = ways(robot, robot.tip_frame, method, off)
+        assert agree(outcomes)
+        floats = any(joint.kind.nq == 7 for joint in robot.tree.joints)
+        assert isinstance(outcomes[0], str) == floats
+
+
+def test_names_that_do_not_exist_are_refused_in_the_robots_words(panda: Robot) -> None:
+    q = panda.neutral()
+    panda.jacobian(q, FRAME, Reference.WORLD)  # what was asked for before must not count
+    for frame in ("pnda_hand", "", None, 3):
+        with pytest.raises((InputError, UnknownNameError)) as long:
+            panda.jacobian(q, frame, threads=1)  # type: ignore[arg-type]
+        for way in (panda.prepare, lambda frame: panda.jacobian(q, frame)):
+            with pytest.raises(type(long.value)) as caught:
+                way(frame)  # type: ignore[arg-type]
+            # Only one frame is prepared; a robot may be asked for several.
+            assert str(caught.value) == str(long.value) or (
+                way == panda.prepare and not isinstance(frame, str)
+            )
+    with pytest.raises(InputError, match="a frame is the name of a link or joint"):
+        panda.prepare(["panda_hand"])  # type: ignore[arg-type]
+    for reference in ("globe", "", None, 1, 1.0, True, ["local"], {"local": 1}):
+        for refer in (panda.prepare, lambda frame, other: panda.jacobian(q, frame, other)):
+            with pytest.raises(UnknownNameError, match="unknown reference"):
+                refer(FRAME, reference)  # type: ignore[arg-type]
+
+
+def test_a_reference_may_be_named_in_either_case(panda: Robot) -> None:
+    q = panda.sample(1, 4)[0]
+    for reference in Reference:
+        expected = panda.jacobian(q, FRAME, reference, threads=1)
+        for name in (reference, reference.name, reference.name.lower()):
+            assert panda.prepare(FRAME, name).reference is reference
+            assert not differing(panda.prepare(FRAME, name).jacobian(q), expected)
+
+
+def test_a_robot_where_nothing_moves_has_empty_jacobians() -> None:
+    robot = urdfkin.load('<robot name="r"><link name="a"/></robot>', verify=False)
+    fast = robot.prepare("a")
+    assert fast.jacobian(np.zeros(0)).shape == (6, 0)
+    assert (fast.placement(np.zeros(0)) == np.eye(4)).all()
+    assert not fast.velocity(np.zeros(0), np.zeros(0)).any()
+
+
+def test_a_copy_works_after_what_it_was_made_from_is_gone() -> None:
+    robot = urdfkin.load("panda", verify=False)
+    q, fast = robot.sample(1, 5)[0], robot.prepare(FRAME, "world")
+    expected = fast.jacobian(q)
+    text = pickle.dumps(fast)
+    copies: list[PreparedFrame] = [copy.copy(fast), copy.deepcopy(fast), pickle.loads(text)]
+    again: Robot = pickle.loads(pickle.dumps(robot))
+    copies.append(again.prepare(FRAME, "world"))
+    del robot, fast, again
+    for other in copies:
+        assert (other.frame, other.reference) == (FRAME, Reference.WORLD)
+        assert not differing(other.jacobian(q), expected)
+
+
+@pytest.mark.slow
+def test_it_goes_to_another_process(tmp_path: Any) -> None:
+    robot = urdfkin.load("panda", verify=False)
+    q, fast = robot.sample(1, 6)[0], robot.prepare(FRAME)
+    (tmp_path / "fast").write_bytes(pickle.dumps((fast, q, fast.jacobian(q))))
+    program = (
+        "import pickle, sys; fast, q, J = pickle.load(open(sys.argv[1], 'rb'));"
+        "assert (fast.jacobian(q) == J).all()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path / "fast")],
+        capture_output=True, text=True, check=False, env=os.environ,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_functions_take_their_own_number_of_arguments_and_no_other(panda: Robot) -> None:
+    q, fast = panda.neutral(), panda.prepare(FRAME)
+    fast.jacobian(q)
+    compute, task = single("jacobian", panda.plan([panda.tree.frame_link(FRAME)]), fast.reference)
+    for arguments in ((), (q,), (q, None, None), (q, q, None), (None, None), (q, q), (None, q)):
+        assert compute(*arguments) is None
+    assert task[Task.COUNT] == 0
+    assert compute(q, None) is not None
+    assert task[Task.COUNT] == 1
+
+
+def test_arrays_lie_in_memory_as_compiled_code_reads_them() -> None:
+    assert arrays_are_known()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_arguments_and_results_are_held_as_often_as_they_are_used(panda: Robot, method: str) -> None:
+    inputs = [x[0] for x in state(panda, 1, 7)][: METHODS[method]]
+    fast = getattr(panda.prepare(FRAME), method)
+    out, wrong = fast(*inputs), np.zeros(5)
+    things = (*inputs, out, wrong)
+    before = [sys.getrefcount(thing) for thing in things]
+    for _ in range(100):
+        fast(*inputs, out=out)
+        assert sys.getrefcount(fast(*inputs)) == sys.getrefcount(np.empty(3))
+        with pytest.raises(InputError):
+            fast(*inputs, out=wrong)
+    assert [sys.getrefcount(thing) for thing in things] == before
+
+
+def test_while_one_thread_is_at_work_another_gets_the_same_by_the_robots_way(panda: Robot) -> None:
+    q, fast = panda.sample(1, 8)[0], panda.prepare(FRAME)
+    expected = fast.jacobian(q)
+    task = fast._jacobian.__self__[0]  # type: ignore[attr-defined]
+    task[Task.BUSY] = 1
+    try:
+        assert fast._jacobian(q, None) is None
+        assert not differing(fast.jacobian(q), expected)
+    finally:
+        task[Task.BUSY] = 0
+    again = fast._jacobian(q, None)
+    assert again is not None
+    assert not differing(again, expected)
+
+
+def test_threads_that_share_one_get_their_own_results() -> None:
+    robot = urdfkin.load("panda", verify=False)
+    fast, qs = robot.prepare(FRAME), robot.sample(4, 9)
+    expected = robot.jacobian(qs, FRAME, threads=1)
+    results = np.zeros((4, 200, 6, robot.nv))
+
+    def work(k: int) -> None:
+        for out in results[k]:
+            fast.jacobian(qs[k], out=out)
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(work, range(4)))
+    assert not differing(results, np.repeat(expected[:, np.newaxis], 200, axis=1))
+    assert robot.certificate().lines[0].unchecked == 4 + 800
+
+
+def test_threads_that_share_one_without_the_interpreters_lock_get_right_results_or_none() -> None:
+    robot = urdfkin.load("panda", verify=False)
+    fast, qs = robot.prepare(FRAME), robot.sample(2, 10)
+    expected = robot.jacobian(qs, FRAME, threads=1)
+    fast.jacobian(qs[0])
+    bound = fast._jacobian.__self__  # type: ignore[attr-defined]
+    word, calls, begun = ctypes.c_int64, 20_000, threading.Barrier(2)
+    compute = ctypes.CFUNCTYPE(word, word, word, word)(one_configuration.address)
+
+    @numba.njit(nogil=True)
+    def ask(bound: int, arguments: int, to: int, out: FloatArray, right: FloatArray) -> tuple[int, int]:
+        done = wrong = 0
+        for _ in range(calls):
+            if compute(bound, arguments, 2) == to:
+                done += 1
+                wrong += not (out == right).all()
+                out[:] = 0.0
+        return done, wrong
+
+    def work(k: int) -> tuple[int, int]:
+        q, out = qs[k], np.empty((6, robot.nv))
+        arguments = (word * 2)(id(q), id(out))
+        begun.wait()
+        done, wrong = ask(id(bound), ctypes.addressof(arguments), id(out), out, expected[k])
+        return done, wrong
+
+    begun_with = int(bound[0][Task.COUNT])
+    ask.compile("UniTuple(int64, 2)(int64, int64, int64, float64[:, ::1], float64[:, ::1])")
+    with ThreadPoolExecutor(2) as pool:
+        (first, wrong), (second, also_wrong) = pool.map(work, range(2))
+    assert (wrong, also_wrong) == (0, 0)
+    assert bound[0][Task.COUNT] - begun_with == first + second
+    assert max(first, second) > 0  # one may find the other at work each time

@@ -1,0 +1,35 @@
+"""Hypothesis strategies for geometry: unit vectors, angles at the awkward places, rotations."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import strategies as st
+
+from urdfkin.kinematics.inputs import FloatArray
+
+#: A few units in the last place of numbers of size one, which is what rounding gives.
+ROUNDING = 16 * np.finfo(np.float64).eps
+
+_components = st.one_of(st.sampled_from([0.0, 1.0, -1.0, 1e-9, -1e-17]), st.floats(-1.0, 1.0))
+
+#: Vectors with components in [-1, 1], zeros and tiny ones included.
+vectors3 = st.tuples(_components, _components, _components).map(np.array)
+
+
+def _normalised(vector: FloatArray) -> FloatArray:
+    unit: FloatArray = vector / np.linalg.norm(vector)
+    return unit
+
+
+#: Unit vectors, the coordinate axes and their near neighbours among them.
+axes = vectors3.filter(lambda v: bool(np.linalg.norm(v) > 1e-3)).map(_normalised)
+
+#: Angles, multiples of a right angle and their near neighbours among them.
+angles = st.one_of(
+    st.floats(-10.0, 10.0),
+    st.builds(
+        lambda n, off: n * np.pi / 2 + off,
+        st.integers(-4, 4),
+        st.sampled_from([0.0, 1e-16, 1e-12, 1e-9, -1e-9, 1e-7, -1e-5, 1e-3]),
+    ),
+)

@@ -1,0 +1,137 @@
+"""A chain is the same motion as the tree's, whichever way the path runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from tests.oracle import TreeOracle
+from tests.random_chains import configurations, rotation, shift, trees
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Mimic, build_tree
+
+EPS = np.finfo(np.float64).eps
+
+
+def joint(
+    name: str, T: FloatArray | None = None, kind: JointKind = JointKind.REVOLUTE, mimic: Mimic | None = None
+) -> Joint:
+    pose = np.eye(4) if T is None else T
+    return Joint(name, kind, 0, pose, np.array([0.0, 0.0, 1.0]), mimic=mimic)
+
+
+@pytest.fixture
+def walker() -> KinematicTree:
+    """Two legs and a platform that floats, joined at the pelvis."""
+    hip = shift(0.0, 0.1, 0.0) @ rotation("x", 0.3)
+    return build_tree(
+        "walker",
+        "pelvis",
+        [
+            (joint("left_hip", hip), "pelvis", "left_thigh"),
+            (joint("left_knee", shift(0.4, 0.0, 0.0)), "left_thigh", "left_shin"),
+            (joint("left_sole", shift(0.0, 0.0, -0.5), JointKind.FIXED), "left_shin", "left_foot"),
+            (joint("right_hip", hip.T), "pelvis", "right_thigh"),
+            (
+                joint("right_knee", shift(0.4, 0, 0), mimic=Mimic("left_knee", -1.5, 0.2)),
+                "right_thigh",
+                "right_shin",
+            ),
+            (joint("float", kind=JointKind.FLOATING), "left_shin", "balloon"),
+        ],
+    )
+
+
+@given(trees())
+@settings(max_examples=50)
+def test_every_path_of_a_tree_is_placed_as_pinocchio_places_it(tree: KinematicTree) -> None:
+    oracle = TreeOracle(tree)
+    q = configurations(tree.nq, 4)
+    ends = [tree.links[0], tree.links[-1], tree.links[len(tree.links) // 2]]
+    for base in ends:
+        for tip in ends:
+            path = chain(tree, tip, base)
+            own = path.coupling.select(tree, q)
+            scale = 1.0 + path.lengths.sum() + 10.0 * len(path.joints)
+            error = np.abs(path.placement(own) - oracle.placement(q, tip, base)).max()
+            assert error <= 10 * (1 + len(tree.joints)) * EPS * scale
+
+
+def test_a_path_through_the_common_ancestor_goes_up_and_then_down(walker: KinematicTree) -> None:
+    path = chain(walker, "right_shin", "left_foot")
+    assert [j.name for j in path.joints] == ["left_knee", "left_hip", "right_hip", "right_knee"]
+    assert [j.backwards for j in path.joints] == [True, True, False, False]
+
+
+def test_a_joint_passed_backwards_has_its_axis_reversed_and_keeps_its_sign(walker: KinematicTree) -> None:
+    there, back = chain(walker, "left_shin", "left_thigh"), chain(walker, "left_thigh", "left_shin")
+    np.testing.assert_array_equal(there.axes(), [[0.0, 0.0, 1.0]])
+    np.testing.assert_array_equal(back.axes(), [[0.0, 0.0, -1.0]])
+    product = there.placement([0.7]) @ back.placement([0.7])
+    np.testing.assert_allclose(product, np.eye(4), atol=4 * EPS)
+
+
+@given(trees(min_joints=1))
+@settings(max_examples=50)
+def test_a_chain_and_its_reverse_undo_each_other(tree: KinematicTree) -> None:
+    there, back = chain(tree, "tip", "l0"), chain(tree, "l0", "tip")
+    q = configurations(tree.nq, 4)
+    q_there, q_back = there.coupling.select(tree, q), back.coupling.select(tree, q)
+    scale = 1.0 + there.lengths.sum() + 10.0 * len(there.joints)
+    error = np.abs(there.placement(q_there) @ back.placement(q_back) - np.eye(4)).max()
+    assert error <= 20 * (1 + len(tree.joints)) * EPS * scale
+
+
+def test_a_followers_leader_is_a_coordinate_wherever_it_stands(walker: KinematicTree) -> None:
+    path = chain(walker, "right_shin", "pelvis")
+    assert path.joint_names == ("right_hip", "left_knee")
+    assert path.coupling.values([0.1, 2.0]).tolist() == [0.1, -1.5 * 2.0 + 0.2]
+    q = np.arange(1.0, walker.nq + 1)
+    names = [j.name for j in walker.joints if j.nq == 1]
+    picked = dict(zip(path.joint_names, path.coupling.select(walker, q), strict=True))
+    assert picked["left_knee"] == q[walker.q_index[walker.joint_index("left_knee")]]
+    assert set(picked) <= set(names)
+
+
+def test_coordinates_can_be_given_by_name(walker: KinematicTree) -> None:
+    path = chain(walker, "left_foot")
+    by_name = path.placement({"left_knee": 0.4})
+    np.testing.assert_array_equal(by_name, path.placement([0.0, 0.4]))
+    with pytest.raises(UnknownNameError, match="left_knee"):
+        path.placement({"left_nee": 0.4})
+
+
+def test_interorigin_vectors_add_up_from_the_first_joint_to_the_tip(walker: KinematicTree) -> None:
+    path = chain(walker, "left_foot", "right_thigh")
+    q = configurations(len(path.joint_names), 5)
+    total = path.origins(q)[:, 0] + path.interorigin(q).sum(axis=-2)
+    np.testing.assert_allclose(total, path.placement(q)[:, :3, 3], atol=8 * EPS)
+    np.testing.assert_allclose(np.linalg.norm(path.axes(q), axis=-1), 1.0, atol=8 * EPS)
+
+
+@given(trees())
+@settings(max_examples=50)
+def test_the_lengths_bound_the_distance_between_origins(tree: KinematicTree) -> None:
+    for path in (chain(tree, "tip"), chain(tree, "l0", "tip")):
+        distances = [np.linalg.norm(A[:3, 3]) for A in path.constants]
+        assert (np.array(distances) <= path.lengths * (1 + 8 * EPS) + 1e-300).all()
+
+
+def test_a_path_over_a_floating_joint_says_what_to_do(walker: KinematicTree) -> None:
+    with pytest.raises(InputError, match=r"joint float: a floating joint .*'balloon' outwards"):
+        chain(walker, "balloon", "pelvis")
+    assert chain(walker, "balloon", "balloon").joints == ()
+
+
+def test_an_unknown_frame_offers_the_nearest_names(walker: KinematicTree) -> None:
+    with pytest.raises(UnknownNameError, match="left_foot"):
+        chain(walker, "left_fot")
+
+
+def test_the_wrong_number_of_coordinates_names_the_right_ones(walker: KinematicTree) -> None:
+    with pytest.raises(InputError, match="left_hip, left_knee"):
+        chain(walker, "left_foot").placement(np.zeros(3))
+    with pytest.raises(InputError, match="walker needs"):
+        chain(walker, "left_foot").coupling.select(walker, np.zeros(3))

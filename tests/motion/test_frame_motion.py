@@ -1,0 +1,63 @@
+"""A frame's motion is what the robot's own methods give, its parts add up, and a disagreement is seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import urdfkin
+from urdfkin.motion.frame_motion import FrameMotion, frame_motion
+from urdfkin.robot import Robot
+from urdfkin.verify.pinocchio import Oracle
+
+N = 7
+
+
+def motion(robot: Robot, reference: str = "local_world_aligned") -> FrameMotion:
+    rng = np.random.default_rng(0)
+    v, a = rng.standard_normal((2, N, robot.nv))
+    return frame_motion(robot, robot.sample(N, 0), v, a, robot.tip_frame, reference)
+
+
+@pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
+def test_it_is_what_the_robots_methods_give_and_pinocchio_confirms(reference: str) -> None:
+    robot = urdfkin.load("panda")
+    rng = np.random.default_rng(0)
+    v, a = rng.standard_normal((2, N, robot.nv))
+    q, tip = robot.sample(N, 0), robot.tip_frame
+    x = frame_motion(robot, q, v, a, tip, reference)
+    np.testing.assert_array_equal(x.placement, robot.placement(q, tip))
+    np.testing.assert_array_equal(x.velocity, robot.velocity(q, v, tip, reference))
+    np.testing.assert_array_equal(x.acceleration, robot.acceleration(q, v, a, tip, reference))
+    np.testing.assert_array_equal(x.jacobian, robot.jacobian(q, tip, reference))
+    np.testing.assert_allclose(x.parts.total, x.acceleration, rtol=1e-12, atol=1e-12)
+    assert x.agrees
+    assert set(x.checks) >= {"placement", "velocity", "acceleration", "jacobian"}
+    assert all(check.units.shape == (N,) for check in x.checks.values())
+
+
+def test_a_disagreement_is_shown_and_not_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = urdfkin.load("panda")
+    right = Oracle.velocities
+    monkeypatch.setattr(Oracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-10))
+    x = motion(robot)
+    assert not x.agrees
+    assert (x.checks["velocity"].share > 1.0).all()
+    assert (x.checks["placement"].share < 1.0).all()
+
+
+def test_manipulability_is_the_root_of_the_determinant() -> None:
+    x = motion(urdfkin.load("ur5"))
+    for rows in (slice(0, 6), slice(0, 3), slice(3, 6)):
+        J = x.jacobian[:, rows]
+        np.testing.assert_allclose(
+            x.manipulability(rows) ** 2, np.linalg.det(J @ J.swapaxes(1, 2)), rtol=1e-6
+        )
+    np.testing.assert_allclose(x.singular_values.prod(axis=1), x.manipulability(), rtol=1e-12)
+
+
+def test_a_frame_that_nothing_moves_has_no_manipulability() -> None:
+    robot = urdfkin.load("ur5")
+    q = robot.sample(N, 0)
+    still = np.zeros_like(q)
+    assert not frame_motion(robot, q, still, still, "base_link").manipulability().any()

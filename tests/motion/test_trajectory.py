@@ -1,0 +1,118 @@
+"""A line is smooth and its rates are its derivatives; a table is read exactly or refused with its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urdfkin
+from urdfkin.errors import InputError, SourceError
+from urdfkin.motion.trajectory import line, read_trajectory
+from urdfkin.robot import Robot
+
+END = np.array([1.0, -1.2, 0.8, 0.4, -0.3, 2.0])
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return urdfkin.load("ur5")
+
+
+def test_a_line_runs_from_rest_to_rest_and_halfway_at_half_time(robot: Robot) -> None:
+    x = line(robot, robot.neutral(), END, 2.0, 101)
+    np.testing.assert_array_equal(x.q[0], robot.neutral())
+    np.testing.assert_allclose(x.q[-1], END, rtol=1e-15)
+    np.testing.assert_allclose(x.q[50], END / 2, rtol=1e-15)
+    for ends in (x.v, x.a):
+        assert not ends[[0, -1]].any()
+    assert not x.q.flags.writeable
+
+
+def test_a_lines_rates_are_its_derivatives(robot: Robot) -> None:
+    """Fourth-order differences of a quintic are exact up to h^4 times its fifth derivative."""
+    x = line(robot, robot.neutral(), END, 1.5, 401)
+    h = x.t[1]
+    for values, rates in ((x.q, x.v), (x.v, x.a)):
+        slopes = (values[:-4] - 8 * values[1:-3] + 8 * values[3:-1] - values[4:]) / (12 * h)
+        np.testing.assert_allclose(slopes, rates[2:-2], atol=1e-6)
+
+
+@pytest.mark.parametrize(("duration", "samples"), [(0.0, 10), (-1.0, 10), (float("nan"), 10), (1.0, 2)])
+def test_a_line_without_time_or_samples_is_refused(robot: Robot, duration: float, samples: int) -> None:
+    with pytest.raises(InputError, match="duration"):
+        line(robot, robot.neutral(), END, duration, samples)
+
+
+def test_a_floating_root_has_no_line() -> None:
+    floating = urdfkin.load("ur5", root_joint="floating")
+    with pytest.raises(InputError, match="floating joint's rates are not the rates of its coordinates"):
+        line(floating, floating.neutral(), floating.neutral(), 1.0, 5)
+
+
+def write(path: Path, robot: Robot, columns: dict[str, np.ndarray]) -> Path:
+    rows = [",".join(columns)]
+    rows += [",".join(repr(float(x)) for x in row) for row in zip(*columns.values(), strict=True)]
+    path.write_text("\n".join(rows))
+    return path
+
+
+def columns_of(robot: Robot, *, rates: bool) -> dict[str, np.ndarray]:
+    x = line(robot, robot.neutral(), END, 2.0, 41)
+    columns = {"t": x.t} | {name: x.q[:, k] for k, name in enumerate(robot.coordinate_names)}
+    if rates:
+        for letter, values in (("v", x.v), ("a", x.a)):
+            columns |= {f"{letter}:{name}": values[:, k] for k, name in enumerate(robot.rate_names)}
+    return columns
+
+
+def test_a_table_with_rates_reads_back_to_the_bit_in_any_order(robot: Robot, tmp_path: Path) -> None:
+    columns = columns_of(robot, rates=True)
+    shuffled = {name: columns[name] for name in sorted(columns, reverse=True)}
+    x = read_trajectory(robot, write(tmp_path / "x.csv", robot, shuffled))
+    direct = line(robot, robot.neutral(), END, 2.0, 41)
+    for ours, theirs in ((x.t, direct.t), (x.q, direct.q), (x.v, direct.v), (x.a, direct.a)):
+        np.testing.assert_array_equal(ours, theirs)
+    assert x.rates == "as given"
+
+
+def test_a_table_without_rates_is_differentiated(robot: Robot, tmp_path: Path) -> None:
+    x = read_trajectory(robot, write(tmp_path / "x.csv", robot, columns_of(robot, rates=False)))
+    direct = line(robot, robot.neutral(), END, 2.0, 41)
+    np.testing.assert_allclose(x.v[2:-2], direct.v[2:-2], atol=0.02)
+    np.testing.assert_allclose(x.a[4:-4], direct.a[4:-4], atol=0.15)
+    assert x.rates == "by central differences"
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda text: text.replace("elbow_joint", "elbow"), r"x.csv:1: .* unknown: elbow"),
+        (
+            lambda text: text.replace("elbow_joint", "wrist_1_joint"),
+            r"x.csv:1: .* missing: elbow_joint; twice there: wrist_1_joint",
+        ),
+        (
+            lambda text: "\n".join(row.rpartition(",")[0] for row in text.splitlines()),
+            "missing: wrist_3_joint",
+        ),
+        (lambda text: text.replace("\n0.1,", "\n9.1,"), "time must increase"),
+        (lambda text: text.replace("\n0.1,", "\nnan,"), "not a finite number"),
+        (lambda text: text.replace("\n0.1,", "\n0.1,,"), r"x.csv:4: 7 numbers are expected .*: found 8"),
+        (lambda text: "\n".join(text.splitlines()[:3]), "samples are the least"),
+    ],
+)
+def test_a_spoiled_table_is_refused_by_name(
+    spoil: object, message: str, robot: Robot, tmp_path: Path
+) -> None:
+    path = write(tmp_path / "x.csv", robot, columns_of(robot, rates=False))
+    assert callable(spoil)
+    path.write_text(spoil(path.read_text()))
+    with pytest.raises(InputError, match=message):
+        read_trajectory(robot, path)
+
+
+def test_a_missing_table_says_so(robot: Robot, tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="cannot be read"):
+        read_trajectory(robot, tmp_path / "none.csv")

@@ -1,0 +1,48 @@
+"""Whatever a robot is read from, no more of it is read than was allowed."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from urdfkin.urdf.sources import MOST, read_source
+
+MOST_HERE = 1000
+
+
+@pytest.fixture
+def large(tmp_path: Path) -> Path:
+    place = tmp_path / "large.urdf"
+    place.write_bytes(b"<" * 5000)
+    return place
+
+
+@pytest.mark.parametrize("how", ["path", "word", "bytes stream", "text stream", "standard input"])
+def test_reading_ends_one_byte_after_what_is_allowed(
+    how: str, large: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = large.read_bytes()
+    source: Any = {
+        "path": large,
+        "word": os.fspath(large),
+        "bytes stream": io.BytesIO(data),
+        "text stream": io.StringIO(data.decode()),
+        "standard input": "-",
+    }[how]
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
+    assert len(read_source(source, MOST_HERE).data) == MOST_HERE + 1
+
+
+def test_a_robot_of_the_catalogue_is_read_no_further_either() -> None:
+    assert len(read_source("panda", MOST_HERE).data) == MOST_HERE + 1
+    assert len(read_source("panda").data) > MOST_HERE + 1
+
+
+def test_a_device_that_never_ends_is_read_up_to_what_is_allowed() -> None:
+    assert len(read_source(Path("/dev/zero"), MOST_HERE).data) == MOST_HERE + 1
+    assert MOST == 100_000_000

@@ -1,0 +1,301 @@
+"""The judge reads decimals, is right to fifty digits, and finds an error of a few units in the last place."""
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.high_precision import mp as independent
+from tests.high_precision import rate, second_rate
+from tests.laws.subjects import robot_of
+from tests.text.robots import motion
+from urdfkin import BaseMotion
+from urdfkin.compiled import evaluate
+from urdfkin.errors import InputError
+from urdfkin.kinematics import equations as eq
+from urdfkin.kinematics.rotation.euler import SEQUENCES
+from urdfkin.kinematics.rotation.quaternion import quaternion_of
+from urdfkin.model import base_motion as recursion_base
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.validation.judgement import Errors, Line, exact_quaternion, judge
+from urdfkin.verify.asked import BaseRows
+from urdfkin.verify.exact import recursion as exact_recursion
+from urdfkin.verify.exact.decimals import read_exact
+from urdfkin.verify.exact.vectors import exact, mp
+from urdfkin.verify.line_of_nodes import euler_jacobian, quaternion_jacobian
+from urdfkin.verify.quantities import QUANTITIES
+from urdfkin.verify.sampling import draw_base
+
+#: One of each kind: arms, a hand with followers, humanoids, a quadruped, a mobile base, CAD exports.
+ROBOTS = (
+    "panda", "ur5", "xarm7", "kinova", "allegro_left_hand", "tiago_pro", "talos", "icub", "anymal", "so100",
+    "polar",
+)  # fmt: skip
+
+
+def exact_motion(name: str, q: FloatArray, v: FloatArray, a: FloatArray) -> exact_recursion.Motion:
+    robot = urdfkin.load(name)
+    joints = read_exact(robot.urdf, robot.tree)
+    return exact_recursion.move(robot.tree, joints, *([exact(x) for x in row] for row in (q, v, a)))
+
+
+def test_decimals_are_read_as_they_are_written_not_as_the_nearest_doubles() -> None:
+    robot = urdfkin.load("planar_two_link")
+    joints = read_exact(robot.urdf, robot.tree)
+    assert joints[2].p[0] == mp.mpf("0.4")
+    assert joints[2].p[0] != mp.mpf(0.4)
+
+
+def test_it_agrees_to_far_more_digits_than_a_double_has_with_derivatives_of_the_elbow() -> None:
+    # The elbow's decimals are doubles in the other source: 0.6, 0.5 and 0.45 are put in as such here too.
+    moving = motion("elbow", 12)
+    text = urdfkin.load("elbow").urdf
+    for word in ("0.6", "0.5", "0.45"):
+        text = text.replace(f" {word}", f" {independent.nstr(independent.mpf(float(word)), 60)}")
+        text = text.replace(f'"{word}', f'"{independent.nstr(independent.mpf(float(word)), 60)}')
+    tree = urdfkin.load("elbow").tree
+    numbers = ([exact(x) for x in row] for row in (moving.q, moving.v, moving.a))
+    state = exact_recursion.move(tree, read_exact(text, tree), *numbers).states[tree.link_index("wrist")]
+    # The other source differentiates with a step of 1e-18 at 60 digits.
+    expected = (
+        (state.p, moving.d(6)(0), 1e-45),
+        (state.vel, rate(moving.d(6), 0.0), 1e-33),
+        (state.acc, second_rate(moving.d(6), 0.0), 1e-22),
+    )
+    for found, derivative, room in expected:
+        for row in range(3):
+            assert abs(found[row] - derivative[row]) < room
+
+
+def test_the_rate_of_the_jacobian_is_its_difference_quotient_to_many_digits() -> None:
+    moving = motion("polar", 13)
+    step = mp.mpf(10) ** -15
+    robot = urdfkin.load("polar")
+    joints, link = read_exact(robot.urdf, robot.tree), robot.tree.link_index("slider")
+    v = [exact(x) for x in moving.v]
+
+    def at(t: object) -> exact_recursion.Motion:
+        q = [exact(x) + t * rate for x, rate in zip(moving.q, v, strict=True)]
+        return exact_recursion.move(robot.tree, joints, q, v, v)
+
+    for reference in Reference:
+        ahead, behind = (exact_recursion.jacobian(at(t), link, reference) for t in (step, -step))
+        found = exact_recursion.jacobian_rate(at(mp.mpf(0)), link, reference)
+        for column, after, before in zip(found, ahead, behind, strict=True):
+            for x, late, early in zip(column, after, before, strict=True):
+                assert abs(x - (late - early) / (2 * step)) < 1e-25
+
+
+@pytest.mark.parametrize(
+    ("name", "root_joint"), [("ur3_gripper", None), ("anymal", "floating"), ("solo8", "planar")]
+)
+def test_it_judges_followers_and_free_joints_too(name: str, root_joint: str | None) -> None:
+    robot = urdfkin.load(name, root_joint=root_joint)
+    for line in judge(robot, samples=1).lines:
+        assert line.urdfkin.worst < 40.0, line
+        assert line.pinocchio.worst < 40.0, line
+
+
+def test_an_error_of_sixteen_units_in_the_last_place_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = {line.quantity: line for line in judge(urdfkin.load("ur5"), samples=2).lines}
+    original = evaluate.placements
+
+    def wrong(*args: object, **kwargs: object) -> FloatArray:
+        return original(*args, **kwargs) * (1.0 + 16.0 * np.finfo(np.float64).eps)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(evaluate, "placements", wrong)
+    found = {line.quantity: line for line in judge(urdfkin.load("ur5"), samples=2).lines}
+    assert not right["placement"].ours_is_worse
+    assert found["placement"].ours_is_worse
+    assert found["placement"].urdfkin.worst == pytest.approx(16.0, rel=0.2)
+    assert found["placement"].pinocchio == right["placement"].pinocchio
+
+
+def test_the_same_seed_gives_the_same_judgement() -> None:
+    first, again = (judge(urdfkin.load("polar"), samples=3, seed=4).as_dict() for _ in range(2))
+    assert first == again
+    assert first != judge(urdfkin.load("polar"), samples=3, seed=5).as_dict()
+
+
+@pytest.mark.parametrize(("name", "samples"), [("fixed_only", 1), ("single_link", 1), ("one_joint", 0)])
+def test_where_nothing_moves_or_nothing_is_drawn_there_are_the_same_lines(name: str, samples: int) -> None:
+    lines = judge(robot_of(name), samples=samples).lines
+    assert len(lines) == 15
+    assert all(line.numbers == 0 for line in lines if "jacobian" in line.quantity)
+
+
+def test_worse_means_by_more_than_a_factor_of_two() -> None:
+    def line(ours: float, theirs: float) -> Line:
+        return Line("velocity", "local", 1, Errors(ours, ours), Errors(theirs, theirs))
+
+    assert line(2.1, 1.0).ours_is_worse
+    assert not line(1.9, 1.0).ours_is_worse
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "worse"),
+    [
+        ((6.1, 1.0), (3.0, 1.0), True),
+        ((6.0, 1.0), (3.0, 1.0), False),
+        ((3.0, 0.61), (3.0, 0.3), True),
+        ((3.0, 0.6), (3.0, 0.3), False),
+        ((0.9, 0.9), (0.5, 0.5), False),
+    ],
+)
+def test_the_worst_and_the_typical_error_are_each_held_against_their_own(
+    ours: tuple[float, float], theirs: tuple[float, float], worse: bool
+) -> None:
+    line = Line("velocity", "local", 1, Errors(*ours), Errors(*theirs))
+    assert line.ours_is_worse == worse
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROBOTS)
+def test_urdfkin_is_never_the_worse_of_the_two_by_more_than_a_factor_of_two(name: str) -> None:
+    for line in judge(urdfkin.load(name), samples=5).lines:
+        assert not line.ours_is_worse, line
+
+
+# -- a base that moves ---------------------------------------------------------------------------------
+
+
+def test_a_moving_base_is_a_floating_joint_that_moves_alike() -> None:
+    # The floating joint's rates are in its own axes: u = R^T vel, o = R^T w, and their rates.
+    base, robot = draw_base(1, np.random.default_rng(3)), robot_of("tree_3")
+    hung = robot_of("tree_3", root_joint="floating")
+    generator = np.random.default_rng(4)
+    q = robot.sample(1, 4)[0]
+    v, a = generator.standard_normal((2, robot.nv))
+    T, six, six_2 = base.placement[0], base.velocity[0], base.acceleration[0]
+    root = exact_recursion.on_base(BaseRows(T, six, six_2))
+    back = eq.transposed(root.R)
+    u, o = eq.rotate(back, root.vel), eq.rotate(back, root.w)
+    u_rate = eq.rotate(back, eq.minus(root.acc, eq.cross(root.w, root.vel)))
+    o_rate = eq.rotate(back, root.alpha)
+    quaternion = exact_quaternion(np.array([root.R], dtype=object), quaternion_of(T[:3, :3])[np.newaxis])[0]
+    own = [[exact(x) for x in row] for row in (q, v, a)]
+    on_base = exact_recursion.move(robot.tree, read_exact(robot.urdf, robot.tree), *own, base=root)
+    free = ([*root.p, *quaternion], [*u, *o], [*u_rate, *o_rate])
+    full = ([*first, *rest] for first, rest in zip(free, own, strict=True))
+    afloat = exact_recursion.move(hung.tree, read_exact(hung.urdf, hung.tree), *full)
+    for link, name in enumerate(robot.tree.links):
+        there = hung.tree.link_index(name)
+        for reference in Reference:
+            for quantity in ("placement", "velocity", "acceleration"):
+                one = QUANTITIES[quantity].truth(on_base, link, reference)
+                other = QUANTITIES[quantity].truth(afloat, there, reference)
+                assert abs(one - other).max() < 1e-40, (name, quantity, reference)
+            one, other = (
+                QUANTITIES["jacobian rate"].truth(motion, k, reference)
+                for motion, k in ((on_base, link), (afloat, there))
+            )
+            assert abs(one - other[:, 6:]).max(initial=0) < 1e-40, (name, reference)
+
+
+@pytest.mark.parametrize(("name", "root_joint"), [("ur3_gripper", None), ("polar", "planar")])
+def test_it_judges_a_moving_base_too(name: str, root_joint: str | None) -> None:
+    robot = urdfkin.load(name, root_joint=root_joint)
+    still = judge(robot, samples=2)
+    for base in (draw_base(2, np.random.default_rng(1)), BaseMotion(velocity=np.arange(6.0))):
+        moving = judge(robot, samples=2, base=base)
+        assert moving.moving_base
+        assert len(moving.lines) == len(still.lines)
+        assert moving.lines != still.lines
+        for line in moving.lines:
+            assert line.urdfkin.worst < 40.0, line
+            assert line.pinocchio.worst < 40.0, line
+
+
+def test_a_base_that_one_side_takes_for_another_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, base = urdfkin.load("ur5"), draw_base(2, np.random.default_rng(1))
+    original = recursion_base.BaseMotion.state
+
+    def off(self: BaseMotion, batch_shape: tuple[int, ...]) -> FloatArray:
+        return original(self, batch_shape) * (1.0 + 1e-13)
+
+    monkeypatch.setattr(recursion_base.BaseMotion, "state", off)
+    lines = judge(robot, samples=2, base=base).lines
+    assert all(line.ours_is_worse for line in lines if line.quantity != "analytical jacobian")
+    assert max(line.pinocchio.worst for line in lines) < 40.0
+
+
+def test_bases_that_are_not_as_many_as_samples_are_refused() -> None:
+    with pytest.raises(InputError, match="base is one, or one for each of 2 samples"):
+        judge(urdfkin.load("polar"), samples=2, base=draw_base(3, np.random.default_rng(1)))
+
+
+# -- analytical Jacobians ------------------------------------------------------------------------------
+
+
+def angles(name: str, R: object) -> list[object]:
+    """The angles of a rotation, as the chapter's text and a URDF's rpy define them, at 50 digits."""
+    x, y, z = (tuple(row) for row in R)  # type: ignore[attr-defined]
+    if name == "ZYZ":  # Rz(phi) Ry(theta) Rz(psi)
+        return [mp.atan2(y[2], x[2]), mp.acos(z[2]), mp.atan2(z[1], -z[0])]
+    return [mp.atan2(z[1], z[2]), -mp.asin(z[0]), mp.atan2(y[0], x[0])]  # xyz: roll, pitch, yaw
+
+
+@pytest.mark.parametrize("name", ["ZYZ", "xyz", "quaternion"])
+def test_the_analytical_jacobian_at_fifty_digits_is_the_difference_quotient_of_its_numbers(name: str) -> None:
+    robot = urdfkin.load("panda")
+    joints, link = read_exact(robot.urdf, robot.tree), robot.tree.frame_link("panda_hand")
+    q, zeros, step = robot.sample(1, 5)[0], [0] * robot.nv, mp.mpf(10) ** -18
+
+    def at(column: int, off: object) -> exact_recursion.Motion:
+        numbers = [exact(x) + (off if i == column else 0) for i, x in enumerate(q)]
+        return exact_recursion.move(robot.tree, joints, numbers, zeros, zeros)
+
+    def pose(column: int, off: object) -> list[object]:
+        state = at(column, off).states[link]
+        if name != "quaternion":
+            return [*state.p, *angles(name, state.R)]
+        return [*state.p, *exact_quaternion(np.array([state.R], dtype=object), near)[0]]
+
+    here = at(0, 0)
+    R = np.array(here.states[link].R, dtype=object)
+    near = quaternion_of(R.astype(float))[np.newaxis]
+    J_v = QUANTITIES["jacobian"].truth(here, link, Reference.LOCAL_WORLD_ALIGNED)
+    if name == "quaternion":
+        J = quaternion_jacobian(exact_quaternion(R[np.newaxis], near), J_v[np.newaxis])[0]
+    else:
+        J = euler_jacobian(name, R[np.newaxis], J_v[np.newaxis])[0][0]
+    for column in range(robot.nv):
+        for row, (late, early) in enumerate(zip(pose(column, step), pose(column, -step), strict=True)):
+            assert abs(J[row, column] - (late - early) / (2 * step)) < 1e-28  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("name", [name for name in SEQUENCES if name.islower()])
+def test_about_fixed_axes_the_numbers_are_those_about_turning_ones_last_row_first(name: str) -> None:
+    robot = urdfkin.load("panda", verify=False)
+    fixed, turning = (
+        robot.analytical_jacobian(robot.sample(5, 0), "panda_hand", representation)
+        for representation in (name, name.upper()[::-1])
+    )
+    assert (fixed[:, :3] == turning[:, :3]).all()
+    assert (fixed[:, 3:] == turning[:, :2:-1]).all()
+
+
+def test_an_analytical_jacobian_is_judged_in_every_representation_and_an_error_of_its_own_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = urdfkin.load("ur5")
+
+    def lines() -> dict[str, Line]:
+        return {x.reference: x for x in judge(robot, samples=2).lines if x.quantity == quantity}
+
+    quantity = "analytical jacobian"
+    right, original = lines(), evaluate.jacobians
+
+    def wrong(*args: object, **kwargs: object) -> FloatArray:
+        return original(*args, **kwargs) * (1.0 + 64.0 * np.finfo(np.float64).eps)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(evaluate, "jacobians", wrong)
+    found = lines()
+    assert set(right) == set(found) == {"euler angles", "quaternion"}
+    for name, line in right.items():
+        assert line.urdfkin.worst < 5.0
+        assert line.pinocchio.worst < 5.0
+        assert found[name].ours_is_worse
+        assert found[name].pinocchio == line.pinocchio
+    # Two samples of eleven links of up to six columns, in twelve sequences; singular ones are left out.
+    assert 1000 < right["euler angles"].numbers < 2 * 11 * 6 * 6 * 12

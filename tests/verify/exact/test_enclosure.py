@@ -1,0 +1,247 @@
+"""An enclosure holds the true values, which are those at fifty digits, in every quantity and reference."""
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import redirect_stdout
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import urdfkin
+from tests.attacks.test_judged_quaternions import quaternions, text
+from tests.laws.everything import by_the_robot
+from tests.laws.subjects import robot_of, state
+from tests.laws.test_mutation import with_a_slip
+from urdfkin import BaseMotion, Reference
+from urdfkin.errors import InputError, NotFiniteError, UnknownNameError
+from urdfkin.kinematics.rotation import exp_rotation
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+from urdfkin.verify.exact import recursion
+from urdfkin.verify.exact.decimals import read_exact
+from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
+from urdfkin.verify.exact.vectors import exact, mp
+from urdfkin.verify.quantities import QUANTITIES
+
+pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+
+ROBOTS = (
+    "panda", "a1", "floating_root", "planar_and_floating_in_the_middle", "two_floating_in_a_row",
+    "followers_of_followers", "mimic_hand_40_sliding", "default_everything", "sizes",
+    *(f"tree_{seed}" for seed in range(8)),
+)  # fmt: skip
+Sample = tuple[FloatArray, FloatArray, FloatArray]
+
+
+def sample(robot: Robot, seed: int = 0) -> Sample:
+    q, v, a = state(robot, 1, seed)
+    return q[0], v[0], a[0]
+
+
+def moving_base(seed: int) -> BaseMotion:
+    generator = np.random.default_rng(seed)
+    T = np.eye(4)
+    T[:3, :3] = np.round(exp_rotation(generator.normal(size=3)), 9)
+    T[:3, 3] = generator.normal(size=3)
+    return BaseMotion(T, generator.normal(size=6), generator.normal(size=6))
+
+
+def quantities(enclosed: Enclosures) -> Iterator[Enclosure]:
+    yield from (
+        enclosed.placement,
+        enclosed.velocity,
+        enclosed.acceleration,
+        enclosed.jacobian,
+        enclosed.jacobian_rate,
+    )
+
+
+def at_fifty_digits(robot: Robot, x: Sample, base: BaseMotion | None) -> recursion.Motion:
+    numbers = ([exact(number) for number in row] for row in x)
+    joints = read_exact(robot.urdf, robot.tree)
+    on = None if base is None else recursion.on_base(base)
+    return recursion.move(robot.tree, joints, *numbers, base=on)
+
+
+def holds(enclosure: Enclosure, true: NDArray[np.object_]) -> bool:
+    """Whether the true numbers, of 50 digits, lie inside."""
+    rows = zip(enclosure.lower.flat, true.flat, enclosure.upper.flat, strict=True)
+    return all(exact(low) <= mp.mpf(number) <= exact(high) for low, number, high in rows)
+
+
+@pytest.mark.parametrize("moves", [False, True], ids=["standing", "moving"])
+@pytest.mark.parametrize("name", ROBOTS)
+def test_every_number_at_fifty_digits_lies_in_its_interval_at_any_precision(name: str, moves: bool) -> None:
+    robot = robot_of(name)
+    x, base = sample(robot), moving_base(3) if moves else None
+    link = int(np.random.default_rng(len(robot.tree.links)).integers(1, len(robot.tree.links)))
+    motion = at_fifty_digits(robot, x, base)
+    for reference in Reference:
+        widest = np.inf
+        for digits in (15, 40):
+            enclosed = robot.enclose(*x, robot.tree.link_frames[link], reference, base=base, digits=digits)
+            for one in quantities(enclosed):
+                assert holds(one, QUANTITIES[one.quantity].truth(motion, link, reference)), (digits, one)
+            before, widest = widest, max(float(one.width.max(initial=0.0)) for one in quantities(enclosed))
+            assert widest <= before
+
+
+def test_quaternions_in_the_file_and_joints_that_the_root_hangs_from_are_enclosed_too() -> None:
+    for robot in (
+        urdfkin.load(text(quaternions(1.7), 'version="1.1"'), verify=False),
+        robot_of("tree_1", root_joint="floating"),
+        robot_of("one_joint", root_joint="planar"),
+    ):
+        x = sample(robot)
+        motion = at_fifty_digits(robot, x, None)
+        for one in quantities(robot.enclose(*x, robot.tip_frame, "local")):
+            link = robot.tree.frame_link(robot.tip_frame)
+            assert holds(one, QUANTITIES[one.quantity].truth(motion, link, Reference.LOCAL)), one
+
+
+@pytest.mark.parametrize("name", ["panda", "tree_3", "tree_5", "mimic_hand_40_sliding", "deep_with_fixed"])
+def test_the_ends_are_neighbouring_doubles_unless_fewer_digits_are_asked_for(name: str) -> None:
+    robot = robot_of(name)
+    for one in quantities(robot.enclose(*sample(robot), robot.tip_frame)):
+        # Where the true number is a double itself, or nothing, by a sum that intervals cannot see through,
+        # they end on either side of it.
+        next_ones = one.upper <= np.nextafter(one.lower, np.inf)
+        assert (next_ones | (one.width <= 2.0 * np.spacing(np.abs(one.upper))) | (one.width < 1e-25)).all()
+        assert next_ones.mean() > 0.8
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5", "tree_2", "floating_root"])
+def test_what_doubles_give_lies_in_what_intervals_of_as_many_digits_give_but_for_few(name: str) -> None:
+    robot = urdfkin.load("ur5", verify=False) if name == "ur5" else robot_of(name)
+    x, frame = sample(robot), robot.tip_frame
+    for reference in Reference:
+        enclosed = robot.enclose(*x, frame, reference, digits=15)
+        results, inside = dict(by_the_robot(robot, frame, *x)), []
+        for one in quantities(enclosed):
+            what = "placement" if one is enclosed.placement else f"{one.quantity} {reference.name}"
+            assert (one.urdfkin == results[what]).all()
+            assert one.pinocchio is not None
+            inside += [one.contains(one.urdfkin).ravel(), one.contains(one.pinocchio).ravel()]
+        # They go other ways than the intervals, which may be exact where these round.
+        assert np.concatenate(inside).mean() > 0.97
+
+
+@pytest.mark.parametrize("base", [None, moving_base(1)], ids=["standing", "moving"])
+def test_pinocchios_doubles_are_those_that_it_is_asked_for(base: BaseMotion | None) -> None:
+    robot = robot_of("panda")
+    x, frame = sample(robot), robot.tip_frame
+    enclosed = robot.enclose(*x, frame, "world", base=base)
+    q, v, a = (row[np.newaxis] for row in x)
+    asked = robot.verifier.oracle(base)
+    expected = asked.accelerations(q, v, a, [frame], Reference.WORLD, base)[0, 0]
+    assert (enclosed.acceleration.pinocchio == expected).all()
+    assert (enclosed.placement.pinocchio == asked.placements(q, [frame], base)[0, 0]).all()
+
+
+@pytest.mark.parametrize(
+    ("equation", "term", "quantity"),
+    [
+        ("centripetal", "cross(w, cross(w, d))", "acceleration"),
+        ("angular_acceleration", "times(v, cross(w, z))", "acceleration"),
+        ("turning_column", "cross(z, d)", "jacobian"),
+        ("turning_column_rate", "cross(z, d_rate)", "jacobian rate"),
+    ],
+)
+def test_what_an_equation_gives_that_is_slightly_wrong_leaves_the_interval(
+    equation: str, term: str, quantity: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = robot_of("panda")
+    x, frame = sample(robot), robot.tip_frame
+    monkeypatch.setattr(recursion, "eq", with_a_slip(equation, term))
+    for one in quantities(robot.enclose(*x, frame, digits=15)):
+        assert one.pinocchio is not None
+        if one.quantity == quantity:
+            assert not one.contains(one.urdfkin).all()
+            assert not one.contains(one.pinocchio).all()
+
+
+#: Lengths that are doubles, and joints that slide along coordinate axes.
+GANTRY = (
+    '<robot name="gantry"><link name="a"/><link name="b"/><link name="c"/>'
+    '<joint name="x" type="prismatic"><parent link="a"/><child link="b"/><origin xyz="0.5 0.25 0"/>'
+    '<axis xyz="2 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    '<joint name="y" type="prismatic"><parent link="b"/><child link="c"/><origin xyz="0 0 0.1"/>'
+    '<axis xyz="0 3 4"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+)
+
+
+def test_what_is_exact_has_no_width_and_a_decimal_that_is_no_double_lies_between_two() -> None:
+    robot = urdfkin.load(GANTRY)
+    first, second = (robot.enclose([0.75, 0.5], [1.0, 5.0], [0.5, 0.0], frame) for frame in "bc")
+    assert [one.width.max() for one in quantities(first)] == [0.0] * 5
+    assert first.placement.lower[:3, 3].tolist() == [1.25, 0.25, 0.0]
+    assert first.acceleration.upper.tolist() == [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]
+    # 0.1 + 0.5 * 0.8 is half, which intervals do not know; 0.25 + 0.5 * 0.6 is no double.
+    low, high = second.placement.lower[:3, 3], second.placement.upper[:3, 3]
+    assert (low[0], high[0]) == (1.25, 1.25)
+    assert low[1] < high[1] == np.nextafter(low[1], 1.0)
+    assert low[2] < 0.5 < high[2]
+    assert high[2] - low[2] < 2e-16
+    assert second.jacobian.contains(np.array([[1.0, 0, 0, 0, 0, 0], [0, 0.6, 0.8, 0, 0, 0]]).T).all()
+
+
+def test_an_error_is_what_a_number_can_be_off_by_at_most() -> None:
+    robot = robot_of("panda")
+    velocity = robot.enclose(*sample(robot), robot.tip_frame).velocity
+    off = velocity.lower - 1e-3
+    assert (velocity.error(off) >= 1e-3).all()
+    assert (velocity.error(off) <= 1e-3 + 2.0 * velocity.width + 1e-15).all()
+    assert (velocity.error(velocity.lower) >= velocity.width).all()
+    assert not velocity.contains(off).any()
+
+
+def test_a_robot_that_pinocchio_refuses_is_enclosed_all_the_same() -> None:
+    robot = robot_of("panda")
+    robot.verifier.unverifiable = "it was told to"
+    enclosed = robot.enclose(*sample(robot), robot.tip_frame)
+    assert enclosed.jacobian.pinocchio is None
+    assert "Pinocchio" not in str(enclosed)
+
+
+def test_it_reads_as_what_it_says() -> None:
+    lines = str(urdfkin.load(GANTRY).enclose([0.75, 0.5], [1.0, 5.0], [0.5, 0.0], "b")).splitlines()
+    assert lines[0] == "b in local_world_aligned, proven with 31 digits"
+    assert lines[3] == "  acceleration: 6 numbers, widest 0.0e+00, inside 6 of urdfkin's, 6 of Pinocchio's"
+    assert len(lines) == 6
+
+
+def test_bad_input_is_said() -> None:
+    robot = robot_of("panda")
+    q, v, a = sample(robot)
+    with pytest.raises(InputError, match=r"a proof is for one sample: found a batch of shape \(2,\)"):
+        robot.enclose(np.stack([q, q]), v, a, robot.tip_frame)
+    with pytest.raises(InputError, match="digits must be at least 15"):
+        robot.enclose(q, v, a, robot.tip_frame, digits=14)
+    with pytest.raises(NotFiniteError, match="v must be finite"):
+        robot.enclose(q, v * np.nan, a, robot.tip_frame)
+    with pytest.raises(UnknownNameError, match="panda_hand"):
+        robot.enclose(q, v, a, "panda_hond")
+    enclosed = robot.enclose(q, v, a, robot.tip_frame)
+    with pytest.raises(InputError, match=r"the velocity has the shape \(6,\)"):
+        enclosed.velocity.contains(np.zeros(5))
+
+
+def test_a_robot_without_joints_has_jacobians_without_columns() -> None:
+    robot = robot_of("fixed_only")
+    enclosed = robot.enclose([], [], [], robot.tip_frame, base=moving_base(4))
+    assert enclosed.jacobian.lower.shape == (6, 0)
+    assert enclosed.velocity.contains(robot.velocity([], [], robot.tip_frame, base=moving_base(4))).any()
+
+
+def test_the_example_on_the_page_runs_and_prints_what_stands_there() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "enclosures.md").read_text("utf-8")
+    code, printed = re.findall(r"```(?:python|text)\n(.*?)```", page, re.DOTALL)
+    names: dict[str, Enclosures] = {}
+    with redirect_stdout(io.StringIO()) as out:
+        exec(code, names)
+    # How many of urdfkin's own lie inside is a matter of last digits.
+    own = re.compile(r"\d+ of urdfkin's")
+    assert own.sub("", out.getvalue()) == own.sub("", printed)

@@ -1,0 +1,127 @@
+"""The bounds, number for number, as their derivation has them: a looser one is a change that shows here."""
+
+import numpy as np
+import pytest
+
+import urdfkin
+from urdfkin.compiled.plan import Plan
+from urdfkin.kinematics.roundings import EPS, of_joints
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.verify import bounds
+from urdfkin.verify.bounds import Bound
+from urdfkin.verify.magnitudes import Magnitudes
+from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, JACOBIAN_RATE, PLACEMENT, VELOCITY
+
+#: A turning joint, one that slides twice as far as the coordinate before it says.
+ARM = """<robot name="r">
+<link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/>
+<joint name="a" type="continuous"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>
+<joint name="b" type="prismatic"><parent link="l1"/><child link="l2"/><axis xyz="1 0 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="c" type="prismatic"><parent link="l2"/><child link="l3"/><axis xyz="1 0 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="b" multiplier="-2"/></joint></robot>"""
+P, W, VEL, ALPHA, ACC, JOINTS = 3.0, 5.0, 7.0, 11.0, 13.0, 4.0
+LOCAL, WORLD, ALIGNED = Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED
+
+
+def sizes(tilt: float = 0.0) -> Magnitudes:
+    return Magnitudes(*(np.array([[x]]) for x in (P, W, VEL, ALPHA, ACC, of_joints(JOINTS, tilt))))
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    return urdfkin.load(ARM).plan([3])
+
+
+def six(bound: Bound) -> tuple[float, float, float]:
+    """Linear and angular scale, each the same for three numbers, and k."""
+    linear, angular = np.split(bound.scale[0, 0], 2, axis=0)
+    assert (linear == linear[0]).all()
+    assert (angular == angular[0]).all()
+    return float(linear[0]), float(angular[0]), float(bound.k.ravel()[0])
+
+
+def columns(bound: Bound) -> tuple[FloatArray, FloatArray, float]:
+    """The scales of the linear and of the angular rows, one number a column, and k."""
+    scale = bound.scale[0, 0]
+    assert (scale[:3] == scale[0]).all()
+    assert (scale[3:] == scale[3]).all()
+    return scale[0], scale[3], float(bound.k.ravel()[0])
+
+
+def test_a_placement_is_held_to_the_path_and_its_rotation_to_one(plan: Plan) -> None:
+    bound = PLACEMENT.bound(plan, sizes(), None)
+    expected = np.array([[1, 1, 1, P], [1, 1, 1, P], [1, 1, 1, P], [0, 0, 0, 0]], dtype=np.float64)
+    assert (bound.scale[0, 0] == expected).all()
+    assert bound.k.ravel().tolist() == [24.0 * JOINTS]
+
+
+@pytest.mark.parametrize(
+    ("reference", "linear", "factors"), [(ALIGNED, VEL, 2), (LOCAL, VEL, 3), (WORLD, VEL + W * P, 3)]
+)
+def test_a_velocity_has_two_factors(plan: Plan, reference: Reference, linear: float, factors: int) -> None:
+    assert six(VELOCITY.bound(plan, sizes(), reference)) == (linear, W, 24.0 * JOINTS * factors)
+
+
+@pytest.mark.parametrize(
+    ("reference", "linear", "factors"),
+    [
+        (ALIGNED, ACC + W * VEL, 3),
+        (LOCAL, ACC + W * VEL, 4),
+        (WORLD, ACC + 2 * W * VEL + (ALPHA + W * W) * P, 4),
+    ],
+)
+def test_an_acceleration_has_three(plan: Plan, reference: Reference, linear: float, factors: int) -> None:
+    assert six(ACCELERATION.bound(plan, sizes(), reference)) == (linear, ALPHA, 24.0 * JOINTS * factors)
+
+
+@pytest.mark.parametrize(("reference", "factors"), [(ALIGNED, 2), (LOCAL, 3), (WORLD, 3)])
+def test_a_jacobian_has_two(plan: Plan, reference: Reference, factors: int) -> None:
+    linear, angular, k = columns(JACOBIAN.bound(plan, sizes(), reference))
+    assert (linear.tolist(), angular.tolist(), k) == ([P, 3.0], [1.0, 0.0], 24.0 * JOINTS * factors)
+
+
+@pytest.mark.parametrize(("reference", "again", "factors"), [(ALIGNED, 1, 3), (LOCAL, 2, 4), (WORLD, 1, 4)])
+def test_its_rate_has_three(plan: Plan, reference: Reference, again: int, factors: int) -> None:
+    linear, angular, k = columns(JACOBIAN_RATE.bound(plan, sizes(), reference))
+    assert linear.tolist() == [again * W * P + VEL, 3.0 * again * W]
+    assert angular.tolist() == [again * W, 0.0]
+    assert k == 24.0 * JOINTS * factors
+
+
+def test_rates_of_angles_grow_as_the_square_of_the_distance_from_the_singularity(plan: Plan) -> None:
+    def euler(apart: float) -> Bound:
+        jacobian = JACOBIAN.bound(plan, sizes(), ALIGNED)
+        return bounds.euler_jacobian_bound(jacobian, sizes(), np.array([[apart]]))
+
+    delta = EPS * 24.0 * JOINTS
+    for apart in (1.0, 1e-3, 1e-6):
+        scale = bounds.euler_jacobian_bound(
+            JACOBIAN.bound(plan, sizes(), ALIGNED), sizes(), np.array([[apart]])
+        ).scale[0, 0]
+        s = apart - delta
+        assert (scale[:3] == [P, 3.0]).all()
+        assert scale[[3, 5], 0] == pytest.approx(1.5 / s**2, rel=1e-15)
+        assert scale[4, 0] == pytest.approx(1.0 / s, rel=1e-15)
+        assert (scale[3:, 1] == 0.0).all()
+    hidden = euler(delta)
+    assert not np.isfinite(hidden.scale[0, 0, 3:, 0]).any()
+    assert bounds.nearest_singularity(plan) == 4.0 * delta
+
+
+def test_rates_of_a_quaternion_are_held_to_those_of_the_jacobian(plan: Plan) -> None:
+    bound, jacobian = (
+        bounds.quaternion_jacobian_bound(JACOBIAN.bound(plan, sizes(), ALIGNED)),
+        JACOBIAN.bound(plan, sizes(), ALIGNED),
+    )
+    assert (bound.scale[0, 0, :6] == jacobian.scale[0, 0]).all()
+    assert (bound.scale[0, 0, 6] == jacobian.scale[0, 0, 5]).all()
+    assert (bound.k == jacobian.k).all()
+
+
+def test_a_tilt_adds_twice_itself_to_each_factor(plan: Plan) -> None:
+    tilt = 1e-13
+    k = 24.0 * JOINTS + 2.0 * tilt / EPS
+    assert six(VELOCITY.bound(plan, sizes(tilt), LOCAL))[2] == 3.0 * k
+    assert columns(JACOBIAN.bound(plan, sizes(tilt), ALIGNED))[2] == 2.0 * k

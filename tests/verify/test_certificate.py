@@ -1,0 +1,145 @@
+"""The certificate counts what was handed out: no result more, no result less, from any number of threads."""
+
+import copy
+import pickle
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.laws.subjects import state
+from urdfkin.errors import InputError
+from urdfkin.robot import Robot
+from urdfkin.verify.certificate import NOT_ASKED_FOR
+
+FRAME = "panda_hand"
+
+
+@pytest.fixture(scope="module")
+def panda() -> Robot:
+    return urdfkin.load("panda", verify=False)
+
+
+@pytest.fixture
+def robot(panda: Robot) -> Robot:
+    """The same robot with an empty ledger."""
+    return copy.deepcopy(panda)
+
+
+@pytest.fixture
+def often() -> Iterator[None]:
+    """Threads take turns as often as the interpreter lets them."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+def counts(robot: Robot) -> dict[str, tuple[int, int]]:
+    """Checked and unchecked results of each quantity."""
+    return {str(line.quantity): (line.checked, line.unchecked) for line in robot.certificate().lines}
+
+
+def test_a_copy_of_a_robot_keeps_an_account_of_its_own(panda: Robot) -> None:
+    panda.prepare(FRAME).jacobian(panda.neutral())
+    before = counts(panda)
+    for other in (copy.deepcopy(panda), pickle.loads(pickle.dumps(panda))):
+        assert counts(other) == {}
+        other.prepare(FRAME).jacobian(other.neutral())
+        other.jacobian(other.neutral(), FRAME)
+        assert counts(other) == {"jacobian": (0, 2)}
+    assert counts(panda) == before
+
+
+def test_each_way_of_asking_is_counted(robot: Robot) -> None:
+    q, v, a = state(robot, 1, 1)
+    one = q[0], v[0], a[0]
+    fast = robot.prepare(FRAME, "local")
+    for _ in range(3):
+        fast.placement(one[0])
+        fast.velocity(*one[:2])
+        fast.jacobian(one[0].tolist())  # the long way
+        fast.acceleration(*one)
+    assert counts(robot) == dict.fromkeys(("placement", "velocity", "jacobian", "acceleration"), (0, 3))
+    robot.placement(one[0], FRAME)
+    robot.placement(one[0], FRAME, verify=True)
+    robot.placement(one[0], robot.link_frames)
+    robot.placement(one[0], [FRAME, "panda_link2"], verify=True)
+    robot.placement(np.repeat(q, 7, axis=0), FRAME)
+    fast.placement(np.repeat(q, 5, axis=0))
+    links = len(robot.link_names)
+    assert counts(robot)["placement"] == (1 + 2, 3 + 1 + links + 7 + 5)
+    robot.velocity(one[0], np.repeat(v, 4, axis=0), FRAME)
+    assert counts(robot)["velocity"] == (0, 3 + 4)
+    assert robot.certificate().not_verified == (NOT_ASKED_FOR,)
+
+
+def test_what_was_refused_is_not_counted(robot: Robot) -> None:
+    q = robot.neutral()
+    bad = np.full(robot.nq, np.nan)
+    fast = robot.prepare(FRAME)
+    calls: list[Callable[[], object]] = [
+        lambda: fast.placement(bad),
+        lambda: fast.velocity(q, bad),
+        lambda: fast.jacobian(q[:3]),
+        lambda: fast.jacobian(q, out=np.zeros((6, 9))),
+        lambda: fast.acceleration(q, q, bad),
+        lambda: robot.jacobian(bad, FRAME),
+        lambda: robot.placement(bad, robot.link_frames),
+        lambda: robot.velocity(q, q, FRAME, out=q),
+    ]
+    for compute in calls:
+        with pytest.raises(InputError):
+            compute()
+    assert robot.certificate().lines == ()
+    assert robot.certificate().not_verified == ()
+
+
+def test_what_was_prepared_is_in_the_same_certificate_as_what_was_checked(robot: Robot) -> None:
+    q = robot.sample(10, 2)
+    robot.jacobian(q, FRAME, verify=True)
+    assert robot.certificate().verified
+    fast = robot.prepare(FRAME)
+    assert robot.certificate().verified  # preparing hands out nothing
+    fast.jacobian(q[0])
+    certificate = robot.certificate()
+    assert not certificate.verified
+    assert counts(robot) == {"jacobian": (10, 1)}
+    assert certificate.lines[0].quantity == "jacobian"
+    assert "1 not checked" in str(certificate)
+
+
+@pytest.mark.usefixtures("often")
+def test_eight_threads_are_counted_as_one_is_and_get_what_one_gets(robot: Robot) -> None:
+    q, v, a = state(robot, 16, 3)
+    fast = robot.prepare(FRAME), robot.prepare("panda_link5", "local")
+    expected = [robot.prepare(FRAME).jacobian(x) for x in q]
+    before = counts(robot)["jacobian"][1]
+    rounds = 400
+
+    def work(thread: int) -> bool:
+        k, good = thread % 16, True
+        for turn in range(rounds):
+            k = (k + 7) % 16
+            good &= bool((fast[0].jacobian(q[k]) == expected[k]).all())
+            fast[1].acceleration(q[k], v[k], a[k])
+            robot.jacobian(q[k], FRAME)
+            if turn % 20 == 0:
+                robot.jacobian(q, FRAME)
+                robot.placement(q[:2], [FRAME, "panda_link1", "panda_link2"])
+                robot.velocity(q[:3], v[:3], FRAME, verify=True)
+                robot.certificate()
+        return good
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(work, range(8)))
+    few = rounds // 20
+    assert counts(robot) == {
+        "placement": (0, 8 * few * 6),
+        "velocity": (8 * few * 3, 0),
+        "jacobian": (0, before + 8 * (2 * rounds + few * 16)),
+        "acceleration": (0, 8 * rounds),
+    }

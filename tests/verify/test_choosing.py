@@ -1,0 +1,240 @@
+"""A check in parts, or of a sample, says what a check of everything at once says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.laws.subjects import state
+from urdfkin.errors import InputError
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+from urdfkin.verify import choosing, verifier
+from urdfkin.verify.asked import Rows
+from urdfkin.verify.certificate import Certificate
+from urdfkin.verify.choosing import SAMPLE, Verify, parts
+from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.quantities import PLACEMENT, Quantity
+
+#: Numbers of a part: one configuration at a time, a few, and all.
+SIZES = (1, 200, 10**9)
+FRAMES = ("panda_hand", "panda_link2", "panda_link7")
+#: The number that marks configurations about which Pinocchio is made to lie.
+MARK = 0.123456
+
+
+def calls(
+    robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: BaseMotion | None, verify: Verify
+) -> dict[str, Callable[[], FloatArray]]:
+    """One call for each quantity; two of them are of several frames."""
+    asked = {"base": base, "verify": verify}
+    return {
+        "placement": lambda: robot.placement(q, FRAMES, **asked),  # type: ignore[arg-type]
+        "velocity": lambda: robot.velocity(q, v, FRAMES[0], "local", **asked),  # type: ignore[arg-type]
+        "jacobian": lambda: robot.jacobian(q, FRAMES[0], "world", **asked),  # type: ignore[arg-type]
+        "jacobian rate": lambda: robot.jacobian_rate(q, v, FRAMES[0], **asked),  # type: ignore[arg-type]
+        "acceleration": lambda: robot.acceleration(q, v, a, FRAMES, "world", **asked),  # type: ignore[arg-type]
+    }
+
+
+def moving(shape: tuple[int, ...]) -> BaseMotion:
+    """A base that moves, and elsewhere in each configuration."""
+    generator = np.random.default_rng(8)
+    T = np.broadcast_to(np.eye(4), (*shape, 4, 4)).copy()
+    T[..., :3, 3] = generator.standard_normal((*shape, 3))
+    return BaseMotion(T, *generator.standard_normal((2, *shape, 6)))
+
+
+def batch(robot: Robot, shape: tuple[int, ...]) -> list[FloatArray]:
+    n = int(np.prod(shape))
+    return [x.reshape(*shape, -1) for x in state(robot, n, 4)]
+
+
+@pytest.fixture(scope="module")
+def panda() -> Robot:
+    return urdfkin.load("panda")
+
+
+@pytest.fixture
+def fresh(panda: Robot) -> Robot:
+    """The same with an empty ledger; Pinocchio's models are kept."""
+    panda.verifier.ledger = type(panda.verifier.ledger)()
+    panda._prepared.clear()
+    return panda
+
+
+@pytest.fixture
+def lies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pinocchio is off by a millionth where the finger stands at the mark, and by more where it is beyond."""
+    right = verifier.pinocchios
+
+    def wrong(quantity: Quantity, oracle: Oracle, asked: Rows) -> FloatArray:
+        theirs, finger = right(quantity, oracle, asked), asked.inputs[0][:, 7]
+        size = np.where(np.abs(finger - MARK) < 1e-3, 1e-6 + np.abs(finger - MARK), 0.0)
+        # Numbers that must agree exactly stay as they are: wherever they do not, there is nothing worse.
+        rows = theirs[..., :3, :] if quantity is PLACEMENT else theirs
+        rows *= 1.0 + size.reshape(-1, *[1] * (theirs.ndim - 1))
+        return theirs
+
+    monkeypatch.setattr(verifier, "pinocchios", wrong)
+
+
+BATCHES = [
+    ((), None),
+    ((), ()),
+    ((23,), None),
+    ((23,), ()),
+    ((23,), (23,)),
+    ((2, 11), None),
+    ((2, 11), ()),
+    ((2, 11), (2, 11)),
+    ((2, 11), (11,)),
+]
+
+
+@pytest.mark.parametrize(("shape", "base"), BATCHES)
+@pytest.mark.usefixtures("lies")
+def test_the_worst_sample_is_named_in_whatever_part_it_stands(
+    fresh: Robot, monkeypatch: pytest.MonkeyPatch, shape: tuple[int, ...], base: tuple[int, ...] | None
+) -> None:
+    q, v, a = batch(fresh, shape)
+    first, last = tuple(0 for _ in shape), tuple(size - 1 for size in shape)
+    motion = None if base is None else moving(base)
+    for worst, other in ((first, last), (last, first)):
+        q[..., 7] = 0.0
+        q[(*other, 7)] = MARK
+        q[(*worst, 7)] = MARK + 1e-4
+        for size in SIZES:
+            monkeypatch.setattr(choosing, "_AT_A_TIME", size)
+            for quantity, compute in calls(fresh, q, v, a, motion, True).items():
+                with pytest.raises(urdfkin.VerificationError) as caught:
+                    compute()
+                error = caught.value
+                assert (error.quantity, error.index) == (quantity, worst), size
+                expected = calls(fresh, q, v, a, motion, False)[quantity]()[worst]
+                frame = FRAMES.index(error.frame)
+                ours = expected[frame] if expected.ndim > error.ours.ndim else expected
+                np.testing.assert_array_equal(error.ours, ours)
+    assert not any(line.checked for line in fresh.certificate().lines)
+
+
+@pytest.mark.parametrize(("shape", "base"), BATCHES)
+def test_the_certificate_does_not_depend_on_the_parts(
+    fresh: Robot, monkeypatch: pytest.MonkeyPatch, shape: tuple[int, ...], base: tuple[int, ...] | None
+) -> None:
+    motion = None if base is None else moving(base)
+    found = list[Certificate]()
+    q, v, a = batch(fresh, shape)
+    for size in SIZES:
+        monkeypatch.setattr(choosing, "_AT_A_TIME", size)
+        fresh.verifier.ledger = type(fresh.verifier.ledger)()
+        for compute in calls(fresh, q, v, a, motion, True).values():
+            compute()
+        found.append(fresh.certificate())
+    assert found[0] == found[1] == found[2]
+    n = int(np.prod(shape))
+    several = ("placement", "acceleration")
+    counts = {line.quantity: line.checked for line in found[0].lines}
+    assert counts == {quantity: n * (3 if quantity in several else 1) for quantity in counts}
+    assert len(counts) == 5
+    assert found[0].verified
+
+
+@pytest.mark.parametrize("base", [None, (), (250,)])
+@pytest.mark.parametrize("size", SIZES)
+def test_of_a_large_batch_a_sample_is_checked_and_the_rest_stated(
+    fresh: Robot, monkeypatch: pytest.MonkeyPatch, size: int, base: tuple[int, ...] | None
+) -> None:
+    monkeypatch.setattr(choosing, "_AT_A_TIME", size)
+    motion = None if base is None else moving(base)
+    q, v, a = batch(fresh, (250,))
+    for compute in calls(fresh, q, v, a, motion, "sample").values():
+        compute()
+    certificate = fresh.certificate()
+    frames = {"placement": 3, "acceleration": 3}
+    for line in certificate.lines:
+        of = frames.get(line.quantity, 1)
+        assert (line.checked, line.unchecked) == (SAMPLE * of, (250 - SAMPLE) * of)
+        assert line.worst > 0.0
+        assert 0.0 < line.share < 1.0
+    assert len(certificate.lines) == 5
+    assert not certificate.verified
+    assert certificate.not_verified == ('verify="sample" checks 100 configurations of a call',)
+
+
+@pytest.mark.parametrize("n", [0, 1, 99, SAMPLE])
+def test_a_sample_of_no_more_than_its_size_is_everything(fresh: Robot, n: int) -> None:
+    fresh.jacobian(fresh.sample(n, 1), "panda_hand", verify="sample")
+    certificate = fresh.certificate()
+    assert [(line.checked, line.unchecked) for line in certificate.lines] == [(n, 0)] * (n > 0)
+    assert certificate.verified is (n > 0)
+    assert certificate.not_verified == ()
+
+
+@pytest.mark.parametrize("n", [101, 1000])
+@pytest.mark.parametrize("numbers", [1, 6, 48, 10**7])
+def test_the_sample_is_always_the_same_each_once_and_from_all_of_the_batch(n: int, numbers: int) -> None:
+    drawn, again = (
+        np.concatenate([np.arange(n)[part] for part in parts("sample", n, numbers)]) for _ in range(2)
+    )
+    assert drawn.tolist() == again.tolist()
+    assert len(set(drawn.tolist())) == SAMPLE
+    assert drawn.tolist() == sorted(drawn.tolist())
+    assert drawn[0] < n // 10
+    assert drawn[-1] >= n - n // 10
+
+
+@pytest.mark.parametrize("numbers", [0, 1, 48, 10**7])
+@pytest.mark.parametrize("n", [0, 1, 5000])
+def test_the_parts_of_everything_are_everything_once(n: int, numbers: int) -> None:
+    choices: tuple[Verify, ...] = (True, "sample") if n <= SAMPLE else (True,)
+    for verify in choices:
+        indices = [i for part in parts(verify, n, numbers) for i in np.arange(n)[part].tolist()]
+        assert indices == list(range(n))
+
+
+@pytest.mark.usefixtures("lies")
+def test_a_lie_in_the_sample_is_found_and_one_outside_is_not(fresh: Robot) -> None:
+    drawn = np.concatenate([np.arange(250)[part] for part in parts("sample", 250, 48)])
+    inside, outside = int(drawn[57]), int(np.setdiff1d(np.arange(250), drawn)[3])
+    q, v, a = batch(fresh, (250,))
+    q[:, 7] = 0.0
+    q[outside, 7] = MARK
+    for compute in calls(fresh, q, v, a, None, "sample").values():
+        compute()
+    q[inside, 7] = MARK
+    for shape in ((250,), (5, 50)):
+        shaped = [x.reshape(*shape, -1) for x in (q, v, a)]
+        for compute in calls(fresh, shaped[0], shaped[1], shaped[2], moving(shape), "sample").values():
+            with pytest.raises(urdfkin.VerificationError) as caught:
+                compute()
+            assert caught.value.index == tuple(np.unravel_index(inside, shape))
+
+
+def test_a_robot_may_be_loaded_to_check_samples_and_a_call_ask_for_more_or_less() -> None:
+    robot = urdfkin.load("ur5", verify="sample")
+    q = robot.sample(103, 1)
+    robot.placement(q, "tool0")
+    robot.placement(q, "tool0", verify=True)
+    robot.placement(q[0], "tool0")
+    robot.placement(q[0], "tool0", verify=False)
+    (line,) = robot.certificate().lines
+    assert (line.checked, line.unchecked) == (SAMPLE + 103 + 1, 3 + 1)
+    assert robot.certificate().not_verified == (
+        "verify=False was asked for",
+        'verify="sample" checks 100 configurations of a call',
+    )
+
+
+@pytest.mark.parametrize("verify", ["sampled", "", "True", 1, 0, None, np.True_, np.ones(2), ["sample"]])
+def test_what_is_no_choice_is_refused(fresh: Robot, verify: object) -> None:
+    with pytest.raises(InputError, match='verify is True, False or "sample"'):
+        urdfkin.load("ur5", verify=verify)  # type: ignore[arg-type]
+    if verify is not None:
+        with pytest.raises(InputError, match='verify is True, False or "sample"'):
+            fresh.jacobian(fresh.neutral(), "panda_hand", verify=verify)  # type: ignore[arg-type]
+    assert fresh.certificate().lines == ()

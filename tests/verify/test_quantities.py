@@ -1,0 +1,189 @@
+"""A quantity is one row: what stands in the table is computed, checked, validated, shown and replayed."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import shlex
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as command
+from urdfkin.compiled import evaluate
+from urdfkin.compiled.plan import Plan
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.kinematics.registry import equations
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.motion.frame_motion import frame_motion
+from urdfkin.report.html import as_html
+from urdfkin.report.markdown import as_markdown
+from urdfkin.robot import Robot
+from urdfkin.verify import bounds
+from urdfkin.verify.magnitudes import Magnitudes
+from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.quantities import QUANTITIES, VELOCITY, Quantity, by_command, walked
+
+# -- a made-up row: the angular velocity alone ---------------------------------------------------------
+
+
+def turning(
+    plan: Plan,
+    q: FloatArray,
+    v: FloatArray,
+    reference: Reference,
+    *,
+    out: FloatArray | None = None,
+    **how: Any,
+) -> FloatArray:
+    result = evaluate.velocities(plan, q, v, reference, **how)[..., 3:]
+    if out is None:
+        return result
+    out[...] = result
+    return out
+
+
+def pinocchios(
+    oracle: Oracle, q: FloatArray, v: FloatArray, frames: Sequence[str], reference: Reference, *base: Any
+) -> FloatArray:
+    return oracle.velocities(q, v, frames, reference, *base)[..., 3:]
+
+
+def size(plan: Plan, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
+    return bounds.velocity_scale(plan, magnitudes, reference)[..., 3:]
+
+
+TURNING = replace(
+    VELOCITY,
+    name="angular velocity",
+    title="angular velocity",
+    shape=(3,),
+    compute=turning,
+    ask=pinocchios,
+    scale=size,
+    head="turns",
+    labels=("wx", "wy", "wz"),
+    units={"angular": "rad/s"},
+    command="angular-velocity",
+    summary="angular velocity of a frame",
+    page="How fast it turns.",
+    example="urdfkin angular-velocity ur5",
+)
+
+
+@pytest.fixture
+def row(monkeypatch: pytest.MonkeyPatch) -> Quantity:
+    monkeypatch.setitem(QUANTITIES, TURNING.name, TURNING)
+    return TURNING
+
+
+@pytest.mark.usefixtures("row")
+def test_a_new_row_is_computed_checked_and_certified() -> None:
+    robot = urdfkin.load("ur5")
+    q = robot.sample(5)
+    out = np.empty((5, 2, 3))
+    found = robot.compute("angular velocity", (q, q), ["tool0", "wrist_1_link"], "local", out=out)
+    assert found is out
+    np.testing.assert_array_equal(
+        found, robot.velocity(q, q, ["tool0", "wrist_1_link"], "local", verify=False)[..., 3:]
+    )
+    (line,) = (line for line in robot.certificate().lines if line.quantity == "angular velocity")
+    assert (line.checked, line.unchecked) == (10, 0)
+    assert 0.0 < line.share < 1.0
+
+
+def test_a_slip_in_a_new_row_is_found_and_its_line_computes_it_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = replace(TURNING, compute=lambda *x, **how: turning(*x, **how) * (1.0 + 1e-10))
+    monkeypatch.setitem(QUANTITIES, wrong.name, wrong)
+    robot = urdfkin.load("ur5")
+    q = robot.sample(1)[0]
+    with pytest.raises(urdfkin.VerificationError, match="the angular velocity of tool0") as caught:
+        robot.compute("angular velocity", (q, q), "tool0")
+    line = caught.value.reproduce
+    assert line.startswith("urdfkin angular-velocity ur5 --frame tool0")
+    assert command(*shlex.split(line)[1:]).code == 1
+
+
+@pytest.mark.usefixtures("row")
+def test_a_new_row_is_validated_and_stands_in_every_report() -> None:
+    report = urdfkin.validate("ur5", samples=4)
+    (robot,) = report.robots
+    assert report.passed
+    tallies = robot.of("angular velocity")
+    assert len(tallies) == 3
+    assert all(tally.results == 7 * len(robot.frames) and 0.0 < tally.share < 1.0 for tally in tallies)
+    replay = robot.replay(("angular velocity", "local"))
+    assert replay is not None
+    assert command(*shlex.split(replay)[1:]).code == 0
+    document: Any = report.as_dict()
+    named = [check["quantity"] for check in document["robots"][0]["checks"]]
+    assert named.count("angular velocity") == 3
+    assert "turns" in as_markdown(document)
+    assert "angular velocity" in as_html(document)
+
+
+@pytest.mark.usefixtures("row")
+def test_a_new_row_is_a_command_with_help_and_every_form() -> None:
+    assert "angular velocity of a frame" in command("--help").text
+    text = " ".join(command("angular-velocity", "--help").text.split())
+    assert "Angular velocity of a frame (eq. 7.127, 7.128). How fast it turns. ROBOT is" in text
+    words = ["angular-velocity", "ur5", "--frame", "tool0", "--v", "1,0,0,0,0,0"]
+    assert "angular [rad/s]" in command(*words).text
+    document = json.loads(command(*words, "--format", "json").out)
+    assert (document["quantity"], document["rows"], "a" in document) == (
+        "angular velocity",
+        ["wx", "wy", "wz"],
+        False,
+    )
+    assert document["result"] == [[0.0, 0.0, 1.0]]
+    assert command(*words, "--format", "csv").text.splitlines()[0] == "sample,wx,wy,wz"
+
+
+@pytest.mark.usefixtures("row")
+def test_a_new_row_is_checked_along_a_trajectory() -> None:
+    robot = urdfkin.load("ur5")
+    q = robot.sample(3)
+    x = frame_motion(robot, q, q, q, "tool0")
+    assert x.agrees
+    assert x.checks["angular velocity"].share.shape == (3,)
+
+
+# -- the table -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("row", QUANTITIES.values(), ids=lambda row: row.name)
+def test_a_rows_equations_are_the_chapters(row: Quantity) -> None:
+    assert set(row.equations) <= set(equations())
+    assert row.equations
+
+
+@pytest.mark.parametrize("row", walked(), ids=lambda row: row.name)
+def test_a_robot_has_a_method_for_each_row_that_takes_its_inputs(row: Quantity) -> None:
+    parameters = list(inspect.signature(getattr(Robot, row.method)).parameters)
+    takes = [*row.inputs, "frame", *(["reference"] if row.referred else [])]
+    assert parameters == ["self", *takes, "base", "out", "verify", "threads"]
+    robot = urdfkin.load("polar")
+    inputs = [robot.sample(2)] * len(row.inputs)
+    found = robot.compute(row.name, inputs, "slider")
+    np.testing.assert_array_equal(found, getattr(robot, row.method)(*inputs, "slider"))
+    assert found.shape == (2, *row.own_shape(robot.nv))
+    assert robot.certificate().verified
+
+
+def test_every_command_of_the_table_is_its_rows() -> None:
+    assert list(by_command()) == ["placement", "velocity", "jacobian", "jacobian-rate", "acceleration"]
+
+
+def test_what_is_no_row_or_takes_other_inputs_is_refused() -> None:
+    robot = urdfkin.load("polar")
+    with pytest.raises(UnknownNameError, match="unknown quantity 'jacobain'; did you mean jacobian"):
+        robot.compute("jacobain", ([0.0, 0.0],), "slider")
+    with pytest.raises(InputError, match=r"the velocity takes \(q, v\)"):
+        robot.compute("velocity", ([0.0, 0.0],), "slider")
+    with pytest.raises(InputError, match="has a method of its own; call analytical_jacobian"):
+        robot.compute("analytical jacobian", ([0.0, 0.0],), "slider")

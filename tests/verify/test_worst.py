@@ -1,0 +1,88 @@
+"""The compiled comparison is its definition, `bounds.disagreement`, whatever the numbers are."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from urdfkin.kinematics.roundings import EPS, SMALLEST
+from urdfkin.model.tree import FloatArray
+from urdfkin.verify.bounds import Bound, disagreement
+from urdfkin.verify.worst import worst_of_each
+
+ODD = (0.0, -0.0, 5e-324, 1e-310, SMALLEST, 1.0, 1.0 + EPS, -1.0, 1e300, 1.7e308, -1.7e308)
+NEVER = (np.inf, -np.inf, np.nan)
+numbers = st.one_of(st.floats(-10.0, 10.0), st.sampled_from(ODD), st.floats(), st.sampled_from(NEVER))
+scales = st.one_of(
+    st.floats(0.0, 100.0), st.sampled_from([0.0, 5e-324, SMALLEST / EPS, 1e300, np.inf, np.nan])
+)
+
+
+def definition(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
+    """The largest disagreement over the axes of each result; none where a result has no numbers."""
+    units = disagreement(ours, theirs, Bound(scale, np.ones(1)))
+    return np.asarray(units.reshape(*ours.shape[:axes], -1).max(axis=-1, initial=0.0))
+
+
+@st.composite
+def cases(draw: st.DrawFn) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    """Results, some of them equal or a rounding apart, and a scale that may have to be broadcast."""
+    shape = draw(st.sampled_from([(1,), (7,), (1, 6), (3, 2, 6), (2, 2, 6, 3), (17, 1, 4, 4)]))
+    size = int(np.prod(shape))
+    pool = draw(st.lists(numbers, min_size=1, max_size=24))
+    ours = np.resize(np.array(pool), size).reshape(shape)
+    change = np.resize(np.array(draw(st.lists(st.integers(0, 3), min_size=1, max_size=16))), size)
+    other = np.resize(np.array(draw(st.lists(numbers, min_size=1, max_size=5))), size)
+    with np.errstate(over="ignore"):  # before NumPy 2.2 the number after the largest raised a flag
+        up = np.nextafter(ours, np.inf).ravel()
+    theirs = np.choose(change, [ours.ravel(), ours.ravel(), up, other]).reshape(shape)
+    own = draw(st.sampled_from([shape, shape[-1:], (1,) * len(shape)]))
+    scale = np.resize(np.array(draw(st.lists(scales, min_size=1, max_size=8))), int(np.prod(own)))
+    return ours, theirs, scale.reshape(own), draw(st.integers(0, len(shape)))
+
+
+@settings(max_examples=150)
+@given(cases())
+def test_it_is_the_definition_to_the_last_bit(case: tuple[FloatArray, FloatArray, FloatArray, int]) -> None:
+    ours, theirs, scale, axes = case
+    with np.errstate(over="ignore"):
+        expected = definition(ours, theirs, scale, axes)
+    found = worst_of_each(ours, theirs, scale, axes)
+    assert found.shape == ours.shape[:axes]
+    np.testing.assert_array_equal(found, expected)
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 2**32 - 1))
+def test_it_is_the_definition_for_results_as_they_come(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    ours = generator.standard_normal((33, 3, 6, 8))
+    theirs = ours + EPS * generator.standard_normal(ours.shape)
+    scale = generator.uniform(0.1, 9.0, (33, 3, 6, 8))
+    np.testing.assert_array_equal(worst_of_each(ours, theirs, scale, 2), definition(ours, theirs, scale, 2))
+
+
+@pytest.mark.parametrize("place", range(16))
+@pytest.mark.parametrize("bad", NEVER)
+def test_what_is_not_finite_disagrees_wherever_it_stands(place: int, bad: float) -> None:
+    right = np.ones((5, 1, 4, 4))
+    spoiled = right.copy()
+    spoiled[3].flat[place] = bad
+    expected = [0.0, 0.0, 0.0, np.inf, 0.0]
+    for arrays in ((spoiled, right, right), (right, spoiled, right), (right, right, spoiled)):
+        assert worst_of_each(*arrays, 2)[:, 0].tolist() == expected
+    assert worst_of_each(spoiled, spoiled, right, 2)[:, 0].tolist() == expected
+
+
+def test_where_the_scale_is_zero_only_equal_numbers_agree() -> None:
+    ours = np.array([[0.0, 1.0], [0.0, 1.0], [-0.0, 1.0]])
+    theirs = np.array([[0.0, 1.0], [5e-324, 1.0], [0.0, 1.0]])
+    assert worst_of_each(ours, theirs, np.array([0.0, 1.0]), 1).tolist() == [0.0, np.inf, 0.0]
+
+
+@pytest.mark.parametrize(("shape", "axes"), [((0, 1, 4, 4), 2), ((3, 0, 6), 2), ((3, 2, 6, 0), 2), ((0,), 0)])
+def test_of_nothing_there_is_no_disagreement(shape: tuple[int, ...], axes: int) -> None:
+    nothing = np.zeros(shape)
+    found = worst_of_each(nothing, nothing, nothing, axes)
+    assert found.shape == shape[:axes]
+    assert not found.any()

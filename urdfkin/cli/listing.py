@@ -1,0 +1,89 @@
+"""Plain tables for a terminal of any width: names on the left, numbers on the right at six digits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Literal
+
+from urdfkin.errors.printable import printable
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+
+def make_table(columns: Sequence[str], rows: Iterable[Sequence[str | float]], *, words: int = 1) -> Table:
+    """A plain table: the first `words` columns left, the others right, numbers at six digits.
+
+    What is below rounding of the table's largest number is shown as 0: full precision is for machines.
+    """
+    from rich import box  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, header_style="bold")
+    for i, column in enumerate(columns):
+        justify: Literal["left", "right"] = "left" if i < words else "right"
+        table.add_column(column, justify=justify, overflow="fold", no_wrap=i >= words)
+    for row in _texts(rows):
+        table.add_row(*row)
+    return table
+
+
+def print_named(
+    out: Console, columns: Sequence[str], rows: Iterable[Sequence[str | float]], *, words: int = 1
+) -> None:
+    """A table like `make_table`'s whose first column holds names, which are never folded.
+
+    Where the terminal is too narrow, a name that leaves no room for what belongs to it stands on a line of
+    its own above that.
+    """
+    from rich.cells import cell_len  # noqa: PLC0415
+
+    texts = _texts(rows)
+    widths = _widths(columns, texts)
+    if fits(out, columns, texts):
+        out.print(make_table(columns, texts, words=words))
+        return
+    room = max(2, out.width - 1 - sum(width + 1 for width in widths[1:]))
+
+    def show(cells: Sequence[str], style: str | None = None) -> None:
+        first, rest = cells[0], " ".join(map(padded, range(1, len(cells)), cells[1:], widths[1:]))
+        if cell_len(first) > room - 1:
+            out.print(first, soft_wrap=True, style=style)
+            first = ""
+        out.print(padded(0, first, room) + rest.rstrip(), soft_wrap=True, style=style)
+
+    def padded(i: int, cell: str, width: int) -> str:
+        gap = " " * (width - cell_len(cell))
+        return cell + gap if i < words else gap + cell
+
+    show(columns, "bold")
+    out.print(("-" if out.options.ascii_only else "\u2500") * out.width)
+    name = None
+    for row in texts:
+        show([row[0] if row[0] != name else "", *row[1:]])
+        name = row[0]
+
+
+def fits(out: Console, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
+    """Whether a table is no wider than the terminal."""
+    return sum(width + 1 for width in _widths(columns, rows)) <= out.width
+
+
+def _widths(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[int]:
+    from rich.cells import cell_len  # noqa: PLC0415
+
+    return [max(map(cell_len, column)) for column in zip(columns, *rows, strict=True)]
+
+
+def _texts(rows: Iterable[Sequence[str | float]]) -> list[list[str]]:
+    cells = [list(row) for row in rows]
+    largest = max((abs(cell) for row in cells for cell in row if not isinstance(cell, str)), default=0.0)
+    return [
+        [printable(cell) if isinstance(cell, str) else _number(cell, 1e-15 * largest) for cell in row]
+        for row in cells
+    ]
+
+
+def _number(value: float, noise: float) -> str:
+    return "0" if abs(value) <= noise else f"{value:.6g}"

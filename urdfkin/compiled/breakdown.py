@@ -1,0 +1,226 @@
+"""Whose doing a frame's acceleration is: each joint's, part by part.
+
+Sections 7.6 and 7.7. Seen from link k-1, the frame moves about or along the axis of joint k, with velocity
+u_k = v_k z x d (or v_k z), while link k-1 itself turns with w_{k-1}. That is a moving point in a moving
+frame, and 7.125 names its terms; applied joint by joint from the last inwards they add up to 7.130:
+
+    transverse   a_k z x d              a rotary joint speeds up
+    centripetal  v_k z x (v_k z x d)    it turns
+    coriolis     2 w_{k-1} x u_k        what it does while the joints before it turn the link it sits on
+    sliding      a_k z                  a prismatic joint speeds up
+
+with d from the joint's origin to the frame: not a difference of two places in the world, which far away from
+its origin has lost its digits, but of two places seen from the frame. The angular rows are those of 7.129:
+a_k z, and v_k w_{k-1} x z under coriolis. A planar or floating joint slides and turns at once, along axes
+that turn with it: its sliding velocity s then adds o x s, with o its own angular velocity, under coriolis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from urdfkin.compiled.batch import in_parts
+from urdfkin.compiled.evaluate import placements, velocities
+from urdfkin.compiled.plan import Plan, make_plan
+from urdfkin.errors import NotFiniteError, RangeError
+from urdfkin.kinematics.arrays import chapter as eq
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
+
+#: The kinds of contribution, in the order in which they are kept.
+KINDS = ("transverse", "centripetal", "coriolis", "sliding")
+
+
+_OFFSET, _NOWHERE = slice(9, 12), np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class AccelerationBreakdown:
+    """A frame's acceleration as a sum over joints and kinds.
+
+    Attributes:
+        joints: Moving joints from the base to the frame.
+        base: (..., 6) what a moving base contributes, as if all joints stood still.
+        terms: (..., joints, 4, 6) contributions, kinds in the order of `KINDS`, [linear; angular].
+    """
+
+    joints: tuple[str, ...]
+    base: FloatArray
+    terms: FloatArray
+
+    @cached_property
+    def total(self) -> FloatArray:
+        """(..., 6) the acceleration: the sum of everything else here."""
+        total: FloatArray = self.base + self.by_joint.sum(axis=-2)
+        return total
+
+    @cached_property
+    def by_joint(self) -> FloatArray:
+        """(..., joints, 6) what each joint contributes."""
+        summed: FloatArray = self.terms.sum(axis=-2)
+        return summed
+
+    @cached_property
+    def by_kind(self) -> FloatArray:
+        """(..., 4, 6) what the joints contribute in each kind."""
+        summed: FloatArray = self.terms.sum(axis=-3)
+        return summed
+
+
+class _Moves(NamedTuple):
+    """Sliding and turning of the moved frame relative to the link before it, in world axes: (n, 3) each."""
+
+    slide: FloatArray
+    turn: FloatArray
+
+
+def acceleration_breakdown(
+    tree: KinematicTree,
+    link: int,
+    q: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+    reference: Reference = Reference.LOCAL_WORLD_ALIGNED,
+    base: FloatArray = STILL_STATE,
+    *,
+    out: FloatArray | None = None,
+    threads: int | None = None,
+) -> AccelerationBreakdown:
+    """The contributions to the classical acceleration of a link's frame.
+
+    Args:
+        tree: The robot.
+        link: Index of the link that carries the frame.
+        q: (n, nq).
+        v: (n, nv).
+        a: (n, nv).
+        reference: For which point and in which axes.
+        base: (1 or n, 24) state of the base, see `BaseMotion.state`.
+        out: (n, joints, 4, 6) to write the terms into.
+        threads: How many compute at most; None for `batch.default_threads`.
+
+    Returns:
+        Contributions with one leading axis n.
+
+    Raises:
+        NotFiniteError: a number of q, v or a is not finite.
+        RangeError: a part leaves the range of double precision.
+    """
+    if not np.isfinite(a).all():  # the walks below, which look at their inputs themselves, take q and v
+        raise NotFiniteError("q, v and a must be finite")
+    path = moving_joints(tree, link)
+    plan = make_plan(tree, [0, link, *(i + 1 for i in path), *(tree.joints[i].parent for i in path)])
+    n = len(q)
+    terms = np.empty((n, len(path), len(KINDS), 6)) if out is None else out
+    of_base = np.empty((n, 6))
+
+    def compute(part: slice) -> None:
+        state = base if len(base) == 1 else base[part]
+        try:
+            of_base[part] = _contributions(
+                tree, path, plan, q[part], v[part], a[part], reference, state, terms[part]
+            )
+        except RangeError as error:
+            if part == slice(0, n):
+                raise
+            where = f"samples {part.start} to {part.stop - 1}"
+            raise RangeError(error.what, where=where, remedy=error.remedy) from error
+
+    in_parts(compute, n, threads)
+    return AccelerationBreakdown(tuple(tree.joints[i].name for i in path), of_base, terms)
+
+
+def moving_joints(tree: KinematicTree, link: int) -> list[int]:
+    """The joints that contribute, from the base to the link."""
+    return [i for i in tree.path(link) if tree.joints[i].kind.nv]
+
+
+@np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite is refused at the end
+def _contributions(
+    tree: KinematicTree,
+    path: Sequence[int],
+    plan: Plan,
+    q: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+    reference: Reference,
+    base: FloatArray,
+    terms: FloatArray,
+) -> FloatArray:
+    """Fill in the terms; what the base contributes."""
+    Ts = placements(plan, q, base=base, threads=1)
+    velocity = velocities(plan, q, v, base=base, threads=1)
+    end = _NOWHERE
+    if reference is not Reference.WORLD:
+        # The same walk with the world's origin at the frame: what it rounds is as small as the robot, and
+        # what the new start is off by is the same for all.
+        base = _moved(base, -Ts[:, 1, :3, 3])
+        Ts = placements(plan, q, base=base, threads=1)
+        end = Ts[:, 1, :3, 3]
+    for k, i in enumerate(path):
+        R, d = Ts[:, 2 + k, :3, :3], end - Ts[:, 2 + k, :3, 3]
+        w_before = velocity[:, 2 + len(path) + k, 3:]
+        joint, at = tree.joints[i], tree.v_index[i]
+        terms[:, k] = _terms(_moves(joint, v[:, at:], R), _moves(joint, a[:, at:], R), w_before, d)
+    of_base = _rigid(base, end - Ts[:, 0, :3, 3])
+    if reference is Reference.LOCAL:
+        back = Ts[:, 1, :3, :3].swapaxes(-1, -2)
+        of_base = _turned(back, of_base)
+        terms[...] = _turned(back[:, np.newaxis, np.newaxis], terms)
+    if not (np.isfinite(of_base).all() and np.isfinite(terms).all()):
+        raise RangeError(
+            "a part of the acceleration leaves the range of double precision", remedy="give smaller numbers"
+        )
+    return of_base
+
+
+def _moved(base: FloatArray, by: FloatArray) -> FloatArray:
+    """(n, 24) the base's state with its place moved."""
+    moved = np.repeat(base, len(by), axis=0) if len(base) == 1 else base.copy()
+    moved[:, _OFFSET] += by
+    return moved
+
+
+def _terms(rate: _Moves, rate_2: _Moves, w_before: FloatArray, d: FloatArray) -> FloatArray:
+    """(n, 4, 6) what one joint contributes."""
+    nothing = np.zeros_like(d)
+    u = eq.point_velocity(rate.slide, rate.turn, d)
+    kinds = (
+        (eq.transverse(rate_2.turn, d), rate_2.turn),
+        (eq.centripetal(rate.turn, d), nothing),
+        (eq.coriolis(w_before, u) + eq.axis_rate(rate.turn, rate.slide), eq.axis_rate(w_before, rate.turn)),
+        (rate_2.slide, nothing),
+    )
+    return np.stack([np.concatenate(pair, axis=-1) for pair in kinds], axis=-2)
+
+
+def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
+    """Rates, or their rates, of one joint as vectors in world axes."""
+    slide, turn = np.zeros((len(x), 3)), np.zeros((len(x), 3))
+    if joint.kind is JointKind.PLANAR:
+        slide[:, :2], turn[:, 2] = x[:, :2], x[:, 2]
+    elif joint.kind is JointKind.FLOATING:
+        slide[:], turn[:] = x[:, :3], x[:, 3:6]
+    else:
+        factor = joint.mimic.multiplier if joint.mimic else 1.0
+        (turn if joint.kind.turns else slide)[:] = factor * x[:, :1] * joint.axis
+    return _Moves((R @ slide[..., np.newaxis])[..., 0], (R @ turn[..., np.newaxis])[..., 0])
+
+
+def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
+    """The acceleration of a point that rides on the base, d from its origin (7.123)."""
+    w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
+    linear = eq.point_acceleration(a, alpha, w, d)
+    return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)
+
+
+def _turned(R: FloatArray, six: FloatArray) -> FloatArray:
+    pairs = six.reshape(*six.shape[:-1], 2, 3)
+    turned: FloatArray = (R[..., np.newaxis, :, :] @ pairs[..., np.newaxis])[..., 0]
+    return turned.reshape(six.shape)

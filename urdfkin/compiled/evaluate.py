@@ -1,0 +1,198 @@
+"""Arrays in, arrays out: the compiled walks behind plain functions.
+
+Inputs are flat batches, (n, nq) and (n, nv), already checked; `urdfkin.robot` checks, reshapes and verifies.
+One row that was broadcast to n is read again for each configuration, and never copied.
+A core is loaded when it is first needed, so that a first use compiles only what it needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from urdfkin.compiled.batch import in_blocks
+from urdfkin.compiled.compiling import Core
+from urdfkin.compiled.plan import LARGE, Plan
+from urdfkin.compiled.program import Program, program_of
+from urdfkin.compiled.task import Task, scratch
+from urdfkin.errors import NotFiniteError, RangeError
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.system.forking import importing
+
+_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+_PLACES = Task.BASE, Task.Q, Task.V, Task.A
+_STRIDES = Task.STRIDE_BASE, Task.STRIDE_Q, Task.STRIDE_V, Task.STRIDE_A
+
+
+def _cores() -> Any:
+    with importing:
+        from urdfkin.compiled import cores  # noqa: PLC0415
+    return cores
+
+
+def placements(
+    plan: Plan,
+    q: FloatArray,
+    *,
+    base: FloatArray = STILL_STATE,
+    out: FloatArray | None = None,
+    threads: int | None = None,
+) -> FloatArray:
+    """(n, frames, 4, 4) T_world_frame: 7.77 with the rotations alongside."""
+    core = _cores().placements
+    shape = len(q), len(plan.frames), 16
+    flat = np.empty(shape) if out is None else out.reshape(shape)
+    _run(core, plan, program_of(plan, turned=True), [q], _ALIGNED, base, flat, threads)
+    return flat.reshape(len(q), len(plan.frames), 4, 4)
+
+
+def velocities(
+    plan: Plan,
+    q: FloatArray,
+    v: FloatArray,
+    reference: Reference = _ALIGNED,
+    *,
+    base: FloatArray = STILL_STATE,
+    out: FloatArray | None = None,
+    threads: int | None = None,
+) -> FloatArray:
+    """(n, frames, 6) [linear; angular]: 7.127, 7.128."""
+    cores = _cores()
+    core = cores.local_velocities if reference is Reference.LOCAL else cores.velocities
+    out = np.empty((len(q), len(plan.frames), 6)) if out is None else out
+    _run(
+        core,
+        plan,
+        program_of(plan, turned=reference is Reference.LOCAL),
+        [q, v],
+        reference,
+        base,
+        out,
+        threads,
+    )
+    return out
+
+
+def accelerations(
+    plan: Plan,
+    q: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+    reference: Reference = _ALIGNED,
+    *,
+    base: FloatArray = STILL_STATE,
+    out: FloatArray | None = None,
+    threads: int | None = None,
+) -> FloatArray:
+    """(n, frames, 6) [linear; angular], classical: 7.129, 7.130."""
+    from urdfkin.compiled.cores import accelerations, local_accelerations  # noqa: PLC0415
+
+    core = local_accelerations if reference is Reference.LOCAL else accelerations
+    out = np.empty((len(q), len(plan.frames), 6)) if out is None else out
+    _run(
+        core,
+        plan,
+        program_of(plan, turned=reference is Reference.LOCAL),
+        [q, v, a],
+        reference,
+        base,
+        out,
+        threads,
+    )
+    return out
+
+
+def jacobians(
+    plan: Plan,
+    q: FloatArray,
+    reference: Reference = _ALIGNED,
+    *,
+    base: FloatArray = STILL_STATE,
+    out: FloatArray | None = None,
+    threads: int | None = None,
+) -> FloatArray:
+    """(n, frames, 6, nv) velocity Jacobians: 7.85."""
+    core = _cores().jacobians
+    out = np.empty((len(q), len(plan.frames), 6, plan.nv)) if out is None else out
+    program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
+    _run(core, plan, program, [q], reference, base, out, threads)
+    return out
+
+
+def jacobian_rates(
+    plan: Plan,
+    q: FloatArray,
+    v: FloatArray,
+    reference: Reference = _ALIGNED,
+    *,
+    base: FloatArray = STILL_STATE,
+    out: FloatArray | None = None,
+    threads: int | None = None,
+) -> FloatArray:
+    """(n, frames, 6, nv) time derivatives of the velocity Jacobians: the J-dot of 7.126."""
+    core = _cores().jacobian_rates
+    out = np.empty((len(q), len(plan.frames), 6, plan.nv)) if out is None else out
+    program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
+    _run(core, plan, program, [q, v], reference, base, out, threads)
+    return out
+
+
+def _run(
+    core: Core,
+    plan: Plan,
+    program: Program,
+    inputs: Sequence[FloatArray],
+    reference: Reference,
+    base: FloatArray,
+    out: FloatArray,
+    threads: int | None,
+) -> None:
+    """Have a core fill `out` from q, and v, and a.
+
+    Raises:
+        NotFiniteError: an input is not finite.
+        RangeError: a result is not, although the inputs are.
+    """
+    moving = base is not STILL_STATE
+    inputs = [x[:1] if _is_the_same_for_all(x) else x for x in inputs]
+    strides = [0 if len(x) == 1 else x.shape[1] for x in (base, *inputs)]
+
+    def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
+        memory, task = scratch(program), np.zeros(len(Task), dtype=np.int64)
+        task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
+        task[Task.SCRATCH], task[Task.OUT] = memory.ctypes.data, part.ctypes.data
+        task[Task.REFERENCE], task[Task.N] = reference, len(part)
+        for place, of_place, x, stride in zip(_PLACES, _STRIDES, parts, strides, strict=False):
+            task[place], task[of_place] = x.ctypes.data, stride
+        if not moving:
+            task[Task.BASE] = 0
+        return core(task.ctypes.data)
+
+    if in_blocks(compute, [base, *inputs], out, threads) or plan.is_large or _is_large(base):
+        _demand_finite([base, *inputs], out)
+
+
+def _is_the_same_for_all(x: FloatArray) -> bool:
+    """Whether rows are one row that was broadcast."""
+    return len(x) > 1 and x.strides[0] == 0
+
+
+def _is_large(base: FloatArray) -> bool:
+    return base is not STILL_STATE and not float(np.abs(base).max(initial=0.0)) < LARGE
+
+
+def _demand_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
+    """Results that are finite, from inputs that are; where all is ordinary nothing needs to be looked at."""
+    if not all(np.isfinite(x).all() for x in inputs):
+        raise NotFiniteError("q, v and a must be finite")
+    finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))
+    if not finite.all():
+        raise RangeError(
+            "a result leaves the range of double precision",
+            where=f"sample {int(finite.argmin())} of {len(out)}" if len(out) > 1 else None,
+            remedy="give smaller numbers",
+        )

@@ -1,0 +1,58 @@
+"""Compiled kernels on disk, sealed: a damaged one is compiled again, and where none can be kept, none is.
+
+Numba's own files have no digest: half a file ends every later run, and a flipped bit is run as it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+from urdfkin.system.sealed import damaged, keep, kept
+
+_Null: Any = NullCache  # numba has no types
+_Result: Any = CompileResult
+_dumps: Any = dumps
+
+
+class KeptKernel(_Null):  # type: ignore[misc]
+    """Where Numba looks for one function before it compiles it, and leaves it afterwards.
+
+    The folder stands for the sources; a file's name for the function, its arguments and the processor.
+    """
+
+    def __init__(self, function: Callable[..., int], folder: Path) -> None:
+        self._folder, self._name = folder, function_name(function)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What was kept for these arguments; None where there is nothing of use."""
+        target_context.refresh()
+        place = self._place(sig, target_context.codegen())
+        if (content := kept(place)) is None:
+            return None
+        try:
+            return _Result._rebuild(target_context, *pickle.loads(content))
+        except Exception as error:  # whole, but of another time: it may fail in any way
+            damaged(place, f"{type(error).__name__}: {error}")
+            return None
+
+    def save_overload(self, sig: Any, cres: Any) -> None:
+        """Keep what was compiled."""
+        if not cres.library.has_dynamic_globals:  # addresses of this process
+            keep(self._place(sig, cres.library.codegen), _dumps(cres._reduce()))
+
+    def _place(self, signature: Any, codegen: Any) -> Path:
+        key = repr((signature, codegen.magic_tuple()))
+        return self._folder / f"{self._name}.{hashlib.sha256(key.encode()).hexdigest()[:16]}.kernel"
+
+
+def function_name(function: Callable[..., int]) -> str:
+    """The module's name without its packages, and the function's."""
+    return f"{function.__module__.rpartition('.')[2]}.{function.__name__}"

@@ -1,0 +1,215 @@
+"""From memory to rows of scratch and back: eight configurations at a time, eight numbers at a time.
+
+In memory the numbers of one configuration lie together; in scratch those of one row do, one for each
+configuration. Going from one to the other is a transposition. Number by number it took a third of the time
+of a Jacobian; in blocks of eight by eight it is a few shuffles. What is left of a width that eight does not
+divide goes in blocks of four, two and one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from urdfkin.compiled.compiling import compiled, helper
+from urdfkin.compiled.plan import LARGE
+from urdfkin.compiled.registers import LANES, put, same
+
+#: Numbers in half of a first-level cache.
+_MOST_FETCHED = 3072
+_NUMBERS = types.CPointer(types.float64)
+
+
+def _piece(builder: Any, vector: Any, start: int, width: int) -> Any:
+    """`width` elements of a vector."""
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(start, start + width)))
+    return builder.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), mask)
+
+
+def _joined(builder: Any, pieces: Sequence[Any]) -> Any:
+    """Vectors of equal width, a power of two of them, one behind the other."""
+    while len(pieces) > 1:
+        width = 2 * pieces[0].type.count
+        mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(width)))
+        pieces = [builder.shuffle_vector(a, b, mask) for a, b in zip(pieces[::2], pieces[1::2], strict=True)]
+    return pieces[0]
+
+
+def _transposed(builder: Any, vectors: Sequence[Any]) -> list[Any]:
+    """Square blocks, side by side in the vectors, each turned over: its own inverse.
+
+    For w = 1, 2, 4: in each block of 2w by 2w, the upper right and the lower left w by w change rows.
+    """
+    x, w = list(vectors), 1
+    while w < len(x):
+        for i in range(len(x)):
+            if not i & w:
+                first = [LANES + j - w if j & w else j for j in range(LANES)]
+                second = [LANES + j if j & w else j + w for j in range(LANES)]
+                masks = (ir.Constant(ir.VectorType(ir.IntType(32), LANES), m) for m in (first, second))
+                x[i], x[i + w] = (builder.shuffle_vector(x[i], x[i + w], mask) for mask in masks)
+        w *= 2
+    return x
+
+
+def _vector_at(builder: Any, numbers: Any, at: Any, width: int) -> Any:
+    """The address of `width` numbers that begin at `numbers[at]`."""
+    return builder.bitcast(builder.gep(numbers, [at]), ir.VectorType(ir.DoubleType(), width).as_pointer())
+
+
+def _plus(builder: Any, number: Any, constant: int) -> Any:
+    return builder.add(number, ir.Constant(number.type, constant))
+
+
+def _reading(width: int) -> Any:
+    """A block of eight configurations, `width` numbers of each, into rows."""
+
+    @intrinsic
+    def read(context: Any, x: Any, at: Any, stride: Any, s: Any, row: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            x, at, stride, s, row = arguments
+            pieces = []
+            for _ in range(LANES):
+                pieces.append(builder.load(_vector_at(builder, x, at, width), align=8))
+                at = builder.add(at, stride)
+            rows = _transposed(builder, [_joined(builder, pieces[i::width]) for i in range(width)])
+            to = builder.mul(row, ir.Constant(row.type, LANES))
+            for i, vector in enumerate(rows):
+                place = _vector_at(builder, s, _plus(builder, to, LANES * i), LANES)
+                builder.store(vector, place, align=64)
+            return context.get_dummy_value()
+
+        return types.void(_NUMBERS, *[types.intp] * 2, _NUMBERS, types.intp), generate
+
+    return read
+
+
+def _writing(width: int) -> Any:
+    """`width` rows, wherever they are, into the memory of eight configurations."""
+
+    @intrinsic
+    def write(context: Any, s: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            s, rows, first, to, at, stride = arguments
+            vectors = []
+            for i in range(width):
+                row = builder.load(builder.gep(rows, [_plus(builder, first, i)]))
+                begin = builder.mul(row, ir.Constant(row.type, LANES))
+                vectors.append(builder.load(_vector_at(builder, s, begin, LANES), align=64))
+            blocks = _transposed(builder, vectors)
+            for k in range(LANES):
+                numbers = _piece(builder, blocks[k % width], k // width * width, width)
+                builder.store(numbers, _vector_at(builder, to, at, width), align=8)
+                at = builder.add(at, stride)
+            return context.get_dummy_value()
+
+        whole = types.CPointer(types.int64)
+        return types.void(_NUMBERS, whole, types.intp, _NUMBERS, *[types.intp] * 2), generate
+
+    return write
+
+
+_read_8, _read_4, _read_2, _read_1 = map(_reading, (8, 4, 2, 1))
+_write_8, _write_4, _write_2, _write_1 = map(_writing, (8, 4, 2, 1))
+
+
+@compiled
+def read_rows(m, x, at, stride, count, s, row):
+    """`count` numbers, from `x[at]` on, of each of eight configurations `stride` apart, into rows.
+
+    Where `m` is 1, those of one configuration, which then stands in all lanes.
+    """
+    i = 0
+    if m == 1:
+        for i in range(count):
+            put(s, row + i, same(x[at + i]))
+    else:
+        while i + 8 <= count:
+            _read_8(x, at + i, stride, s, row + i)
+            i += 8
+        if count & 4:
+            _read_4(x, at + i, stride, s, row + i)
+            i += 4
+        if count & 2:
+            _read_2(x, at + i, stride, s, row + i)
+            i += 2
+        if count & 1:
+            _read_1(x, at + i, stride, s, row + i)
+
+
+@compiled
+def write_rows(m, s, rows, first, count, to, at, stride):
+    """Rows `rows[first]`, ... as `count` numbers, from `to[at]` on, of eight configurations, or of one."""
+    i = 0
+    if m == 1:
+        for i in range(count):
+            to[at + i] = s[rows[first + i] * LANES]
+    else:
+        while i + 8 <= count:
+            _write_8(s, rows, first + i, to, at + i, stride)
+            i += 8
+        if count & 4:
+            _write_4(s, rows, first + i, to, at + i, stride)
+            i += 4
+        if count & 2:
+            _write_2(s, rows, first + i, to, at + i, stride)
+            i += 2
+        if count & 1:
+            _write_1(s, rows, first + i, to, at + i, stride)
+
+
+@helper(fastmath={"reassoc"})
+def ordinary(x, at, count):
+    """Whether `count` numbers are: none that is no number or infinite, and their sizes no more than `LARGE`.
+
+    The order of this sum is left to the compiler.
+    """
+    total = 0.0
+    for i in range(count):
+        total += abs(x[at + i])
+    return total < LARGE
+
+
+def _fetching(to_write: int) -> Any:
+    """Have the memory around `x[at]` brought near; an address beyond the end does no harm."""
+
+    @intrinsic
+    def fetch(context: Any, x: Any, at: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), ir.IntType(8).as_pointer())
+            number = ir.IntType(32)
+            kind = ir.FunctionType(ir.VoidType(), [address.type, number, number, number])
+            near, data = number(3), number(1)
+            function = builder.module.declare_intrinsic("llvm.prefetch", [address.type], kind)
+            builder.call(function, [address, number(to_write), near, data])
+            return context.get_dummy_value()
+
+        return types.void(_NUMBERS, types.intp), generate
+
+    return fetch
+
+
+_fetch_to_read, _fetch_to_write = map(_fetching, (0, 1))
+
+
+@compiled
+def fetch(x, at, count):
+    """Ask for the `count` numbers from `x[at]` on: the next block's inputs, while this one is computed."""
+    if count <= _MOST_FETCHED:
+        for number in range(at, at + count, LANES):
+            _fetch_to_read(x, number)
+
+
+@compiled
+def fetch_to_write(x, at, count):
+    """Ask for what a block will write.
+
+    A block's output is scattered over more cache lines than the processor fetches at a time. Asked for while
+    the walk goes on, they are there when it writes.
+    """
+    for number in range(at, at + count, LANES):
+        _fetch_to_write(x, number)

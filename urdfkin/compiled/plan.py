@@ -1,0 +1,291 @@
+"""What the recursion does for a tree, as plain arrays: one step a moving joint, one row a frame.
+
+Every joint frame is turned so that its axis is z (`A` below), as in the text: then each revolute joint is
+Rz and each prismatic one Tz. Fixed joints are folded into the offsets. A plan for one frame holds the
+frame's ancestors alone; a plan for several frames holds every joint one of them needs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urdfkin.kinematics.rotation.aligning import axis_aligning
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
+
+IntArray = NDArray[np.int64]
+
+
+#: Where coordinates, rates, lengths and multipliers are smaller than this, no result overflows: with N joints
+#: a rate is less than LARGE^2, the path N LARGE^2, and so w^2 d, the largest product, N^3 LARGE^6.
+LARGE = 1e45
+
+
+class Step(IntEnum):
+    """Columns of `Plan.steps` (whole numbers)."""
+
+    KIND = 0
+    Q = 1
+    V = 2
+
+
+class Motion(IntEnum):
+    """What a step does; the value in column `Step.KIND`."""
+
+    TURN = 0
+    SLIDE = 1
+    PLANAR = 2
+    FLOATING = 3
+
+
+class Geometry(IntEnum):
+    """Columns of `Plan.geometry`: R (9), the offset in the axes before (3), then the mimic rule."""
+
+    R = 0
+    OFFSET = 9
+    MULTIPLIER = 12
+    CONSTANT = 13
+
+
+class Column(IntEnum):
+    """Columns of `Plan.columns`: a column of eq. 7.85 each row."""
+
+    STEP = 0
+    AXIS = 1
+    TURNS = 2
+    V = 3
+
+
+_MOTION = {
+    JointKind.REVOLUTE: Motion.TURN,
+    JointKind.CONTINUOUS: Motion.TURN,
+    JointKind.PRISMATIC: Motion.SLIDE,
+    JointKind.PLANAR: Motion.PLANAR,
+    JointKind.FLOATING: Motion.FLOATING,
+}
+
+#: Which axis of the moved frame each rate of a joint acts along, and whether it turns about it.
+_RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
+    Motion.TURN: ((2, True),),
+    Motion.SLIDE: ((2, False),),
+    Motion.PLANAR: ((0, False), (1, False), (2, True)),
+    Motion.FLOATING: ((0, False), (1, False), (2, False), (0, True), (1, True), (2, True)),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The steps of a walk from the base outwards, and the frames met on the way.
+
+    Attributes:
+        nq: Length of `q`.
+        nv: Length of `v` and `a`.
+        joints: The moving joint of each step, as an index into the tree's joints.
+        steps: (steps, 3) whole numbers, columns `Step`.
+        geometry: (steps, 14), columns `Geometry`.
+        frames: (frames, 2): the step after which a frame is met (-1: the base), and its place in the
+            output; ordered by step.
+        offsets: (frames, 12): rotation (9) and offset (3) from the step's frame to the frame, the offset
+            in the axes of the step.
+        columns: (columns, 4), columns `Column`: every rate of every step.
+        multipliers: (columns,) the mimic multiplier of each column.
+        leaders: (frames, columns): -1 where the column is not the frame's ancestor, else the column that
+            it is added to: itself, but for followers.
+        places_q: Which coordinates the walk needs.
+        parents: (steps,) the step that each step goes on from, -1 for the base.
+        lengths: (steps + frames,) metres: the sum of the lengths of all URDF offsets, fixed joints' too,
+            from a step's parent to it, then from a frame's step to the frame (in the order of `frames`).
+        depth: (frames,) in output order, how many URDF joints lie between a frame and the root.
+        tilts: (frames,) likewise, rad: their `Joint.tilt` added up.
+    """
+
+    nq: int
+    nv: int
+    joints: tuple[int, ...]
+    steps: IntArray
+    geometry: FloatArray
+    frames: IntArray
+    offsets: FloatArray
+    columns: IntArray
+    multipliers: FloatArray
+    leaders: IntArray
+    places_q: tuple[int, ...]
+    parents: IntArray
+    lengths: FloatArray
+    depth: IntArray
+    tilts: FloatArray
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value = np.ascontiguousarray(value)
+                object.__setattr__(self, field.name, value)
+                value.setflags(write=False)
+
+    @cached_property
+    def programs(self) -> dict[object, Any]:
+        """What was made of the plan; `program.program_of` keeps it here."""
+        return {}
+
+    @cached_property
+    def is_large(self) -> bool:
+        """Whether results may overflow although coordinates and rates are ordinary."""
+        numbers = self.geometry, self.offsets, self.lengths
+        return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
+
+    def __reduce__(self) -> tuple[type[Plan], tuple[Any, ...]]:
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
+    """The walk that meets the frames of the given links.
+
+    Args:
+        tree: The robot.
+        links: Indices into `tree.links`, in the order in which results are wanted.
+    """
+    depths = _depths(tree, links)
+    tilts = {0: 0.0}
+    for link in depths:
+        if link:
+            tilts[link] = tilts[tree.joints[link - 1].parent] + tree.joints[link - 1].tilt
+    needed = [link - 1 for link in depths if link and tree.joints[link - 1].kind.nv]
+    step_of_joint = {joint: step for step, joint in enumerate(needed)}
+    anchors = _anchors(tree, step_of_joint, [link - 1 for link in depths if link])
+    steps, geometry = _steps(tree, needed, anchors)
+    parents = [anchors[tree.joints[i].parent].step for i in needed]
+    columns, multipliers = _columns(steps, geometry)
+    leaders = _leaders(columns, parents, [anchors[link].step for link in links])
+    places = zip(steps[:, Step.Q].tolist(), needed, strict=True)
+    order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)
+    ends = [anchors[links[place]] for place in order]
+    return Plan(
+        nq=tree.nq,
+        nv=tree.nv,
+        joints=tuple(needed),
+        steps=steps,
+        geometry=geometry,
+        frames=np.array(
+            [[end.step, place] for end, place in zip(ends, order, strict=True)], dtype=np.int64
+        ).reshape(-1, 2),
+        offsets=np.array([(*end.T[:3, :3].ravel(), *end.T[:3, 3]) for end in ends]).reshape(-1, 12),
+        columns=columns,
+        multipliers=multipliers,
+        leaders=leaders[order],
+        places_q=tuple(at + c for at, i in places for c in range(tree.joints[i].kind.nq)),
+        parents=np.array(parents, dtype=np.int64),
+        lengths=np.array(
+            [anchors[tree.joints[i].parent].length + _length(tree.joints[i]) for i in needed]
+            + [end.length for end in ends]
+        ),
+        depth=np.array([depths[link] for link in links], dtype=np.int64),
+        tilts=np.array([tilts[link] for link in links]),
+    )
+
+
+def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
+    """Every link on the way to the given ones, root outwards, and how many joints lie before it.
+
+    Each joint is met once: the paths themselves, one for each link, would be as long as the tree's depth.
+    """
+    met = {0}
+    for end in links:
+        link = end
+        while link not in met:
+            met.add(link)
+            link = tree.joints[link - 1].parent
+    depths = {0: 0}
+    for link in sorted(met - {0}):
+        depths[link] = depths[tree.joints[link - 1].parent] + 1
+    return depths
+
+
+class _Anchor(NamedTuple):
+    """Where a link hangs: its step (-1: the base), its pose in that step's turned frame, and how far off."""
+
+    step: int
+    T: FloatArray
+    length: float
+
+
+def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterable[int]) -> dict[int, _Anchor]:
+    anchors = {0: _Anchor(-1, np.eye(4), 0.0)}
+    for i in wanted:
+        joint = tree.joints[i]
+        if i in step_of_joint:
+            anchors[i + 1] = _Anchor(step_of_joint[i], turned(joint).T, 0.0)
+        else:
+            parent = anchors[joint.parent]
+            anchors[i + 1] = _Anchor(
+                parent.step, parent.T @ joint.T_parent_joint, parent.length + _length(joint)
+            )
+    return anchors
+
+
+def _length(joint: Joint) -> float:
+    # hypot neither under- nor overflows where squares would: a URDF may hold 1e-200 or 1e200.
+    return math.hypot(*joint.T_parent_joint[:3, 3].tolist())
+
+
+def turned(joint: Joint) -> FloatArray:
+    """(4, 4) `A`: the pose, in the joint's URDF frame, of the frame whose z is the joint's axis."""
+    A = np.eye(4)
+    if joint.kind.has_axis:
+        A[:3, :3] = axis_aligning(joint.axis)
+    return A
+
+
+def _flat(T: FloatArray) -> FloatArray:
+    """R row by row, then the offset in the axes before."""
+    return np.concatenate((T[:3, :3].ravel(), T[:3, 3]))
+
+
+def _steps(
+    tree: KinematicTree, needed: Sequence[int], anchors: dict[int, _Anchor]
+) -> tuple[IntArray, FloatArray]:
+    steps = np.full((len(needed), len(Step)), -1, dtype=np.int64)
+    geometry = np.zeros((len(needed), Geometry.CONSTANT + 1))
+    for row, i in enumerate(needed):
+        joint = tree.joints[i]
+        T_step_joint = anchors[joint.parent].T @ joint.T_parent_joint @ turned(joint)
+        steps[row, Step.KIND] = _MOTION[joint.kind]
+        steps[row, Step.Q] = tree.q_index[i]
+        steps[row, Step.V] = tree.v_index[i]
+        geometry[row, : Geometry.MULTIPLIER] = _flat(T_step_joint)
+        rule = joint.mimic
+        geometry[row, Geometry.MULTIPLIER :] = (1.0, 0.0) if rule is None else (rule.multiplier, rule.offset)
+    return steps, geometry
+
+
+def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArray]:
+    rows = [
+        (row, axis, int(turns), step[Step.V] + place)
+        for row, step in enumerate(steps)
+        for place, (axis, turns) in enumerate(_RATES[Motion(step[Step.KIND])])
+    ]
+    columns = np.array(rows, dtype=np.int64).reshape(-1, len(Column))
+    return columns, geometry[columns[:, Column.STEP], Geometry.MULTIPLIER].copy()
+
+
+def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
+    """For each frame, known by its last step: the columns of the steps it hangs from, and their leaders."""
+    leaders = np.full((len(ends), len(columns)), -1, dtype=np.int64)
+    rows = columns.tolist()
+    for frame, end in enumerate(ends):
+        ancestors, step = set[int](), end
+        while step >= 0:
+            ancestors.add(step)
+            step = parents[step]
+        first: dict[int, int] = {}
+        for c, column in enumerate(rows):
+            if column[Column.STEP] in ancestors:
+                leaders[frame, c] = first.setdefault(column[Column.V], c)
+    return leaders

@@ -1,0 +1,303 @@
+"""Does a URDF agree with a published table? Cell by cell, and in millimetres at the tip."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from urdfkin.dh.compare.align import Alignment, align
+from urdfkin.dh.compare.fit import CELLS, Model, columns, fit_cells, hidden_cells
+from urdfkin.dh.compare.freedoms import fit_freedoms
+from urdfkin.dh.compare.result import CellDifference, Comparison, TakenUp
+from urdfkin.dh.convert import to_standard
+from urdfkin.dh.row import Convention
+from urdfkin.dh.snapping import rotation_angle
+from urdfkin.dh.table import DHTable
+from urdfkin.errors import InputError
+from urdfkin.kinematics.roundings import EPS, of_a_fit
+from urdfkin.model.chain import FrameChain
+from urdfkin.model.tree import FloatArray, JointKind
+
+#: Metres at the tip up to which a table agrees: half as much again as rounding to 0.1 mm in a cell or two.
+TOLERANCE = 2e-4
+FIT_SAMPLES, CHECK_SAMPLES = 40, 200
+#: Of each row, half a unit of the last digit with which its cells were written, metres and radians.
+Digits = Sequence[Mapping[str, float]]
+
+
+def compare(
+    chain: FrameChain,
+    reference: DHTable,
+    tolerance: float = TOLERANCE,
+    *,
+    fit: bool = True,
+    digits: Digits = (),
+) -> Comparison:
+    """Hold a reference table against a path of a URDF.
+
+    Args:
+        chain: The path, base to tip; the table's ends may be other frames fixed to the same links.
+        reference: The table, either convention, one row for each moving joint, in the path's order.
+        tolerance: Metres at the tip.
+        fit: Whether base, tool, the zeros of the joints and the ways they count are fitted; False holds the
+            table to what it says.
+        digits: How exactly each cell is written (`urdfkin.dh.digits`).
+
+    Raises:
+        InputError: the table has another number or other kinds of joints than the path.
+    """
+    _check_joints(chain, reference)
+    standard = to_standard(reference) if reference.convention is Convention.MODIFIED else reference
+    tried, wanted = _samples(chain, FIT_SAMPLES, 1)
+    scale = _reach(chain, wanted)
+    written = _written(standard)
+    fitted = _best_fit(chain, standard, written, tried, wanted, scale) if fit else written
+    complete = fit_cells(fitted, tried, wanted, scale, _cells_of(reference), free=fit)
+    values, there = _samples(chain, CHECK_SAMPLES, 2)
+    off, residual = _off(fitted, written, values, there), _apart(complete, values, there)[0]
+    cells = _differences(chain, reference, fitted, complete, values, scale, digits, fit)
+    found = Comparison(
+        reference=_fitted_table(chain, standard, fitted),
+        reach=scale,
+        fitted=fit,
+        senses=tuple(int(s) * row.sense for s, row in zip(fitted.senses, standard.rows, strict=True)),
+        offsets=_offsets(standard, fitted),
+        base=_taken_up(written.base, fitted.base),
+        tool=_taken_up(written.tool, fitted.tool),
+        # Cells that leave half of it explain nothing, and are not blamed.
+        differences=cells if residual <= max(0.5 * off["metres"], 1e-9 * scale) else (),
+        instead=(),
+        hidden=_hidden(reference, fitted, values, scale) if fit else (),
+        residual=residual,
+        tolerance=tolerance,
+        samples=CHECK_SAMPLES,
+        **off,
+    )
+    if fit and not found.as_written:
+        found = replace(found, instead=_instead(chain, reference, written, found, digits))
+    return found
+
+
+def _off(fitted: Model, written: Model, values: FloatArray, there: FloatArray) -> dict[str, float]:
+    """How far the tip is off, as fitted and as written."""
+    names = ("metres", "radians", "written_metres", "written_radians")
+    return dict(zip(names, (*_apart(fitted, values, there), *_apart(written, values, there)), strict=True))
+
+
+def _reach(chain: FrameChain, wanted: FloatArray) -> float:
+    """Metres that a radian counts as much as: what the robot reaches.
+
+    A URDF that was written from a strict table may have offsets of kilometres that cancel: no way along its
+    links says how large it is, but where its tip comes does.
+    """
+    tips = wanted[:, :3, 3]
+    across = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
+    return max(min(chain.reach, across) if across > 1e-6 * chain.reach else chain.reach, 1e-9)
+
+
+def _check_joints(chain: FrameChain, reference: DHTable) -> None:
+    theirs = [row.kind.turns for row in reference.rows]
+    ours = [joint.kind.turns for joint in chain.joints]
+    if theirs != ours or not ours:
+        words = ["".join("R" if turns else "P" for turns in kinds) or "none" for kinds in (theirs, ours)]
+        raise InputError(
+            "the table's joints are not the path's",
+            where=f"{chain.robot}, {chain.base} to {chain.tip}",
+            found=f"{words[0]} in the table, {words[1]} in the URDF",
+            remedy="choose base and tip so that exactly the table's joints lie between them",
+        )
+
+
+def _written(standard: DHTable) -> Model:
+    """The table as it is written, its variables the URDF's coordinates."""
+    return Model(
+        np.array([(row.theta, row.d, row.a, row.alpha, row.beta) for row in standard.rows]),
+        np.array([float(row.kind.turns) for row in standard.rows]),
+        np.array([float(row.sense) for row in standard.rows]),
+        standard.base,
+        standard.tool,
+    )
+
+
+def _best_fit(
+    chain: FrameChain,
+    standard: DHTable,
+    written: Model,
+    values: FloatArray,
+    wanted: FloatArray,
+    scale: float,
+) -> Model:
+    """Of the table as written and the likely sign patterns, the one whose freedoms fit best.
+
+    What is written has the first word: another pattern must be twice as good.
+    """
+
+    def size(model: Model) -> float:
+        metres, radians = _apart(model, values, wanted)
+        return metres + scale * radians
+
+    if size(written) <= EPS * of_a_fit(0) * scale:
+        return written
+    best, best_size = written, size(written)
+    for start in _starts(chain, standard, written):
+        # Least squares make the sum small. The worst sample is what counts: there the start may be better.
+        model = min(fit_freedoms(start, values, wanted, scale), start, key=size)
+        needed = 1.0 if start is written else 0.5
+        if (its_size := size(model)) < needed * best_size:
+            best, best_size = model, its_size
+        if best_size <= 1e-12 * scale:
+            break
+    return best
+
+
+def _starts(chain: FrameChain, standard: DHTable, written: Model) -> Iterator[Model]:
+    """Where fits begin: what is written, then each likely pattern of signs."""
+    yield written
+    for aligned in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4))):
+        yield _start(standard, aligned)
+
+
+def _start(standard: DHTable, aligned: Alignment) -> Model:
+    """The reference with the freedoms that an alignment found."""
+    start = replace(
+        _written(standard),
+        senses=np.array(aligned.senses, dtype=np.float64),
+        base=aligned.base,
+        tool=aligned.tool,
+    )
+    for i, offset in enumerate(aligned.offsets):
+        start.cells[i, _own(start, i)] += offset
+    return start
+
+
+def _own(model: Model, i: int) -> int:
+    """Which cell of row i the joint's variable is added to."""
+    return 0 if model.turns[i] else 1
+
+
+def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
+    """Values of all joints (count, n), each joint free, and the tip's poses there."""
+    bounds = [(-math.pi, math.pi) if joint.kind.turns else _slide(joint.limit) for joint in chain.joints]
+    lower, upper = np.array(bounds).T
+    values = np.random.default_rng(seed).uniform(lower, upper, (count, len(bounds)))
+    free = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints))
+    return values, free.placement(values)
+
+
+def _slide(limit: object) -> tuple[float, float]:
+    lower, upper = getattr(limit, "lower", -0.5), getattr(limit, "upper", 0.5)
+    return (lower, upper) if math.isfinite(lower) and math.isfinite(upper) and lower < upper else (-0.5, 0.5)
+
+
+def _apart(model: Model, values: FloatArray, wanted: FloatArray) -> tuple[float, float]:
+    poses, _, _ = model.walk(values)
+    metres = np.linalg.norm(poses[:, :3, 3] - wanted[:, :3, 3], axis=-1).max()
+    return float(metres), float(rotation_angle(poses[:, :3, :3], wanted[:, :3, :3]).max())
+
+
+def _offsets(standard: DHTable, fitted: Model) -> tuple[float, ...]:
+    """What was added to each joint's variable."""
+    offsets = []
+    for i, row in enumerate(standard.rows):
+        k = _own(fitted, i)
+        offset = float(fitted.cells[i, k]) - (row.d if k else row.theta)
+        offsets.append(row.sense * (offset if k else math.remainder(offset, 2.0 * math.pi)))
+    return tuple(offsets)
+
+
+def _taken_up(written: FloatArray, fitted: FloatArray) -> TakenUp:
+    shift = float(np.linalg.norm(fitted[:3, 3] - written[:3, 3]))
+    return TakenUp(shift, float(rotation_angle(written[:3, :3], fitted[:3, :3])))
+
+
+def _cell_at(reference: DHTable, i: int, cell: str) -> int:
+    """The row of the reference in which a cell of standard row i stands; the row count where it has none.
+
+    In a modified table a, alpha and beta of a step stand in the next row.
+    """
+    return i + (reference.convention is Convention.MODIFIED and cell not in ("theta", "d"))
+
+
+def _cells_of(reference: DHTable) -> FloatArray:
+    """(n, 5) which cells of the standard rows are cells of the reference: 1 or 0."""
+    n = len(reference.rows)
+    return np.array([[float(_cell_at(reference, i, cell) < n) for cell in CELLS] for i in range(n)])
+
+
+def _hidden(
+    reference: DHTable, fitted: Model, values: FloatArray, scale: float
+) -> tuple[tuple[int, str], ...]:
+    """Cells that base, tool and offsets stand in for; a beta of zero is none."""
+    found = [
+        (_cell_at(reference, i, CELLS[k]), CELLS[k])
+        for i, k in hidden_cells(fitted, values, scale)
+        if k != _own(fitted, i) and (CELLS[k] != "beta" or fitted.cells[i, k])
+    ]
+    return tuple(sorted(one for one in found if one[0] < len(reference.rows)))
+
+
+def _differences(
+    chain: FrameChain,
+    reference: DHTable,
+    fitted: Model,
+    complete: Model,
+    values: FloatArray,
+    scale: float,
+    digits: Digits,
+    free: bool,
+) -> tuple[CellDifference, ...]:
+    """The cells that moved by more than rounding, each with its own effect on the tip, the largest first."""
+    _, _, twists = columns(fitted, values, scale)
+    linear = np.linalg.norm(twists.reshape(len(values), 6, -1)[:, :3], axis=1).max(axis=0)
+    found = []
+    for i, row in enumerate(fitted.cells):
+        for k, cell in enumerate(CELLS):
+            change = float(complete.cells[i, k] - row[k])
+            size = abs(change) * (1.0 if cell in "da" else scale)
+            at = _cell_at(reference, i, cell)
+            if (free and k == _own(fitted, i)) or size <= 1e-10 * scale or at >= len(reference.rows):
+                continue
+            value = getattr(reference.rows[at], cell)
+            effect = float(linear[5 * i + k] * size)
+            last = digits[at].get(cell, 0.0) if at < len(digits) else 0.0
+            name = chain.joints[at].name
+            found.append(CellDifference(at, name, cell, value, value + change, effect, last))
+    return tuple(sorted(found, key=lambda one: (-one.tip, one.row, one.cell)))
+
+
+def _instead(
+    chain: FrameChain, reference: DHTable, written: Model, found: Comparison, digits: Digits
+) -> tuple[CellDifference, ...]:
+    """The cells that would have to change if nothing were fitted, where that is an explanation."""
+    tried, wanted = _samples(chain, FIT_SAMPLES, 1)
+    values, there = _samples(chain, CHECK_SAMPLES, 2)
+    complete = fit_cells(written, tried, wanted, found.reach, _cells_of(reference), free=False)
+    metres, radians = _apart(complete, values, there)
+    if metres > 1e-9 * found.reach or radians > 1e-9:
+        return ()
+    cells = _differences(chain, reference, written, complete, values, found.reach, digits, False)
+    return cells if len(cells) <= len(found.differences) + 2 else ()
+
+
+def _fitted_table(chain: FrameChain, standard: DHTable, fitted: Model) -> DHTable:
+    """The reference as a table of the URDF's joints."""
+    rows = []
+    for i, (row, joint) in enumerate(zip(standard.rows, chain.joints, strict=True)):
+        rows.append(
+            replace(
+                row,
+                theta=float(fitted.cells[i, 0]),
+                d=float(fitted.cells[i, 1]),
+                sense=int(fitted.senses[i]),
+                joint=joint.name,
+                kind=joint.kind if joint.kind is not JointKind.FIXED else row.kind,
+                mimic=joint.mimic,
+                limit=joint.limit,
+            )
+        )
+    return DHTable(
+        Convention.STANDARD, tuple(rows), fitted.base, fitted.tool, chain.robot, chain.base, chain.tip
+    )

@@ -1,0 +1,1 @@
+"""What a robot is: links, joints, coordinates, frames, a base that may move."""

@@ -1,0 +1,419 @@
+"""A robot as a tree of links and joints: what a URDF says about motion, and nothing else.
+
+`KinematicTree` knows neither XML nor Pinocchio. Links and joints stand in Pinocchio's order (depth first,
+sibling joints by name), so that coordinates and rates can be exchanged with it without a permutation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from enum import Enum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.errors.demands import shown
+from urdfkin.kinematics.inputs import FloatArray, floats
+from urdfkin.model.frame_names import FrameName, JointFrame, LinkFrame
+
+__all__ = [
+    "FloatArray",
+    "Joint",
+    "JointKind",
+    "KinematicTree",
+    "Limit",
+    "Mimic",
+    "build_tree",
+    "freed",
+    "frozen",
+    "with_root_joint",
+]
+
+
+def frozen(array: ArrayLike) -> FloatArray:
+    """A read-only, C-contiguous float64 copy of `array`; raises InputError where it is no numbers."""
+    copy = np.array(floats(array, "an array"), dtype=np.float64, order="C")
+    copy.setflags(write=False)
+    return copy
+
+
+class JointKind(Enum):
+    """The joint types of the URDF specification; the value is the word the file uses."""
+
+    REVOLUTE = "revolute"
+    CONTINUOUS = "continuous"
+    PRISMATIC = "prismatic"
+    FIXED = "fixed"
+    PLANAR = "planar"
+    FLOATING = "floating"
+
+    @property
+    def nq(self) -> int:
+        """How many coordinates a joint of this kind takes in `q`."""
+        return _SIZES[self][0]
+
+    @property
+    def nv(self) -> int:
+        """How many rates it takes in `v` and `a`."""
+        return _SIZES[self][1]
+
+    @property
+    def has_axis(self) -> bool:
+        """Whether the axis of the joint means anything to its motion."""
+        return self in (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the joint is a rotation about its axis."""
+        return self in (JointKind.REVOLUTE, JointKind.CONTINUOUS)
+
+
+_SIZES = {
+    JointKind.REVOLUTE: (1, 1),
+    JointKind.CONTINUOUS: (1, 1),
+    JointKind.PRISMATIC: (1, 1),
+    JointKind.FIXED: (0, 0),
+    JointKind.PLANAR: (3, 3),
+    JointKind.FLOATING: (7, 6),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """Bounds of a joint: `lower`, `upper` in rad or m, `velocity` in rad/s or m/s, `effort` in N m or N."""
+
+    lower: float
+    upper: float
+    velocity: float
+    effort: float
+
+
+@dataclass(frozen=True, slots=True)
+class Mimic:
+    """A joint that follows another: its coordinate is `multiplier * q_leader + offset`.
+
+    `leader` is the name of a joint that follows nobody: chains are resolved before a tree is built.
+    """
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joint:
+    """One joint and the place where it sits.
+
+    Attributes:
+        name: As in the URDF.
+        kind: How it moves.
+        parent: Index of the parent link in `KinematicTree.links`.
+        T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, in metres. The
+            child link's frame is the joint frame after the motion.
+        axis: (3,) unit axis in the joint frame; (1, 0, 0) where the kind has none.
+        limit: Its bounds, None where there are none.
+        mimic: Whom it follows, None if it has a coordinate of its own.
+        tilt: By how much (rad) the axis that Pinocchio turns about is off this one (URDF514); mostly 0.
+            Nothing is computed from it: results may differ from Pinocchio's by so much more.
+    """
+
+    name: str
+    kind: JointKind
+    parent: int
+    T_parent_joint: FloatArray
+    axis: FloatArray
+    limit: Limit | None = None
+    mimic: Mimic | None = None
+    tilt: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_parent_joint", frozen(self.T_parent_joint))
+        object.__setattr__(self, "axis", frozen(self.axis))
+        if self.T_parent_joint.shape != (4, 4) or self.axis.shape != (3,):
+            raise InputError(
+                "a joint needs a (4, 4) pose and a (3,) axis",
+                where=f"joint {self.name}",
+                found=f"{self.T_parent_joint.shape} and {self.axis.shape}",
+            )
+
+    def __reduce__(self) -> tuple[type[Joint], tuple[Any, ...]]:
+        # Rebuilding runs __post_init__, so that arrays are read-only after unpickling as well.
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+    @property
+    def nq(self) -> int:
+        """Coordinates of its own: none for a fixed joint or a follower."""
+        return 0 if self.mimic else self.kind.nq
+
+    @property
+    def nv(self) -> int:
+        """Rates of its own: none for a fixed joint or a follower."""
+        return 0 if self.mimic else self.kind.nv
+
+
+@dataclass(frozen=True)
+class KinematicTree:
+    """Links and joints of one robot, in Pinocchio's order.
+
+    Attributes:
+        name: The robot's name.
+        links: Link names; `links[0]` is the root and `links[i + 1]` the child of `joints[i]`.
+        joints: Every joint, fixed ones too; a joint's parent link always stands before its child link.
+
+    Raises:
+        InputError: when the order, a name or a mimic leader breaks these rules.
+    """
+
+    name: str
+    links: tuple[str, ...]
+    joints: tuple[Joint, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.links) != len(self.joints) + 1:
+            raise InputError(
+                "a tree has one link more than joints", found=f"{len(self.links)} and {len(self.joints)}"
+            )
+        for what, names in (("link", self.links), ("joint", [joint.name for joint in self.joints])):
+            if len(set(names)) != len(names):
+                double = next(name for i, name in enumerate(names) if name in names[:i])
+                raise InputError(f"two {what}s have the same name", found=repr(double))
+        for i, joint in enumerate(self.joints):
+            if not 0 <= joint.parent <= i:
+                raise InputError(
+                    "a joint's parent link must stand before it",
+                    where=f"joint {joint.name}",
+                    found=str(joint.parent),
+                )
+            if joint.mimic is not None:
+                self._check_mimic(joint, joint.mimic)
+
+    def _check_mimic(self, joint: Joint, mimic: Mimic) -> None:
+        leader = self.joints[self.joint_index(mimic.leader)]
+        if leader.mimic is not None or leader.kind.nq != 1 or joint.kind.nq != 1:
+            raise InputError(
+                "mimic needs a follower and a leader of one coordinate each, and the leader must not follow",
+                where=f"joint {joint.name}",
+                found=f"{joint.kind.value} following {leader.kind.value} {leader.name}",
+            )
+
+    # -- coordinates ---------------------------------------------------------------------------------
+
+    @cached_property
+    def floating_joints(self) -> tuple[int, ...]:
+        """Indices of the joints whose coordinates hold a quaternion."""
+        return tuple(i for i, joint in enumerate(self.joints) if joint.kind is JointKind.FLOATING)
+
+    @cached_property
+    def nq(self) -> int:
+        """Length of a configuration `q`."""
+        return sum(joint.nq for joint in self.joints)
+
+    @cached_property
+    def nv(self) -> int:
+        """Length of the rates `v` and of their rates `a`."""
+        return sum(joint.nv for joint in self.joints)
+
+    @cached_property
+    def q_index(self) -> tuple[int, ...]:
+        """Where each joint's coordinates begin in `q`; a follower has its leader's."""
+        return self._offsets([joint.nq for joint in self.joints])
+
+    @cached_property
+    def v_index(self) -> tuple[int, ...]:
+        """Where each joint's rates begin in `v`; a follower has its leader's."""
+        return self._offsets([joint.nv for joint in self.joints])
+
+    def _offsets(self, sizes: Sequence[int]) -> tuple[int, ...]:
+        own = np.concatenate(([0], np.cumsum(sizes, dtype=int)))
+        leaders = (
+            self.joint_index(joint.mimic.leader) if joint.mimic else i for i, joint in enumerate(self.joints)
+        )
+        return tuple(int(own[i]) for i in leaders)
+
+    # -- names ---------------------------------------------------------------------------------------
+
+    @cached_property
+    def _joint_index(self) -> dict[str, int]:
+        return {joint.name: i for i, joint in enumerate(self.joints)}
+
+    @cached_property
+    def _link_index(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.links)}
+
+    def joint_index(self, name: str) -> int:
+        """Index of a joint by name; raises UnknownNameError with the nearest names."""
+        if (index := self._joint_index.get(name)) is None:
+            raise UnknownNameError("joint", name, self._joint_index, where=self.name)
+        return index
+
+    def link_index(self, name: str) -> int:
+        """Index of a link by name; raises UnknownNameError with the nearest names."""
+        if (index := self._link_index.get(name)) is None:
+            raise UnknownNameError("link", name, self._link_index, where=self.name)
+        return index
+
+    @cached_property
+    def frame_names(self) -> tuple[str, ...]:
+        """Every link and every joint, root first, each once, as Pinocchio names its frames.
+
+        A joint's frame is its child link's frame: in a URDF the two are the same by definition.
+        """
+        names = [self.links[0]]
+        for joint, child in zip(self.joints, self.links[1:], strict=True):
+            names += [joint.name, child]
+        return tuple(dict.fromkeys(names))
+
+    @cached_property
+    def link_frames(self) -> tuple[LinkFrame, ...]:
+        """Every link, root first, under a name that stands for nothing else."""
+        return tuple(LinkFrame.of(name) for name in self.links)
+
+    @cached_property
+    def joint_frames(self) -> tuple[JointFrame, ...]:
+        """Every joint, likewise."""
+        return tuple(JointFrame.of(joint.name) for joint in self.joints)
+
+    def frame_link(self, name: str) -> int:
+        """Index of the link that carries the frame called `name`.
+
+        A link or joint that is called exactly so comes first; else `link:NAME` and `joint:NAME` say which of
+        the two is meant.
+
+        Raises:
+            UnknownNameError: nothing is called so; the nearest names are offered.
+            InputError: a link and a joint elsewhere share the name.
+        """
+        if not isinstance(name, str):
+            raise InputError("a frame is the name of a link or joint", where=self.name, found=shown(name))
+        if isinstance(name, FrameName):
+            return self._meant(name)
+        link, joint = self._link_index.get(name), self._joint_index.get(name)
+        if link is None and joint is None:
+            meant = self._with_prefix(name)
+            if meant is None:
+                raise UnknownNameError("frame", name, self.frame_names, where=self.name)
+            return self._meant(meant)
+        if link is not None and joint is not None and link != joint + 1:
+            frames = self.link_frames, self.joint_frames
+            ways = [
+                *self._spelled(frames[0][link], *frames[1][link - 1 : link]),
+                *self._spelled(frames[1][joint], frames[0][joint + 1]),
+            ]
+            raise InputError(
+                f"frame {name!r} is the name of a link and of a joint in another place",
+                where=self.name,
+                remedy=f"say {' or '.join(map(repr, ways))}" if ways else "rename one of the two",
+            )
+        return link if link is not None else self._joint_index[name] + 1
+
+    def _meant(self, frame: FrameName) -> int:
+        return self.link_index(frame.own) if isinstance(frame, LinkFrame) else self.joint_index(frame.own) + 1
+
+    def _with_prefix(self, name: str) -> FrameName | None:
+        """`link:NAME` or `joint:NAME` as it is meant, if there is such a link or joint."""
+        kinds: tuple[tuple[type[FrameName], dict[str, int]], ...] = (
+            (LinkFrame, self._link_index),
+            (JointFrame, self._joint_index),
+        )
+        for kind, known in kinds:
+            if name.startswith(kind.prefix) and name.removeprefix(kind.prefix) in known:
+                return kind(name)
+        return None
+
+    def _spelled(self, *names: FrameName) -> list[str]:
+        """The first of the names of a frame that, written out, is no other's own name."""
+        known = self._link_index.keys() | self._joint_index.keys()
+        return [str(name) for name in names if name not in known][:1]
+
+    def frame_name(self, link: int) -> str:
+        """A name by which `frame_link` finds a link: its own, or a `LinkFrame` where a joint has it too."""
+        name = self.links[link]
+        joint = self._joint_index.get(name)
+        return name if joint is None or joint + 1 == link else self.link_frames[link]
+
+    # -- walks ---------------------------------------------------------------------------------------
+
+    def path(self, link: int) -> tuple[int, ...]:
+        """Joints between the root and a link, from the root outwards."""
+        joints = []
+        while link > 0:
+            joints.append(link - 1)
+            link = self.joints[link - 1].parent
+        return tuple(reversed(joints))
+
+    def leaves(self) -> Iterator[int]:
+        """Links without children."""
+        parents = {joint.parent for joint in self.joints}
+        return (link for link in range(len(self.links)) if link not in parents)
+
+
+def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
+    """The tree hung from a link `universe` by a joint `root_joint`, as Pinocchio names the two.
+
+    Args:
+        tree: The robot.
+        kind: `JointKind.FLOATING` or `JointKind.PLANAR`.
+    """
+    for known, name in ((tree.links, "universe"), ([joint.name for joint in tree.joints], "root_joint")):
+        if name in known:
+            raise InputError(
+                f"the robot uses the name {name!r}, which a root joint needs",
+                where=tree.name,
+                remedy="rename it in the URDF or load without root_joint",
+            )
+    root = Joint("root_joint", kind, 0, np.eye(4), np.array([1.0, 0.0, 0.0]))
+    moved = [replace(joint, parent=joint.parent + 1) for joint in tree.joints]
+    return KinematicTree(tree.name, ("universe", *tree.links), (root, *moved))
+
+
+def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree:
+    """The tree with the tilts of some joints, by name: see `Joint.tilt`."""
+    joints = (replace(joint, tilt=tilts.get(joint.name, 0.0)) for joint in tree.joints)
+    return KinematicTree(tree.name, tree.links, tuple(joints))
+
+
+def freed(tree: KinematicTree) -> KinematicTree:
+    """The tree with every mimic joint free to move on its own."""
+    return KinematicTree(tree.name, tree.links, tuple(replace(joint, mimic=None) for joint in tree.joints))
+
+
+def build_tree(
+    name: str,
+    root: str,
+    joints: Sequence[tuple[Joint, str, str]],
+) -> KinematicTree:
+    """Order joints as Pinocchio does (depth first, siblings by name) and make the tree.
+
+    Args:
+        name: The robot's name.
+        root: The root link.
+        joints: (joint, parent link, child link) in any order; the `parent` index inside is ignored.
+
+    Raises:
+        InputError: when a joint cannot be reached from the root.
+    """
+    below: dict[str, list[tuple[Joint, str]]] = {}
+    for joint, parent, child in joints:
+        below.setdefault(parent, []).append((joint, child))
+    links, ordered = [root], list[Joint]()
+    # An explicit stack: a chain of 50,000 links must not meet the interpreter's recursion limit.
+    stack = [(0, joint, child) for joint, child in _last_name_first(below.get(root, []))]
+    while stack:
+        parent_index, joint, child = stack.pop()
+        ordered.append(replace(joint, parent=parent_index))
+        links.append(child)
+        stack += [(len(links) - 1, *pair) for pair in _last_name_first(below.get(child, []))]
+        if len(ordered) > len(joints):
+            raise InputError("the joints close a loop", where=name, found=f"joint {joint.name} met again")
+    if len(ordered) != len(joints):
+        missing = sorted({joint.name for joint, _, _ in joints} - {joint.name for joint in ordered})
+        raise InputError(f"joints cannot be reached from {root!r}", where=name, found=", ".join(missing))
+    return KinematicTree(name, tuple(links), tuple(ordered))
+
+
+def _last_name_first(joints: list[tuple[Joint, str]]) -> list[tuple[Joint, str]]:
+    return sorted(joints, key=lambda pair: pair[0].name, reverse=True)

@@ -1,0 +1,176 @@
+"""Motions in time: a line between two configurations, or a table of samples.
+
+A line runs with s = 10 u^3 - 15 u^4 + 6 u^5, u = t / duration, which starts and ends at rest without a step
+in the acceleration. Where a table has no rates, they are central differences of its configurations, whose
+angles are unwrapped first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from urdfkin.errors import InputError
+from urdfkin.errors.demands import real_number, whole_number
+from urdfkin.kinematics.rotation.quaternion import rotation_of
+from urdfkin.kinematics.rotation.quaternion_rates import angular_velocity_from_quaternion_rates
+from urdfkin.model.configuration import checked
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
+from urdfkin.motion.columns import read_columns
+from urdfkin.motion.unwrapping import unwrapped
+from urdfkin.system.files import read_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from urdfkin.robot import Robot
+
+#: Fewer samples than this have no second difference.
+_FEWEST = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """n samples of a robot's motion.
+
+    Attributes:
+        t: (n,) seconds, increasing.
+        q: (n, nq).
+        v: (n, nv).
+        a: (n, nv).
+        rates: Where v and a come from, in words.
+        exact: Whether v and a are the derivatives of q to rounding; else nobody knows how close they are.
+        notes: What a person must know about how the samples were read, a line each.
+    """
+
+    t: FloatArray
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+    rates: str
+    exact: bool = False
+    notes: tuple[str, ...] = ()
+
+
+def line(robot: Robot, start: FloatArray, end: FloatArray, duration: float, samples: int) -> Trajectory:
+    """A straight line in joint space from rest to rest.
+
+    Args:
+        robot: The robot.
+        start: (nq,) rad, m.
+        end: (nq,).
+        duration: Seconds.
+        samples: How many, ends included.
+
+    Raises:
+        InputError: a duration that is not positive, fewer than three samples, a floating joint.
+
+    >>> import urdfkin
+    >>> robot = urdfkin.load("ur5")
+    >>> motion = line(robot, robot.neutral(), robot.neutral() + 1.0, 2.0, 5)
+    >>> motion.q[2].round(3).tolist(), motion.v[[0, -1]].any()
+    ([0.5, 0.5, 0.5, 0.5, 0.5, 0.5], np.False_)
+    """
+    duration = real_number(duration, "the duration")
+    samples = whole_number(samples, "samples", 0)
+    if duration <= 0.0 or samples < _FEWEST:
+        raise InputError(
+            f"a line needs a duration above 0 and {_FEWEST} samples", found=f"{duration} s, {samples}"
+        )
+    _only_plain_joints(robot)
+    q_0, q_1 = checked(robot.tree, start, "q"), checked(robot.tree, end, "q")
+    t = np.linspace(0.0, duration, samples)
+    u = (t / duration)[:, np.newaxis]
+    s = u**3 * (10.0 + u * (-15.0 + 6.0 * u))
+    s_1 = 30.0 * u**2 * (1.0 - u) ** 2 / duration
+    s_2 = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / duration**2
+    step = q_1 - q_0
+    return Trajectory(
+        frozen(t), frozen(q_0 + s * step), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True
+    )
+
+
+def read_trajectory(robot: Robot, path: Path) -> Trajectory:
+    """Samples from a CSV file whose first line names the columns.
+
+    `t` holds seconds (without it, samples are a second apart); a coordinate's name holds q; `v:NAME` and
+    `a:NAME` hold rates and their rates, all of them or none. Where there are none, the wraps are taken out
+    of the angles of continuous, planar and floating joints, and the rates are central differences.
+
+    Raises:
+        SourceError: the file cannot be read.
+        InputError: a column that is unknown, missing or twice there, a number that is none, time that does
+            not increase, or too few samples.
+    """
+    rates = [f"{letter}:{name}" for letter in "va" for name in robot.rate_names]
+    data = read_columns(
+        read_text(path), str(path), "a trajectory", robot.coordinate_names, ["t", *rates], named=True
+    )
+    q = _columns(path, data, robot.coordinate_names)
+    if len(q) < _FEWEST:
+        raise InputError(
+            f"{_FEWEST} samples are the least, below a line of names", where=str(path), found=str(len(q))
+        )
+    t = data.get("t", np.arange(len(q), dtype=np.float64))
+    if (np.diff(t) <= 0.0).any():
+        raise InputError(
+            "time must increase", where=str(path), found=f"sample {int(np.argmax(np.diff(t) <= 0.0)) + 1}"
+        )
+    q = checked(robot.tree, q, "q")
+    if any(name in data for name in rates):
+        v, a = (_columns(path, data, [f"{x}:{name}" for name in robot.rate_names]) for x in "va")
+        return Trajectory(frozen(t), frozen(q), frozen(v), frozen(a), "as given")
+    found = unwrapped(robot.tree, q)
+    v = _rates(robot.tree, found.q, t)
+    words = "by central differences"
+    if found.joints:
+        words += f", after wraps were taken out of {', '.join(found.joints)}"
+    return Trajectory(
+        frozen(t), frozen(found.q), frozen(v), frozen(_gradient(v, t)), words, notes=found.notes
+    )
+
+
+def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
+    """(n, nv) central differences; those of planar and floating joints in the moving frame."""
+    slopes = _gradient(q, t)
+    v = np.empty((len(q), tree.nv))
+    for joint, at, to in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
+        if joint.nv == 1:
+            v[:, to] = slopes[:, at]
+        elif joint.kind is JointKind.PLANAR:
+            cosine, sine = np.cos(q[:, at + 2]), np.sin(q[:, at + 2])
+            v[:, to] = cosine * slopes[:, at] + sine * slopes[:, at + 1]
+            v[:, to + 1] = cosine * slopes[:, at + 1] - sine * slopes[:, at]
+            v[:, to + 2] = slopes[:, at + 2]
+        elif joint.kind is JointKind.FLOATING:
+            quaternion, rates = (x[:, at + 3 : at + 7] for x in (q, slopes))
+            R = rotation_of(quaternion)
+            v[:, to : to + 3] = (R.swapaxes(-1, -2) @ slopes[:, at : at + 3, np.newaxis])[..., 0]
+            v[:, to + 3 : to + 6] = angular_velocity_from_quaternion_rates(quaternion, rates, "body")
+    return v
+
+
+def _only_plain_joints(robot: Robot) -> None:
+    for joint in robot.tree.joints:
+        if joint.kind in (JointKind.PLANAR, JointKind.FLOATING):
+            raise InputError(
+                f"a {joint.kind.value} joint's rates are not the rates of its coordinates",
+                where=f"joint {joint.name}",
+                remedy="give a CSV file of samples",
+            )
+
+
+def _columns(path: Path, data: Mapping[str, FloatArray], names: Sequence[str]) -> FloatArray:
+    missing = [name for name in names if name not in data]
+    if missing:
+        raise InputError("columns are missing", where=f"{path}:1", found=", ".join(missing))
+    n = len(next(iter(data.values()), ()))
+    return np.stack([data[name] for name in names], axis=-1) if names else np.empty((n, 0))
+
+
+def _gradient(x: FloatArray, t: FloatArray) -> FloatArray:
+    slopes: FloatArray = np.gradient(x, t, axis=0, edge_order=2)
+    return slopes

@@ -1,0 +1,1 @@
+"""What the operating system is asked: files that users name, folders kept between runs, processes, locks."""

@@ -1,0 +1,54 @@
+"""Where the files lie that ship with urdfkin, and those of example-robot-data."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+from urdfkin.errors import SourceError
+
+
+@cache
+def robots_dir() -> Path:
+    """The folder `robots`: inside the package once installed, beside it in a checkout."""
+    here = Path(__file__).resolve().parents[1]
+    for folder in (here / "robots", here.parent / "robots"):
+        if (folder / "catalogue.toml").is_file():
+            return folder
+    raise SourceError("urdfkin's own robots are missing", where=str(here), remedy="install urdfkin again")
+
+
+@cache
+def example_robots_dir() -> Path:
+    """`share/example-robot-data/robots`, found without importing anything of it.
+
+    Raises:
+        SourceError: example-robot-data is not installed.
+    """
+    tried = list(_example_candidates())
+    for folder in tried:
+        if folder.is_dir():
+            return folder
+    raise SourceError(
+        "example-robot-data is not installed",
+        found="no folder " + " or ".join(str(folder) for folder in tried),
+        remedy="pip install example-robot-data",
+    )
+
+
+def _example_candidates() -> Iterator[Path]:
+    below = Path("share", "example-robot-data", "robots")
+    try:
+        distribution = importlib.metadata.distribution("example-robot-data")
+        yield Path(str(distribution.locate_file("cmeel.prefix"))) / below
+    except importlib.metadata.PackageNotFoundError:
+        pass
+    spec = importlib.util.find_spec("pinocchio")
+    if spec is not None and spec.origin is not None:
+        # <prefix>/lib/python3.x/site-packages/pinocchio/__init__.py
+        yield Path(spec.origin).parents[4] / below
+    yield Path(sys.prefix) / below

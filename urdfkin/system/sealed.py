@@ -1,0 +1,51 @@
+"""Files that are kept between runs, each with a digest: what was damaged is noticed, and made anew.
+
+Half a file, or one with a flipped bit, might not be read, kill the process, or compute something else.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import tempfile
+from pathlib import Path
+
+from urdfkin.system.keeping import say_once
+
+_DIGEST = hashlib.sha256().digest_size
+
+
+def keep(place: Path, data: bytes) -> None:
+    """Write a sealed file, whole or not at all; where it cannot be written, that is said and nothing else."""
+    name = ""
+    try:
+        with tempfile.NamedTemporaryFile(dir=place.parent, prefix=f".{place.name}.", delete=False) as file:
+            name = file.name
+            file.write(hashlib.sha256(data).digest() + data)
+        Path(name).replace(place)
+    except OSError as error:
+        if name:
+            with contextlib.suppress(OSError):
+                Path(name).unlink()
+        say_once(f"nothing can be kept in {place.parent}: {error.strerror or error}")
+
+
+def kept(place: Path) -> bytes | None:
+    """What a sealed file holds; None where there is none, or where it is damaged, which is said."""
+    try:
+        content = place.read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        damaged(place, error.strerror or str(error))
+        return None
+    seal, data = content[:_DIGEST], content[_DIGEST:]
+    if hashlib.sha256(data).digest() != seal:
+        damaged(place, "its content is not what was written")
+        return None
+    return data
+
+
+def damaged(place: Path, reason: str) -> None:
+    """Say that a file cannot be used; what it held is made and written anew."""
+    say_once(f"{place} is damaged and is made anew: {reason}")

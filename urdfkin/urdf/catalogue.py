@@ -1,0 +1,79 @@
+"""Robots by short names: those of example-robot-data, and urdfkin's own."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+from urdfkin.system.resources import example_robots_dir, robots_dir
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One robot of the catalogue.
+
+    Attributes:
+        name: The short name.
+        family: arm, hand, humanoid, quadruped, ...
+        limbs: (base frame, tip frame) of each arm, leg or finger; the first one's are the defaults.
+        mimic: Whether its mimic joints can be followed.
+        reason: Why not.
+        own: Whether it is one of urdfkin's own robots, not of example-robot-data.
+    """
+
+    name: str
+    family: str
+    relative_path: Path
+    limbs: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    mimic: bool = True
+    reason: str | None = None
+    own: bool = False
+
+    @property
+    def path(self) -> Path:
+        """The URDF file."""
+        return (robots_dir() if self.own else example_robots_dir()) / self.relative_path
+
+    @property
+    def base(self) -> str | None:
+        """The default base frame."""
+        return next((base for base, _ in self.limbs.values()), None)
+
+    @property
+    def tip(self) -> str | None:
+        """The default tip frame."""
+        return next((tip for _, tip in self.limbs.values()), None)
+
+
+@cache
+def catalogue() -> Mapping[str, Entry]:
+    """Every entry by name: example-robot-data's, then urdfkin's own."""
+    return {**_read("catalogue.toml", own=False), **_read("own.toml", own=True)}
+
+
+def examples() -> tuple[str, ...]:
+    """The names of example-robot-data's robots."""
+    return tuple(name for name, entry in catalogue().items() if not entry.own)
+
+
+def _read(file: str, *, own: bool) -> dict[str, Entry]:
+    path = robots_dir() / file
+    if not path.is_file():
+        return {}
+    with path.open("rb") as stream:
+        table = tomllib.load(stream)
+    return {
+        name: Entry(
+            name=name,
+            family=row["family"],
+            relative_path=Path(row["path"]),
+            limbs={limb: (base, tip) for limb, (base, tip) in row.get("limbs", {}).items()},
+            mimic=row.get("mimic", True),
+            reason=row.get("reason"),
+            own=own,
+        )
+        for name, row in table.items()
+    }

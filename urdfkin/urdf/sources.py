@@ -1,0 +1,153 @@
+"""Where a robot comes from: a path, a catalogue name, URDF text, bytes, an open file, or `-` for stdin."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, TypeGuard
+
+from urdfkin.errors import InputError, SourceError, UnknownNameError
+from urdfkin.errors.demands import shown
+from urdfkin.errors.nearest import nearest
+from urdfkin.system.files import at_home, exists, read_bytes, read_standard_input
+from urdfkin.urdf.catalogue import Entry, catalogue
+
+#: What `load` and `check` take.
+Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
+
+#: Bytes that are read unless a caller allows more; the checks refuse more than this too.
+MOST = 100_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A URDF that was read.
+
+    Attributes:
+        data: Its bytes.
+        label: What to call it in messages: the path, `<text>`, `<stdin>`.
+        source: What to give again to get it again; `<text>`, `<bytes>` or `<file>` where that has no name.
+        entry: The catalogue's entry, if that is where it came from.
+        xacro_args: Names and values that it was expanded with.
+    """
+
+    data: bytes
+    label: str
+    source: str
+    entry: Entry | None = None
+    xacro_args: tuple[tuple[str, str], ...] = ()
+
+
+def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, object] | None = None) -> Text:
+    """The bytes of a URDF, wherever it is.
+
+    A catalogue name comes before a file of the same name without a folder; write `./panda` for the file.
+
+    Args:
+        source: Any of the above.
+        most: Bytes (characters, for text files) after which reading ends, with one more, so that the checks
+            see that there are too many: a device may never end.
+        xacro_args: Arguments for a .xacro file, which is expanded.
+
+    Raises:
+        SourceError: the file cannot be read.
+        UnknownNameError: neither a file nor a name of the catalogue, or an argument that the xacro file does
+            not take; the nearest names are offered.
+        InputError: something else than a source.
+    """
+    if xacro_args is not None and not isinstance(xacro_args, Mapping):
+        raise InputError("xacro_args are a mapping from names to values", found=shown(xacro_args))
+    if is_xacro(source):
+        return _expanded(at_home(source), xacro_args or {})
+    if xacro_args:
+        raise InputError(
+            "xacro_args go with the path of a .xacro file", found=", ".join(map(str, xacro_args))
+        )
+    if isinstance(source, bytes):
+        return Text(source, "<bytes>", "<bytes>")
+    if isinstance(source, os.PathLike):
+        return _read_file(Path(source), most)
+    if isinstance(source, str):
+        return _read_word(source, most)
+    if hasattr(source, "read"):
+        label = str(getattr(source, "name", "<file>"))
+        return _encoded(source.read(most + 1), label, label)
+    raise InputError(
+        "a robot comes from a path, a catalogue name, URDF text, bytes or an open file",
+        found=type(source).__name__,
+    )
+
+
+def is_xacro(source: object) -> TypeGuard[str | os.PathLike[str]]:
+    """Whether a source is the path of a xacro file, by its name.
+
+    >>> is_xacro("arm.urdf.xacro"), is_xacro("arm.urdf"), is_xacro("<robot/>")
+    (True, False, False)
+    """
+    if isinstance(source, str) and source.lstrip().startswith("<"):
+        return False
+    return isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == ".xacro"
+
+
+def _expanded(path: Path, arguments: Mapping[str, object]) -> Text:
+    from urdfkin.urdf.xacro import expand  # noqa: PLC0415  only for those who pass xacro
+    from urdfkin.urdf.xacro_arguments import check_arguments  # noqa: PLC0415
+
+    words = {name: str(value) for name, value in arguments.items()}
+    data = expand(path, words)
+    check_arguments(path, words)
+    return Text(data, f"{path} (expanded)", as_word(path), xacro_args=tuple(words.items()))
+
+
+def _read_word(word: str, most: int) -> Text:
+    if not word.strip():
+        raise InputError(
+            "no robot is named", found=repr(word), remedy="a path, a name that 'urdfkin robots' lists, or '-'"
+        )
+    if word == "-":
+        return Text(read_standard_input(most), "<stdin>", "-")
+    if word.lstrip("\ufeff \t\r\n").startswith("<"):
+        return _encoded(word, "<text>", "<text>")
+    if (entry := catalogue().get(word)) is not None:
+        read = _read_file(entry.path, most)
+        return Text(read.data, read.label, word, entry)
+    path = at_home(word)
+    if os.sep in word or path.suffix or exists(path):
+        return _read_file(path, most)
+    raise UnknownNameError("robot", word, catalogue(), where="neither a file nor in the catalogue")
+
+
+def _encoded(content: str | bytes, label: str, source: str) -> Text:
+    # A lone surrogate cannot be encoded; it reaches the checks as the bytes they refuse.
+    data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
+    return Text(data, label, source)
+
+
+def _read_file(path: Path, most: int) -> Text:
+    try:
+        return Text(read_bytes(path, most), str(path), as_word(path))
+    except SourceError as error:
+        if isinstance(error.__cause__, FileNotFoundError):
+            raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
+        if isinstance(error.__cause__, IsADirectoryError):
+            raise SourceError(
+                "a folder, not a file", where=str(path), remedy="name the .urdf inside"
+            ) from None
+        raise
+
+
+def as_word(path: Path) -> str:
+    """A path that cannot be taken for a name of the catalogue, an option, standard input or text."""
+    word = str(path)
+    return f"./{word}" if word in catalogue() or word.startswith(("-", "<")) else word
+
+
+def _nearest_file(path: Path) -> str:
+    try:
+        names = [entry.name for entry in path.parent.iterdir()]
+    except OSError:
+        return f"there is no folder {path.parent}"
+    close = nearest(path.name, names)
+    return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists names that need no file"

@@ -1,0 +1,267 @@
+"""What a validation found, as data: for a person to read, for a program to act on, to be merged and kept.
+
+`ValidationReport.as_dict` is the JSON document; its layout is `SCHEMA` and changes only with its number.
+"""
+
+from __future__ import annotations
+
+import math
+import platform
+import shlex
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+from urdfkin.urdf.catalogue import examples
+from urdfkin.urdf.origin import Origin
+from urdfkin.validation.clock import Clock
+from urdfkin.validation.outcome import Outcome, Verdict, outcome
+from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
+from urdfkin.validation.tally import HISTOGRAM_EDGES, Key, Tally, WorstCase
+from urdfkin.verify.quantities import QUANTITIES
+from urdfkin.verify.replay import replay_line
+
+if TYPE_CHECKING:
+    from urdfkin.validation.judgement import Judgement
+
+#: Name and version of the JSON layout: urdfkin/report/assets/validation-1.schema.json, docs/reports.md.
+SCHEMA = "urdfkin-validation/1"
+
+
+@dataclass(frozen=True, slots=True)
+class RobotReport:
+    """One robot.
+
+    Attributes:
+        origin: Where it comes from and how it was asked for.
+        name: The robot's name in the URDF.
+        verdict: What it comes to.
+        reason: Why it is not verified, in words; None where it is.
+        joints: Moving joints, followers too.
+        frames: Names of the frames that were compared: every link and every joint.
+        tallies: What was compared.
+        samples: How many configurations.
+        seconds: Time spent computing and comparing.
+        portrait: What it is made of and what was found in its file.
+        clock: Where the time went; None if nothing was computed.
+        error: The traceback of an error that nobody foresaw, to be reported; None otherwise.
+    """
+
+    origin: Origin
+    name: str
+    verdict: Verdict
+    reason: str | None
+    joints: tuple[str, ...]
+    frames: tuple[str, ...]
+    tallies: dict[Key, Tally]
+    samples: int
+    seconds: float
+    portrait: Portrait = NO_PORTRAIT
+    clock: Clock | None = None
+    error: str | None = None
+
+    @property
+    def source(self) -> str:
+        """Where it comes from: a path, a catalogue name, `-`, `<text>`."""
+        return self.origin.source
+
+    @property
+    def results(self) -> int:
+        """How many results were compared."""
+        return sum(tally.results for tally in self.tallies.values())
+
+    @property
+    def failed(self) -> int:
+        """How many of them lie outside their bound."""
+        return sum(tally.failed for tally in self.tallies.values())
+
+    def of(self, quantity: str) -> list[Tally]:
+        """The tallies of one quantity, one a reference."""
+        return [tally for (kind, _), tally in self.tallies.items() if kind == quantity]
+
+    def worst(self, quantity: str) -> float | None:
+        """The largest disagreement of a quantity in eps * scale, None if it was not compared."""
+        return max((tally.worst for tally in self.of(quantity)), default=None)
+
+    def replay(self, key: Key) -> str | None:
+        """A command that computes a quantity's worst case again."""
+        quantity, reference = key
+        case = self.tallies[key].case
+        return None if case is None else replay(self.origin, quantity, reference, case)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The robot's part of the JSON document."""
+        return {
+            "source": self.source,
+            "name": self.name,
+            "verdict": self.verdict.value,
+            "reason": self.reason,
+            "error": self.error,
+            "joints": list(self.joints),
+            "frames": list(self.frames),
+            "samples": self.samples,
+            "results": self.results,
+            "failed": self.failed,
+            "seconds": round(self.seconds, 3),
+            "timings": self.clock.as_dict() if self.clock else None,
+            "model": self.portrait.model,
+            "findings": list(self.portrait.findings),
+            "chains": list(self.portrait.chains),
+            "checks": [self._check(key) for key in self.tallies],
+        }
+
+    def _check(self, key: Key) -> dict[str, Any]:
+        quantity, reference = key
+        tally = self.tallies[key]
+        case = tally.case
+        return {
+            "quantity": quantity,
+            "reference": reference or None,
+            "results": tally.results,
+            "failed": tally.failed,
+            "median": _finite(tally.percentile(50.0)),
+            "p99": _finite(tally.percentile(99.0)),
+            "worst": _finite(tally.worst),
+            "share_of_bound": _finite(tally.share),
+            "bound": [_finite(k) for k in tally.bounds],
+            "histogram": list(tally.histogram),
+            "subjects": QUANTITIES[quantity].of,
+            "worst_by_subject": [_finite(units) for units in tally.by_frame],
+            "worst_case": None
+            if case is None
+            else {
+                "sample": case.sample,
+                "frame": case.frame,
+                "disagreement": _finite(case.units),
+                "q": list(case.q),
+                "v": list(case.v),
+                "a": list(case.a),
+                "replay": self.replay(key),
+            },
+        }
+
+
+def _finite(units: float) -> float | None:
+    """JSON has no infinity: None stands for a result that is no number or must agree exactly and does not."""
+    return units if math.isfinite(units) else None
+
+
+def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:
+    """The command for one case."""
+    row = QUANTITIES[quantity]
+    # Joints are compared under their plain names, which a link elsewhere may have too.
+    frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
+    return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
+
+
+@dataclass(frozen=True, slots=True)
+class ValidationReport:
+    """A whole run.
+
+    Attributes:
+        robots: One report a robot, in the order asked for.
+        asked: How many robots were to be validated.
+        samples: Random configurations for each robot.
+        seed: What they were drawn from.
+        started: When, ISO 8601, UTC.
+        seconds: Wall time.
+        interrupted: Whether the run was stopped; what had finished is kept.
+        judgements: The true errors of both sides, where the judge was asked for: one for each robot that was
+            compared, None where it could not be had.
+    """
+
+    robots: tuple[RobotReport, ...]
+    asked: int
+    samples: int
+    seed: int
+    started: str
+    seconds: float
+    interrupted: bool = False
+    judgements: tuple[Judgement | None, ...] = ()
+
+    @property
+    def command(self) -> str:
+        """The command that repeats the run.
+
+        Robots with other options have a line of their own, and so has each that came as text: standard input
+        is one file.
+        """
+        settings = f"--samples {self.samples} --seed {self.seed}"
+        return "\n".join(
+            f"urdfkin validate {_named(origins)} {settings} {origins[0].options}".rstrip()
+            for origins in _together([robot.origin for robot in self.robots])
+        )
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the run ended, and why it has not passed if it has not."""
+        return outcome((robot.verdict for robot in self.robots), self.asked, self.interrupted)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every robot that was asked for was verified, and there was one."""
+        return self.outcome.passed
+
+    @property
+    def exit_code(self) -> int:
+        """0 verified, 1 a disagreement, 130 interrupted, 2 bad input, 3 a robot not verified."""
+        return self.outcome.exit_code
+
+    def as_dict(self) -> dict[str, Any]:
+        """The JSON document."""
+        return {
+            "schema": SCHEMA,
+            "versions": versions(),
+            "started": self.started,
+            "seconds": round(self.seconds, 3),
+            "seed": self.seed,
+            "samples": self.samples,
+            "histogram_edges": HISTOGRAM_EDGES.tolist(),
+            "asked": self.asked,
+            "interrupted": self.interrupted,
+            "passed": self.passed,
+            "reason": self.outcome.reason,
+            "command": self.command,
+            "robots": self._robots(),
+        }
+
+    def _robots(self) -> list[dict[str, Any]]:
+        """Each with its judgement: those that were compared were judged, in their order."""
+        judgements = iter(self.judgements)
+        entries = []
+        for robot in self.robots:
+            found = next(judgements, None) if robot.tallies else None
+            entries.append(robot.as_dict() | {"judge": found.as_dict() if found else None})
+        return entries
+
+
+def _together(origins: Sequence[Origin]) -> list[list[Origin]]:
+    """Those that one command can validate: the same options, and standard input once."""
+    groups: dict[tuple[str, int], list[Origin]] = {}
+    texts = Counter[str]()
+    for origin in origins:
+        is_text = origin.again == "-"
+        groups.setdefault((origin.options, texts[origin.options] if is_text else 0), []).append(origin)
+        texts[origin.options] += is_text
+    return list(groups.values())
+
+
+def _named(origins: Sequence[Origin]) -> str:
+    if tuple(origin.source for origin in origins) == examples():
+        return "--all"
+    return shlex.join(origin.again for origin in origins)
+
+
+def versions() -> dict[str, str]:
+    """What computed and what checked."""
+    packages: Sequence[str] = ("urdfkin", "pin", "numpy", "numba", "yourdfpy", "example-robot-data")
+    return {"python": platform.python_version()} | {package: _version(package) for package in packages}
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "a checkout" if package == "urdfkin" else "not installed"

@@ -1,0 +1,214 @@
+"""How far two correct computations may differ: the roundings that they count, times the size of their terms.
+
+A result is accepted when every number differs from Pinocchio's by at most
+
+    k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
+
+*scale* is the size of the terms that the number is summed from, in its own unit (`magnitudes`): two
+computations that add the same terms in another order differ in proportion to the terms, not to their sum.
+
+*k* counts roundings, to first order in eps (`urdfkin.kinematics.roundings`): so many for each joint on the
+path, each of which turns what is behind it. Rotations do not stretch what was wrong before, so the error
+grows with the number of joints and no faster.
+
+A quantity is multilinear in rotated vectors, each a *factor* that may be off by as much: a position has one
+in each term (R d), a velocity two (w and d), an acceleration three (w, w, d, or v z, w, d), a Jacobian's
+linear rows two (z and d), its rate's three (w, z and d); seeing it in the frame's own axes is one factor
+more, seeing it from the world's origin crosses it with p and is one more.
+
+Rounding seldom conspires as it would have to. What is measured is a fraction of an eps for each
+joint, and reports give the disagreement itself, in multiples of eps * scale, so that it can be compared
+across robots.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from urdfkin.compiled.plan import Column, Plan
+from urdfkin.kinematics.lengths import chapter as eq
+from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, of_joints
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.verify.magnitudes import Magnitudes
+
+_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+
+#: A scale beyond the range of doubles is inf; `disagreement` accepts nothing there.
+_BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """What a quantity is measured against, each array shaped to broadcast against the results.
+
+    Attributes:
+        scale: The size of the terms, in the result's units; 0 where a result must agree exactly.
+        k: How many eps of it two correct computations may differ by.
+    """
+
+    scale: FloatArray
+    k: FloatArray
+
+
+def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
+    """`k` for each result, the same for all its numbers; `leading` axes count results.
+
+    A k that allows nothing, less, or anything is no number: no share of it is within the bound.
+    """
+    k = bound.k.reshape(bound.k.shape[: len(leading)])
+    return np.broadcast_to(np.where((k > 0.0) & (k < np.inf), k, np.nan), leading)
+
+
+def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
+    """A scale (n, frames, ...) with `k` for each result: its factors, times what each may be off by."""
+    factors += reference is not _ALIGNED
+    k = factors * size.roundings
+    return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
+
+
+def placement_scale(plan: Plan, size: Magnitudes) -> FloatArray:
+    """For (n, frames, 4, 4): the path's length for positions, 1 for rotations, 0 for the last row."""
+    scale = np.zeros((*size.p.shape, 4, 4))
+    scale[..., :3, :3] = 1.0
+    scale[..., :3, 3] = size.p[..., None]
+    return scale
+
+
+@_BEYOND
+def velocity_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
+    """For (n, frames, 6)."""
+    linear = size.vel
+    if reference is Reference.WORLD:
+        linear = eq.point_velocity(linear, size.w, size.p)
+    return _six(linear, size.w)
+
+
+@_BEYOND
+def acceleration_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
+    """For (n, frames, 6). Pinocchio goes through spatial accelerations, which differ by w x vel.
+
+    It is that of a breakdown's sum too. There the terms are gathered by joints: v_k z x (v_k z x d_k) and
+    2 w_{k-1} x (v_k z x d_k) with d_k from the joint to the frame have the lengths (w_k^2 - w_{k-1}^2) d_k, w
+    being the sum of the rates so far, and added over the joints they are w^2 times each link's own length, as
+    in 7.130. The d_k, differences of places seen from the frame, round as the sums of 7.77 do, and adding up
+    the 4 n parts rounds n + 3 times: both are less than the 2 eps that each joint has for sums.
+    """
+    shared = eq.tangential(size.w, size.vel)
+    linear = size.acc + shared
+    if reference is Reference.WORLD:
+        linear = eq.point_acceleration(linear + shared, size.alpha, size.w, size.p)
+    return _six(linear, size.alpha)
+
+
+def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
+    """(..., 6) from (...): the same for each of the three linear numbers, and for each angular one."""
+    scale = np.empty((*linear.shape, 6))
+    scale[..., :3] = linear[..., None]
+    scale[..., 3:] = angular[..., None]
+    return scale
+
+
+def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
+    """(..., 6, nv) from (..., nv), likewise."""
+    scale = np.empty((*linear.shape[:-1], 6, linear.shape[-1]))
+    scale[..., :3, :] = linear[..., None, :]
+    scale[..., 3:, :] = angular[..., None, :]
+    return scale
+
+
+@_BEYOND
+def jacobian_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
+    """For (n, frames, 6, nv): the path's length for turning columns, 1 for sliding ones, 0 for idle ones."""
+    turning, sliding = column_weights(plan)
+    linear, angular = eq.turning_column(turning, size.p[..., None])
+    return _six_rows(linear + sliding, angular)
+
+
+@_BEYOND
+def jacobian_rate_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
+    """For (n, frames, 6, nv).
+
+    A frame's turning columns are no longer than its path, and their arms change no faster than its origin
+    moves. In LOCAL the rate is that of the numbers in the frame's own axes.
+    """
+    turning, sliding = column_weights(plan)
+    w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
+    linear, angular = eq.turning_column_rate(turning, eq.axis_rate(w, turning), p, vel)
+    linear = linear + eq.axis_rate(w, sliding)
+    if reference is Reference.LOCAL:
+        column, axis = eq.turning_column(turning, p)
+        linear = eq.rate_in_turning_axes(linear, w, column + sliding)
+        angular = eq.rate_in_turning_axes(angular, w, axis)
+    return _six_rows(linear, angular)
+
+
+@_BEYOND
+def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> Bound:
+    """For (n, frames, 6, nv): the positions' rows are those of the Jacobian; it grows near the singularity.
+
+    The rates of the outer angles are r . w, that of the middle one u . w, with the reciprocal basis of
+    the axes e_i, u and t = R e_k (`line_of_nodes`): |u| = 1, |r| = 1 / s, where s = |e_i x t| is the sine or
+    cosine of the middle angle. When t is off by no more than delta = k eps, u turns by delta / s, and r,
+    as -(r . du) u - (r . dt) r' shows, changes by 2 delta / s^2, with the least s there is: `apart` - delta.
+    With w off by delta of its size, the sums are 2 delta / s^2 + delta / s, at most 3 delta / s^2, and
+    delta / s + delta, at most 2 delta / s. In scales for the two factors of the Jacobian that is 1.5 / s^2
+    and 1 / s. What the angles' own arithmetic rounds (some 3 eps for arctan2 and its sine, 10 eps for
+    products and quotients, on either side) is held by the joint counted more: there is no offset to add here.
+
+    Args:
+        bound: The Jacobian's.
+        size: Of the frames.
+        apart: (n, frames) s of Pinocchio's rotation.
+    """
+    s = apart - EPS * size.roundings
+    s = np.where(s > 0.0, s, 0.0)  # where rounding hides the singularity nothing is accepted
+    scale = bound.scale.copy()
+    with np.errstate(divide="ignore"):
+        scale[..., [3, 5], :] *= (1.5 / (s * s))[..., None, None]
+        scale[..., 4, :] *= (1.0 / s)[..., None]
+    return Bound(scale, bound.k)
+
+
+def quaternion_jacobian_bound(bound: Bound) -> Bound:
+    """For (n, frames, 7, nv): the positions' rows are those of the Jacobian; there is no singularity.
+
+    A row of 4 q q^T is linear in R, off by less than 4.6 delta and at least 2 long, so that q is off by
+    2.3 delta, half the product of w and q by (2.3 + 1) / 2 delta of w: less than the Jacobian's two factors.
+    """
+    return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
+
+
+def hidden_scalar(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
+    """Below what |qw| rounding hides its sign: k eps is 2 delta, so that this is 3, and q is off by 2.3."""
+    return 1.5 * EPS * result_k(bound, leading)
+
+
+def nearest_singularity(plan: Plan) -> float:
+    """From where on (rad) rounding leaves Euler rates a digit: four times what R may be off by."""
+    return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
+
+
+def column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
+    """(frames, nv) each: the sum of the mimic multipliers that turn, or slide, along each column."""
+    weights = np.zeros((2, len(plan.frames), plan.nv))
+    for f, (_, place) in enumerate(plan.frames):
+        for c in np.flatnonzero(plan.leaders[f] >= 0):
+            kind = 0 if plan.columns[c, Column.TURNS] else 1
+            weights[kind, place, plan.columns[c, Column.V]] += abs(plan.multipliers[c])
+    return weights[0], weights[1]
+
+
+def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
+    """|ours - theirs| in multiples of eps * scale; inf where the scale is 0 and they differ.
+
+    A result that is not finite, or that a scale beyond all numbers would excuse, disagrees by inf.
+    """
+    unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, LEAST_UNIT), 0.0)
+    with np.errstate(all="ignore"):
+        difference = np.abs(ours - theirs)
+        units = difference / unit
+    units = np.where(difference == 0.0, 0.0, units)
+    return np.where(np.isfinite(difference) & np.isfinite(bound.scale), units, np.inf)

@@ -1,0 +1,166 @@
+"""One call's arguments as flat batches for the recursion, and the way back to the caller's shape."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.compiled.plan import IntArray, Plan
+from urdfkin.errors import InputError, NotFiniteError
+from urdfkin.errors.demands import shown
+from urdfkin.model.base_motion import STILL_STATE, BaseMotion
+from urdfkin.model.configuration import checked, shaped
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.verify.asked import Question, Rows
+
+T = TypeVar("T")
+
+
+class Part(NamedTuple):
+    """Some configurations of a call, as urdfkin sees them and as the user asked for them.
+
+    Attributes:
+        plan: The walk.
+        reference: For all but placements.
+        q: (n, nq).
+        rates: (n, nv) v, and a, as far as the call was given them.
+        state: (n or 1, 24) how the base moves.
+        asked: The same configurations in the user's own numbers and names.
+        representation: Of an analytical Jacobian's orientation.
+    """
+
+    plan: Plan
+    reference: Reference
+    q: FloatArray
+    rates: tuple[FloatArray, ...]
+    state: FloatArray
+    asked: Rows
+    representation: str = ""
+
+
+class Call:
+    """One call's inputs as flat batches, and the way back to the caller's shape.
+
+    Args:
+        tree: The robot.
+        plan: Makes the walk that meets some links, or knows it already.
+        frame: The name of a link or joint, or several.
+        reference: A member or its name.
+        base: How the root link moves; None if it stands still.
+        inputs: q, v and a, as far as the quantity needs them.
+        options: What else the call was given, by the method's names for it.
+
+    Raises:
+        InputError: wrong lengths, batches that do not broadcast, something else than names.
+        UnknownNameError: no such frame or reference.
+    """
+
+    def __init__(
+        self,
+        tree: KinematicTree,
+        plan: Callable[[Sequence[int]], Plan],
+        frame: str | Sequence[str],
+        reference: Reference | str,
+        base: BaseMotion | None,
+        inputs: Sequence[ArrayLike],
+        **options: object,
+    ) -> None:
+        if base is not None and not isinstance(base, BaseMotion):
+            raise InputError("base is a BaseMotion or None", found=type(base).__name__)
+        self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
+        self.several, self.frames = _frames(frame)
+        self.question = Question(frame, reference, base, inputs)
+        self.reference = Reference.of(reference)
+        self.links = tuple(tree.frame_link(name) for name in self.frames)
+        self.plan = plan(self.links)
+        given = [shaped(tree, x, name) for x, name in zip(inputs, "qva", strict=False)]
+        self.shape = self._batch_shape(given)
+        self.n = math.prod(self.shape)
+        flat = [self._flat_input(array) for array in given]
+        self.q, *self.rates = flat
+        self.state = STILL_STATE if base is None else base.state(self.shape)
+
+    def _batch_shape(self, given: list[FloatArray]) -> tuple[int, ...]:
+        shapes = [array.shape[:-1] for array in given]
+        if self.base is not None:
+            shapes.append(self.base.batch_shape)
+        if all(shape == shapes[0] for shape in shapes):
+            return shapes[0]
+        try:
+            return np.broadcast_shapes(*shapes)
+        except ValueError:
+            found = ", ".join(str(shape) for shape in shapes)
+            raise InputError("the batch shapes of q, v, a and base do not fit", found=found) from None
+
+    def _flat_input(self, array: FloatArray) -> FloatArray:
+        """(n, width); a single row for many configurations stays one in memory."""
+        width = array.shape[-1]
+        if array.shape[:-1] == self.shape:
+            return np.ascontiguousarray(array.reshape(self.n, width))
+        if array.size == width:
+            return np.broadcast_to(np.ascontiguousarray(array).reshape(width), (self.n, width))
+        return np.ascontiguousarray(np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width))
+
+    @property
+    def results(self) -> int:
+        """How many results the call hands out."""
+        return self.n * len(self.links)
+
+    def flat(self, out: FloatArray | None, own: tuple[int, ...]) -> FloatArray | None:
+        """`out` as the kernels write it, (n, frames, ...); raises InputError if it cannot take the result."""
+        if out is None:
+            return None
+        wanted = (*self.shape, *((len(self.links),) if self.several else ()), *own)
+        good = isinstance(out, np.ndarray) and out.dtype == np.float64 and out.flags.c_contiguous
+        if not good or out.shape != wanted or not out.flags.writeable:
+            raise InputError(
+                f"out must be a writable C-contiguous float64 array of shape {wanted}",
+                found=f"{getattr(out, 'dtype', type(out).__name__)} {getattr(out, 'shape', '')}",
+            )
+        if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
+            raise InputError("out must not share memory with q, v or a: they are read again for the check")
+        return out.reshape(self.n, len(self.links), *own)
+
+    def in_shape(self, result: FloatArray) -> FloatArray:
+        """An (n, frames, ...) result in the caller's batch shape, with an axis of frames if several."""
+        return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
+
+    def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
+        """Evaluate the walk, or name the number that is not finite."""
+        try:
+            return evaluate(*arguments, **options)
+        except NotFiniteError:
+            for x, name in zip(self.inputs, "qva", strict=False):
+                checked(self.tree, x, name)
+            raise
+
+    def part(self, part: slice | IntArray) -> Part:
+        """Some of its configurations, for the check."""
+        state = self.state if len(self.state) == 1 else self.state[part]
+        rates = tuple(x[part] for x in self.rates)
+        representation = str(self.options.get("representation", ""))
+        asked = self.question.rows(part)
+        return Part(self.plan, self.reference, self.q[part], rates, state, asked, representation)
+
+    def index(self, k: int) -> tuple[int, ...]:
+        """Flat sample `k` as an index into the caller's batch."""
+        return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
+
+
+def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
+    """Whether several are asked for, and their names; whoever looks them up says which is none."""
+    if isinstance(frame, str):
+        return False, (frame,)
+    try:
+        return True, tuple(frame)[: len(frame)]  # what has no length is used up by looking
+    except TypeError:
+        raise InputError(
+            "a frame is the name of a link or joint, or a list of names",
+            found=shown(frame),
+            remedy="robot.link_frames are all links",
+        ) from None

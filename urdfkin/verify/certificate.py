@@ -1,0 +1,244 @@
+"""What was checked, how closely it agreed, and what was not checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from urdfkin.compiled.plan import IntArray
+from urdfkin.errors import UrdfkinError
+from urdfkin.model.tree import FloatArray
+from urdfkin.system.forking import lock_over_forks
+from urdfkin.verify.bounds import Bound, result_k
+from urdfkin.verify.quantities import QUANTITIES
+from urdfkin.verify.worst import worst_of_each
+
+#: The reason that certificates give for what nobody wanted checked.
+NOT_ASKED_FOR = "verify=False was asked for"
+#: One entry after the other, in all ledgers.
+_entering = lock_over_forks()
+
+
+class VerificationError(UrdfkinError):
+    """urdfkin and Pinocchio disagree by more than rounding can explain: one of the two is wrong.
+
+    Attributes:
+        quantity: What was compared.
+        frame: Of which frame.
+        reference: In which reference; of an analytical Jacobian, in which representation.
+        index: Position of the worst sample in the batch.
+        ours: urdfkin's value of that sample.
+        theirs: Pinocchio's.
+        bound: What the two may differ by, number for number.
+        units: The disagreement, in eps * scale.
+        reproduce: A line that computes the case again.
+    """
+
+    is_disagreement = True
+
+    def __init__(
+        self,
+        quantity: str,
+        frame: str,
+        reference: str,
+        *,
+        index: tuple[int, ...],
+        ours: FloatArray,
+        theirs: FloatArray,
+        bound: FloatArray,
+        units: float,
+        reproduce: str,
+    ) -> None:
+        difference = float(np.abs(ours - theirs).max())
+        super().__init__(
+            f"the {quantity} of {frame} ({reference}) disagrees with Pinocchio's",
+            where=f"sample {list(index)}" if index else None,
+            found=f"a difference of {difference:.3g}, {units:.3g} eps*scale",
+            remedy=f"reproduce it with: {reproduce}",
+        )
+        self.quantity, self.frame, self.reference, self.index = quantity, frame, reference, index
+        self.ours, self.theirs, self.bound = ours, theirs, bound
+        self.units, self.reproduce = units, reproduce
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """One batch of results held against Pinocchio's.
+
+    Attributes:
+        results: How many results (matrices or six-vectors) were compared.
+        worst: The largest disagreement, in eps * scale.
+        share: The largest disagreement as a share of its bound; above 1 is a failure.
+        index: Where the largest share is, in the results' leading axes.
+    """
+
+    results: int
+    worst: float
+    share: float
+    index: tuple[int, ...]
+
+    @classmethod
+    def of_nothing(cls) -> Comparison:
+        """No results, which agree."""
+        return cls(0, 0.0, 0.0, ())
+
+    def __add__(self, other: Comparison) -> Comparison:
+        """Both together; the place is that of the larger share."""
+        first, second = (self, other) if self.share >= other.share else (other, self)
+        return Comparison(
+            self.results + other.results,
+            max(self.worst, other.worst),
+            first.share,
+            first.index or second.index,
+        )
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every number lies within its bound."""
+        return self.share <= 1.0
+
+
+def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Comparison:
+    """Hold results against Pinocchio's.
+
+    Args:
+        ours: Results with `axes` leading axes; what is left is one result.
+        theirs: The same from Pinocchio.
+        bound: Scale and k, broadcastable against them.
+        axes: How many leading axes count results.
+    """
+    units = worst_of_each(ours, theirs, bound.scale, axes)
+    if not units.size:
+        return Comparison.of_nothing()
+    share = units / result_k(bound, units.shape)
+    index = np.unravel_index(int(share.argmax()), share.shape)
+    return Comparison(units.size, float(units.max()), float(share.max()), tuple(int(i) for i in index))
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A quantity's line in a certificate.
+
+    Attributes:
+        quantity: What was computed.
+        checked: How many results Pinocchio confirmed.
+        worst: The largest disagreement among them, in eps * scale.
+        share: The same as a share of the bound.
+        unchecked: How many results were handed out without a check.
+    """
+
+    quantity: str
+    checked: int
+    worst: float
+    share: float
+    unchecked: int
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What a robot's results so far are worth.
+
+    Attributes:
+        robot: The robot's name.
+        pinocchio: The version that checked.
+        lines: One for each quantity that was computed.
+        not_verified: Why results were not checked, in words; empty where all were.
+    """
+
+    robot: str
+    pinocchio: str
+    lines: tuple[Line, ...]
+    not_verified: tuple[str, ...]
+
+    @property
+    def verified(self) -> bool:
+        """Whether results were handed out and every one of them was checked and found within its bound."""
+        return any(line.checked for line in self.lines) and not any(
+            line.unchecked or not line.share <= 1.0 for line in self.lines
+        )
+
+    def __str__(self) -> str:
+        head = f"{self.robot}, checked by Pinocchio {self.pinocchio}"
+        rows = [head] + [
+            f"  {line.quantity}: {line.checked} checked, worst {line.worst:.2g} eps*scale"
+            f" ({line.share:.1%} of the bound)"
+            + (f", {line.unchecked} not checked" if line.unchecked else "")
+            for line in self.lines
+        ]
+        return "\n".join(rows + [f"  not verified: {reason}" for reason in self.not_verified])
+
+
+@dataclass(slots=True)
+class Account:
+    """What a ledger holds of one quantity.
+
+    Attributes:
+        checked: What Pinocchio confirmed.
+        unchecked: How many results it could not check, or was not asked to because of a sample.
+        not_asked_for: How many results nobody wanted checked.
+        counters: Arrays and places in them where others count more of these, each as it goes.
+    """
+
+    checked: Comparison = field(default_factory=Comparison.of_nothing)
+    unchecked: int = 0
+    not_asked_for: int = 0
+    counters: list[tuple[IntArray, int]] = field(default_factory=list)
+
+    @property
+    def unwanted(self) -> int:
+        """All results that nobody wanted checked."""
+        return self.not_asked_for + sum(int(counts[place]) for counts, place in self.counters)
+
+    def line(self, quantity: str) -> Line:
+        """The same as a certificate has it."""
+        found = self.checked
+        return Line(quantity, found.results, found.worst, found.share, self.unchecked + self.unwanted)
+
+
+@dataclass
+class Ledger:
+    """Counts what a robot hands out; safe to use from several threads."""
+
+    _accounts: dict[str, Account] = field(default_factory=dict)
+    _reasons: dict[str, None] = field(default_factory=dict)
+
+    def account(self, quantity: str) -> Account:
+        """A quantity's account, for those who count often."""
+        with _entering:
+            return self._accounts.setdefault(quantity, Account())
+
+    def checked(self, quantity: str, comparison: Comparison) -> None:
+        """Enter results that Pinocchio confirmed."""
+        account = self.account(quantity)
+        with _entering:
+            account.checked += comparison
+
+    def unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
+        """Enter results that were handed out without a check, and why; None if nobody wanted one."""
+        account = self.account(quantity)
+        with _entering:
+            if reason is None:
+                account.not_asked_for += results
+            else:
+                account.unchecked += results
+                self._reasons[reason] = None
+
+    def certificate(self, robot: str, pinocchio: str) -> Certificate:
+        """What stands in the ledger now."""
+        with _entering:
+            found = [
+                (quantity, self._accounts[quantity]) for quantity in QUANTITIES if quantity in self._accounts
+            ]
+            reasons = [NOT_ASKED_FOR] if any(account.unwanted for _, account in found) else []
+            lines = [account.line(quantity) for quantity, account in found]
+            return Certificate(
+                robot,
+                pinocchio,
+                tuple(line for line in lines if line.checked or line.unchecked),
+                (*reasons, *self._reasons),
+            )
+
+    def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
+        # A copy in another process starts its own account.
+        return type(self), ()

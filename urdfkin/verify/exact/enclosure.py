@@ -1,0 +1,188 @@
+"""Proof for one sample: intervals that contain the true values, and whose doubles lie in them.
+
+`urdfkin.kinematics.equations` is evaluated on intervals (`urdfkin.verify.exact.intervals`), from the decimals
+of the URDF as they are written and the exact values of q, v and a. That these equations are the right ones is
+not in the proof: that is what Pinocchio's agreement says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from urdfkin.errors import InputError
+from urdfkin.errors.demands import whole_number, word
+from urdfkin.kinematics.inputs import floats
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.configuration import checked
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, frozen
+from urdfkin.verify.call import Call
+from urdfkin.verify.exact.decimals import read_exact
+from urdfkin.verify.exact.intervals import ends, of_digits
+from urdfkin.verify.exact.recursion import move, on_base
+from urdfkin.verify.exact.vectors import exact
+from urdfkin.verify.quantities import (
+    ACCELERATION,
+    JACOBIAN,
+    JACOBIAN_RATE,
+    PLACEMENT,
+    VELOCITY,
+    Quantity,
+)
+from urdfkin.verify.verifier import pinocchios, urdfkins
+
+if TYPE_CHECKING:
+    from urdfkin.robot import Robot
+
+#: Fewer digits than these a double has; more than those nobody waits for.
+LEAST_DIGITS, MOST_DIGITS = 15, 10_000
+#: Twice a double's, and a joint may lose one more: a third of one is lost where all axes stand askew.
+ENOUGH_DIGITS = 30
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Enclosure:
+    """Where the true values of one quantity lie, number by number.
+
+    Attributes:
+        quantity: Which.
+        lower: Doubles that are no larger, in the shape in which `Robot` hands the quantity out.
+        upper: Doubles that are no smaller.
+        urdfkin: What urdfkin computes.
+        pinocchio: What Pinocchio computes; None where it cannot.
+    """
+
+    quantity: str
+    lower: FloatArray
+    upper: FloatArray
+    urdfkin: FloatArray
+    pinocchio: FloatArray | None
+
+    @property
+    def width(self) -> FloatArray:
+        """Upper - lower: 0 where the true value is a double, else the step to the next double, or more."""
+        return self.upper - self.lower
+
+    def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
+        """Which numbers of `x`, of the same shape, lie inside.
+
+        Raises:
+            InputError: another shape.
+        """
+        x = self._alike(x)
+        return (self.lower <= x) & (x <= self.upper)
+
+    def error(self, x: ArrayLike) -> FloatArray:
+        """How far each number of `x`, of the same shape, can be from its true value at most.
+
+        Raises:
+            InputError: another shape.
+        """
+        x = self._alike(x)
+        farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
+        return np.where(farthest > 0.0, np.nextafter(farthest, np.inf), 0.0)
+
+    def _alike(self, x: ArrayLike) -> FloatArray:
+        x = floats(x, f"the {self.quantity}")
+        if x.shape != self.lower.shape:
+            raise InputError(f"the {self.quantity} has the shape {self.lower.shape}", found=f"{x.shape}")
+        return x
+
+    def __str__(self) -> str:
+        sides = {"urdfkin's": self.urdfkin, "Pinocchio's": self.pinocchio}
+        inside = [f"{self.contains(x).sum()} of {name}" for name, x in sides.items() if x is not None]
+        widest = self.width.max(initial=0.0)
+        return f"{self.quantity}: {self.lower.size} numbers, widest {widest:.1e}, inside {', '.join(inside)}"
+
+    def __repr__(self) -> str:
+        return f"<Enclosure {self}>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Enclosures:
+    """Where the true values of one frame's motion lie.
+
+    Attributes:
+        frame: Its name.
+        reference: In which its velocity, acceleration and Jacobians are seen.
+        digits: Of the ends of the intervals, before they were rounded outward to doubles.
+        placement: (4, 4).
+        velocity: (6,).
+        acceleration: (6,), classical.
+        jacobian: (6, nv).
+        jacobian_rate: (6, nv).
+    """
+
+    frame: str
+    reference: Reference
+    digits: int
+    placement: Enclosure
+    velocity: Enclosure
+    acceleration: Enclosure
+    jacobian: Enclosure
+    jacobian_rate: Enclosure
+
+    def __str__(self) -> str:
+        quantities = self.placement, self.velocity, self.acceleration, self.jacobian, self.jacobian_rate
+        head = f"{self.frame} in {self.reference.name.lower()}, proven with {self.digits} digits"
+        return "\n  ".join((head, *map(str, quantities)))
+
+    def __repr__(self) -> str:
+        return f"<Enclosures {self}>"
+
+
+def enclose(
+    robot: Robot,
+    inputs: tuple[ArrayLike, ArrayLike, ArrayLike],
+    frame: str,
+    reference: Reference | str,
+    base: BaseMotion | None,
+    digits: int | None,
+) -> Enclosures:
+    """What `Robot.enclose` says."""
+    if digits is not None:
+        digits = whole_number(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
+    call = Call(robot.tree, robot.plan, word(frame, "frame"), reference, base, inputs)
+    if call.shape:
+        raise InputError(
+            "a proof is for one sample",
+            found=f"a batch of shape {call.shape}",
+            remedy="give q (nq,), v and a (nv,), and the base of one sample",
+        )
+    for x, name in zip(inputs, "qva", strict=True):
+        checked(robot.tree, x, name)
+    link, part = call.links[0], call.part(slice(0, 1))
+    path = robot.tree.path(link)
+    digits = digits or ENOUGH_DIGITS + len(path)
+    context = of_digits(digits)
+    numbers = ([exact(x, context) for x in rows[0]] for rows in part.asked.inputs)
+    motion = move(
+        robot.tree,
+        read_exact(robot.urdf, robot.tree, context, path),
+        *numbers,
+        base=None if base is None else on_base(base, context, context.nearest_rotation),
+        context=context,
+    )
+    oracle = None if robot.verifier.cannot(base) else robot.verifier.oracle(base)
+
+    def enclosed(row: Quantity) -> Enclosure:
+        true = row.truth(motion, link, call.reference)
+        lower, upper = np.vectorize(ends, otypes=[float, float])(true)
+        ours = frozen(urdfkins(row, part)[0, 0])
+        theirs = None if oracle is None else frozen(pinocchios(row, oracle, part.asked)[0, 0])
+        return Enclosure(row.name, frozen(lower), frozen(upper), ours, theirs)
+
+    return Enclosures(
+        frame,
+        call.reference,
+        digits,
+        enclosed(PLACEMENT),
+        enclosed(VELOCITY),
+        enclosed(ACCELERATION),
+        enclosed(JACOBIAN),
+        enclosed(JACOBIAN_RATE),
+    )

@@ -1,0 +1,315 @@
+"""A Denavit-Hartenberg table held against Pinocchio: placement, Jacobian and acceleration of its tip.
+
+Pinocchio knows frames in the world; a table's numbers are relative to its base, which may itself be moving
+(left foot to right hand). With R, w, v, alpha, a of base b and tip t in the world and r = p_t - p_b:
+
+    w    = R_b^T (w_t - w_b)
+    vel  = R_b^T (v_t - v_b - w_b x r)
+    alpha= R_b^T (alpha_t - alpha_b - w_b x (w_t - w_b))
+    acc  = R_b^T (a_t - a_b - alpha_b x r - w_b x (w_b x r) - 2 w_b x (v_t - v_b - w_b x r))
+
+which are 7.124 and 7.125 solved for the motion seen from the moving frame. They stand here a second time, and
+not as `urdfkin.kinematics.equations` has them: a table is computed by that text, and this is what it is held
+against. The bound is what rounding can do
+to either side, plus what a snapped table declares.
+
+Rounding is measured by the robot: by the ways from the root to both ends, with what slides, and in each
+column of the Jacobian by the mimic multipliers that move it. A table's own lengths count up to the promise
+that Hayati rows keep (`PROMISED`), and no further. Four parameters for a nearly parallel pair may need a foot
+kilometres away, and two such lengths cancel to eps times themselves: a table that is off by no more than
+that is no disagreement, but it is not the robot to rounding either. It says what it loses.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urdfkin.dh.motion import acceleration, jacobian
+from urdfkin.dh.noise import left_out
+from urdfkin.dh.snapping import LARGEST_TOLERANCE, rotation_angle
+from urdfkin.dh.table import DHTable
+from urdfkin.errors import UrdfkinError
+from urdfkin.kinematics.roundings import EPS, of_joints, of_rows
+from urdfkin.model.chain import chain
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.sampling import Samples
+
+_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+#: No length of a table with Hayati rows exceeds so many times the robot's reach (docs/dh.md).
+PROMISED = 10.0
+
+
+class TableError(UrdfkinError):
+    """A table and Pinocchio disagree by more than rounding and snapping can explain."""
+
+    is_disagreement = True
+
+
+@dataclass(frozen=True, slots=True)
+class TableCheck:
+    """What a table's check found; every figure is the worst of all samples.
+
+    Attributes:
+        samples: How many configurations were compared.
+        metres: Between the two tips.
+        radians: Between their orientations.
+        units: Of "placement", "jacobian" and "acceleration": the disagreement in eps * scale.
+        shares: Likewise: the disagreement over the bound; 1 is as much as the bound allows.
+        snapped: Whether the bound includes what snapping declares.
+        loss: What rounding costs a table whose lengths go far beyond the robot, if that explains more than
+            the bound; None otherwise.
+    """
+
+    samples: int
+    metres: float
+    radians: float
+    units: dict[str, float]
+    shares: dict[str, float]
+    snapped: bool
+    loss: str | None = None
+
+    @property
+    def within(self) -> bool:
+        """Whether every sample is within its bound."""
+        return all(share <= 1.0 for share in self.shares.values())
+
+    @property
+    def agrees(self) -> bool:
+        """Whether all is rounding and snapping, be it the rounding of the table's own lengths."""
+        return self.within or self.loss is not None
+
+    def __str__(self) -> str:
+        if self.loss is not None:
+            return (
+                f"the table LOSES {self.metres * 1e3:.2g} mm and {self.radians:.2g} rad to rounding on"
+                f" {self.samples} samples: {self.loss}"
+            )
+        bound = "rounding and what was snapped" if self.snapped else "rounding"
+        figures = self.shares if self.snapped else self.units
+        unit = "of the bound" if self.snapped else "in eps*scale"
+        worst = ", ".join(f"{name} {_figure(value, self.snapped)}" for name, value in figures.items())
+        verdict = f"agrees within {bound}" if self.agrees else f"DISAGREES by more than {bound}"
+        return (
+            f"{verdict} on {self.samples} samples: tip within {self.metres:.2e} m and {self.radians:.2e} rad;"
+            f" {unit}: {worst}"
+        )
+
+
+def _figure(value: float, share: bool) -> str:
+    return f"{value:.0%}" if share else f"{value:.2g}"
+
+
+def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> TableCheck:
+    """Compare a table of `tree` with Pinocchio.
+
+    Args:
+        oracle: Pinocchio's model of the same robot.
+        tree: The robot.
+        table: A table whose base and tip are frames of the robot.
+        samples: Configurations and rates of the whole robot.
+    """
+    own_q = table.coupling.select(tree, samples.q)
+    columns = list(table.coupling.v_index(tree))
+    own_v, own_a = samples.v[:, columns], samples.a[:, columns]
+    motion = relative_motion(oracle, tree, table, samples)
+    T = table.placement(own_q)
+    apart = _Apart(
+        np.hypot.reduce(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
+        rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3]),
+        np.abs(jacobian(table, own_q) - motion.jacobian[..., columns]),
+        _split(np.abs(acceleration(table, own_q, own_v, own_a) - motion.acceleration)),
+    )
+    size = sizes(tree, table, samples)
+    slack = _Slack(table, own_q, size)
+    units, shares = _measured(apart, size, slack)
+    loss = None
+    own = own_length(table)
+    if table.rows and max(shares.values()) > 1.0 and (own > size.reach).any():
+        _, longer = _measured(apart, size.of_length(own), slack)
+        loss = _loss(table) if max(longer.values()) <= 1.0 else None
+    worst = (float(apart.metres.max(initial=0.0)), float(apart.radians.max(initial=0.0)))
+    return TableCheck(len(own_q), *worst, units, shares, bool(table.snap and table.snap.changes), loss)
+
+
+def own_length(table: DHTable) -> float:
+    """Metres: all lengths of a table, base and tool included."""
+    return table.span + math.hypot(*table.base[:3, 3])
+
+
+def _loss(table: DHTable) -> str:
+    """Why a table loses digits, how many, and what to do."""
+    length, cell, joint = max(
+        (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
+    )
+    tilts = [abs(math.sin(row.alpha)) for row in table.rows if row.alpha not in (0.0, math.pi)]
+    tilt = math.asin(min(tilts, default=1.0))
+    snap = f"take --snap {10.0 ** math.ceil(math.log10(tilt)):.0e}, or " if tilt <= LARGEST_TOLERANCE else ""
+    return (
+        f"{cell} of {joint} is {length:.3g} m, and eps times that is {EPS * length * 1e3:.2g} mm;"
+        f" {snap}take Hayati rows"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Apart:
+    """How far a table is from Pinocchio on each sample: (n,), (n,), (n, 6, columns), two of (n,)."""
+
+    metres: FloatArray
+    radians: FloatArray
+    jacobian: FloatArray
+    acceleration: tuple[FloatArray, FloatArray]
+
+
+def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, float], dict[str, float]]:
+    """The worst of each quantity in eps * scale, and over the bound."""
+    rates = size.rates**2 + size.accelerations
+    one = np.ones_like(apart.metres)
+    columns = size.turning + size.sliding
+    J_linear, J_angular = apart.jacobian[:, :3].max(axis=1), apart.jacobian[:, 3:].max(axis=1)
+    reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
+    pairs: dict[str, tuple[tuple[FloatArray, FloatArray, FloatArray | float], ...]] = {
+        "placement": ((apart.metres, size.reach, slack.metres), (apart.radians, one, slack.turn)),
+        "jacobian": (
+            (J_linear, size.turning * reach + size.sliding, slack.jacobian[:, None] * columns),
+            (J_angular, size.turning * one[:, None], slack.turn * columns),
+        ),
+        "acceleration": (
+            (apart.acceleration[0], (size.reach + slides) * rates, slack.acceleration * rates),
+            (apart.acceleration[1], rates, 4.0 * slack.turn * rates),
+        ),
+    }
+    units, shares = dict[str, float](), dict[str, float]()
+    for name, halves in pairs.items():
+        units[name] = max(_worst(x, scale * EPS) for x, scale, _ in halves)
+        shares[name] = max(_worst(x, (scale.T * size.rounding).T + allowed) for x, scale, allowed in halves)
+    return units, shares
+
+
+def _worst(found: FloatArray, unit: FloatArray | float) -> float:
+    """The largest ratio; nothing over nothing is zero."""
+    return float((found / np.maximum(unit, 1e-300)).max(initial=0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeMotion:
+    """Pinocchio's placement (n, 4, 4), Jacobian (n, 6, nv) and acceleration (n, 6) of a tip in a base."""
+
+    placement: FloatArray
+    jacobian: FloatArray
+    acceleration: FloatArray
+
+
+def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> RelativeMotion:
+    """The tip's motion as seen from the table's base, from Pinocchio's of both in the world."""
+    frames = [table.base_frame, table.tip_frame]
+    T = oracle.placements(samples.q, frames)
+    R = T[:, 0, :3, :3]
+    r = T[:, 1, :3, 3] - T[:, 0, :3, 3]
+    J = oracle.jacobians(samples.q, frames, _ALIGNED)
+    vel = oracle.velocities(samples.q, samples.v, frames, _ALIGNED)
+    acc = oracle.accelerations(samples.q, samples.v, samples.a, frames, _ALIGNED)
+    J_base, J_tip = J[:, 0], J[:, 1]
+    J_linear = J_tip[:, :3] - J_base[:, :3] - np.cross(J_base[:, 3:], r[..., None], axis=1)
+    J_angular = J_tip[:, 3:] - J_base[:, 3:]
+    w = vel[:, 0, 3:]
+    v_seen = vel[:, 1, :3] - vel[:, 0, :3] - np.cross(w, r)
+    alpha = acc[:, 1, 3:] - acc[:, 0, 3:] - np.cross(w, vel[:, 1, 3:] - w)
+    linear = acc[:, 1, :3] - acc[:, 0, :3] - np.cross(acc[:, 0, 3:], r)
+    linear -= np.cross(w, np.cross(w, r)) + 2.0 * np.cross(w, v_seen)
+    placement = np.broadcast_to(np.eye(4), (len(r), 4, 4)).copy()
+    Rt = np.swapaxes(R, -1, -2)
+    placement[:, :3, :3] = Rt @ T[:, 1, :3, :3]
+    placement[:, :3, 3] = (Rt @ r[..., None])[..., 0]
+    return RelativeMotion(
+        placement,
+        np.concatenate([Rt @ J_linear, Rt @ J_angular], axis=1),
+        np.concatenate([(Rt @ linear[..., None])[..., 0], (Rt @ alpha[..., None])[..., 0]], axis=1),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """What rounding is measured by.
+
+    Attributes:
+        reach: (n,) metres: the ways from the root to both ends.
+        turning: (columns,) the sum of the multipliers with which a coordinate turns joints on these ways.
+        sliding: Likewise, slides.
+        rates: (n,) the sum of all joints' rates, rad/s and m/s.
+        accelerations: (n,) likewise.
+        rounding: (n,) the count of roundings times eps, an angle being itself rounded; and the tilts that a
+            table leaves out as rounding (`urdfkin.dh.noise`).
+    """
+
+    reach: FloatArray
+    turning: FloatArray
+    sliding: FloatArray
+    rates: FloatArray
+    accelerations: FloatArray
+    rounding: FloatArray
+
+    def of_length(self, metres: float) -> Sizes:
+        """The same for a table of that length."""
+        return replace(self, reach=np.maximum(self.reach, metres))
+
+
+def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
+    """Everything from the root to either end counts: Pinocchio goes there and back."""
+    n = len(samples.q)
+    reach, rates, accelerations, angles = np.zeros((4, n))
+    names, joints, tilt = table.joint_names, 0, 0.0
+    weights = {True: np.zeros(len(names)), False: np.zeros(len(names))}
+    for link in {tree.frame_link(table.base_frame), tree.frame_link(table.tip_frame)}:
+        for i in tree.path(link):
+            joint = tree.joints[i]
+            joints += 1
+            tilt += joint.tilt
+            reach += math.hypot(*joint.T_parent_joint[:3, 3])  # squares of tiny lengths vanish
+            factor, offset, leader = 1.0, 0.0, joint.name
+            if (rule := joint.mimic) is not None:
+                factor, offset, leader = abs(rule.multiplier), abs(rule.offset), rule.leader
+            v_at, q_at = tree.v_index[i], tree.q_index[i]
+            rates += factor * np.abs(samples.v[:, v_at : v_at + joint.kind.nv]).sum(axis=-1)
+            accelerations += factor * np.abs(samples.a[:, v_at : v_at + joint.kind.nv]).sum(axis=-1)
+            value = offset + factor * np.abs(samples.q[:, q_at : q_at + joint.kind.nq]).sum(axis=-1)
+            if joint.kind.turns:
+                angles += value
+            elif joint.kind.nq:
+                reach += value
+            if leader in names:
+                weights[joint.kind.turns][names.index(leader)] += factor
+    own = own_length(table)
+    reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
+    # A joint costs what it does anywhere, in Pinocchio and in our reading of the chain that rows are made of,
+    # and a row what it does. The acceleration seen from the base has four factors that a tilt turns.
+    counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
+    rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
+    return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
+
+
+class _Slack:
+    """What a snapped table may differ by, beyond rounding.
+
+    No axis turns by more than `turn`, no joint origin and no tip is displaced by more than the declared
+    metres; z x d so changes by turn times reach plus twice the metres, and a product of two such factors
+    by twice that. Angular terms z x z change by twice the turn.
+    """
+
+    def __init__(self, table: DHTable, own_q: FloatArray, size: Sizes) -> None:
+        self.turn, self.metres = 0.0, np.zeros(len(own_q))
+        if table.snap is not None:
+            values = table.coupling.values(own_q)
+            by_name = {row.joint: values[:, i] for i, row in enumerate(table.rows)}
+            self.turn, self.metres = table.snap.radians, self.metres + table.snap.bound(by_name)
+        self.jacobian = self.turn * (size.reach + 1.0) + 2.0 * self.metres
+        self.acceleration = 2.0 * self.turn * (size.reach + 2.0) + 4.0 * self.metres
+
+
+def _split(six: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The largest linear and angular component of (n, 6)."""
+    return six[:, :3].max(axis=-1), six[:, 3:].max(axis=-1)

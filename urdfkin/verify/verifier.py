@@ -1,0 +1,273 @@
+"""What a robot has that checks it: the text that Pinocchio reads, what Pinocchio said, and what nobody asked.
+
+A result is held against Pinocchio's for the user's own arguments, in the shape in which it is handed out.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from typing import Any
+
+import numpy as np
+
+from urdfkin.compiled.plan import IntArray
+from urdfkin.dh.table import DHTable
+from urdfkin.dh.tree_parameters import TreeParameters
+from urdfkin.errors import RangeError
+from urdfkin.kinematics.roundings import EPS, of_joints
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.urdf.origin import Origin
+from urdfkin.verify import bounds
+from urdfkin.verify.asked import Rows
+from urdfkin.verify.bounds import Bound
+from urdfkin.verify.call import Call, Part
+from urdfkin.verify.certificate import Certificate, Comparison, Ledger, VerificationError, compare
+from urdfkin.verify.choosing import SAMPLE, Verify, checked_choice, parts
+from urdfkin.verify.magnitudes import magnitudes
+from urdfkin.verify.pinocchio import Oracle, OracleError, version
+from urdfkin.verify.quantities import Quantity
+from urdfkin.verify.replay import replay_line
+from urdfkin.verify.sampling import draw
+from urdfkin.verify.tables import TableCheck, TableError, check_table
+
+#: Random configurations that a table is checked on, besides the neutral one and the ends of the limits.
+TABLE_SAMPLES = 40
+
+
+class NotVerifiedWarning(UserWarning):
+    """Results are handed out that Pinocchio could not check; the message says why."""
+
+
+class Verifier:
+    """Checks one robot's results, and keeps account of them.
+
+    Args:
+        text: The URDF that Pinocchio reads.
+        tree: urdfkin's reading of it.
+        origin: Where the text comes from, for lines that compute a case again.
+        policy: Which results are checked unless a call says otherwise.
+        mimic: Whether followers follow.
+        unverifiable: Why Pinocchio cannot check the robot; None if it can, as far as is known.
+
+    Attributes:
+        ledger: What was handed out, checked or not.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        tree: KinematicTree,
+        origin: Origin,
+        *,
+        policy: Verify = True,
+        mimic: bool = True,
+        unverifiable: str | None = None,
+    ) -> None:
+        self.text, self.tree, self.origin = text, tree, origin
+        self.policy, self.mimic, self.unverifiable = checked_choice(policy), mimic, unverifiable
+        self.ledger = Ledger()
+        self._oracles: dict[bool, Oracle] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Pinocchio's models are rebuilt where they are needed. A copy, in this process or another, has handed
+        # out nothing yet: its ledger is empty.
+        return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
+
+    def oracle(self, base: BaseMotion | None = None) -> Oracle:
+        """Pinocchio's model of the robot, made once; on a free-flyer if the base moves.
+
+        Raises:
+            OracleError: Pinocchio does not accept the text, or finds other joints in it.
+        """
+        moving = base is not None
+        if moving not in self._oracles:
+            self._oracles[moving] = Oracle(
+                self.text, self.tree, mimic=self.mimic, moving_base=moving, root_joint=self.origin.root_joint
+            )
+        return self._oracles[moving]
+
+    def cannot(self, base: BaseMotion | None = None) -> str | None:
+        """Why Pinocchio cannot check this robot; None if it can."""
+        if self.unverifiable is None:
+            try:
+                self.oracle(base)
+            except OracleError as error:
+                self.unverifiable = str(error)
+        return self.unverifiable
+
+    def wanted(self, verify: Verify | None) -> Verify:
+        """Which results are to be checked; None leaves it to the policy."""
+        return checked_choice(self.policy if verify is None else verify)
+
+    def certificate(self) -> Certificate:
+        """What was checked so far, how closely it agreed, by which Pinocchio, and what was not checked."""
+        return self.ledger.certificate(self.tree.name, version())
+
+    # -- quantities ----------------------------------------------------------------------------------
+
+    def check(self, quantity: Quantity, call: Call, handed_out: FloatArray, verify: Verify | None) -> None:
+        """Have a call's results checked, in the shape in which the user gets them, and enter them.
+
+        Raises:
+            VerificationError: Pinocchio computes something else.
+            OracleError: they have another shape than what was asked.
+        """
+        ledger, wanted = self.ledger, self.wanted(verify)
+        if wanted is False:
+            ledger.unchecked(quantity.name, call.results)
+            return
+        if (reason := self.cannot(call.base)) is not None:
+            _warn(reason)
+            ledger.unchecked(quantity.name, call.results, reason)
+            return
+        results = call.question.flat(handed_out, quantity.axes)
+        total, worst = Comparison.of_nothing(), None
+        for part in parts(wanted, call.n, results[:1].size):
+            comparison, failure = self._compare(quantity, call, results[part], part)
+            if failure is not None and (worst is None or comparison.share > total.share):
+                worst = failure
+            total += comparison
+        if worst is not None:
+            raise worst
+        ledger.checked(quantity.name, total)
+        if left := call.results - total.results:
+            ledger.unchecked(quantity.name, left, f'verify="sample" checks {SAMPLE} configurations of a call')
+
+    def _compare(
+        self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
+    ) -> tuple[Comparison, VerificationError | None]:
+        """Hold some of the results against Pinocchio's; the worst of them, if it disagrees."""
+        x = call.part(part)
+        theirs, bound = held_against(quantity, self.oracle(call.base), x, ours)
+        comparison = compare(ours, theirs, bound, 2)
+        if comparison.agrees:
+            return comparison, None
+        i, f = comparison.index
+        k = part.start + i if isinstance(part, slice) else int(part[i])
+        bound = Bound(*(np.broadcast_to(x, ours.shape)[i, f] for x in (bound.scale, bound.k)))
+        if not (np.isfinite(bound.scale).all() and np.isfinite(theirs[i, f]).all()):
+            raise RangeError(
+                f"the {quantity.name} of {call.frames[f]} leaves the range of double precision",
+                where=f"sample {list(call.index(k))}" if call.shape else None,
+                remedy="give smaller numbers",
+            )
+        return comparison, VerificationError(
+            quantity.name,
+            call.frames[f],
+            x.representation or call.reference.name,
+            index=call.index(k),
+            ours=ours[i, f],
+            theirs=theirs[i, f],
+            bound=EPS * bound.k * bound.scale,
+            units=float(bounds.disagreement(ours[i, f], theirs[i, f], bound).max()),
+            reproduce=self._replay(quantity, call, k, call.frames[f]),
+        )
+
+    def _replay(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
+        """A line that computes sample `k` again: a command, or Python for what commands have no words for."""
+        inputs = (call.q, *call.rates)
+        values = {name: array[k].tolist() for name, array in zip("qva", inputs, strict=False)}
+        reference = call.reference.name.lower() if quantity.referred else None
+        if call.base is None and quantity.command:
+            return replay_line(self.origin, quantity.command, frame, reference, values)
+        options = call.options if reference is None else {"reference": reference, **call.options}
+        words = [*map(repr, values.values()), repr(frame), *(f"{x}={y!r}" for x, y in options.items())]
+        if (asked := call.question.rows(np.array([k])).base) is not None:
+            fields = asked.placement, asked.velocity, asked.acceleration
+            words.append(f"base=urdfkin.BaseMotion({', '.join(repr(x[0].tolist()) for x in fields)})")
+        return f"{self.origin.python}.{quantity.method}({', '.join(words)})"
+
+    # -- tables --------------------------------------------------------------------------------------
+
+    def table(self, table: DHTable, samples: int = TABLE_SAMPLES, seed: int = 0) -> TableCheck | None:
+        """Hold a table against Pinocchio; None, with a warning, where Pinocchio cannot check the robot.
+
+        A strict table whose lengths lose more than rounding of the robot's own is warned of as well.
+
+        Raises:
+            TableError: the two disagree.
+        """
+        if (reason := self.cannot()) is not None:
+            _warn(reason)
+            return None
+        drawn = draw(self.tree, samples, np.random.default_rng(seed), with_special=True)
+        check = check_table(self.oracle(), self.tree, table, drawn)
+        if not check.agrees:
+            raise TableError(
+                f"the {table.convention} table of {table.base_frame} to {table.tip_frame} disagrees",
+                where=f"{self.tree.name}, Pinocchio {version()}",
+                found=str(check),
+                remedy="please report this as an error of urdfkin, with the URDF",
+            )
+        if check.loss is not None:
+            _warn(str(check))
+        return check
+
+    def tree_parameters(
+        self, parameters: TreeParameters, samples: int = TABLE_SAMPLES, seed: int = 0
+    ) -> str | None:
+        """Hold the placements of all links by tree parameters against Pinocchio's; a line says how close.
+
+        None, with a warning, where Pinocchio cannot check the robot.
+
+        Raises:
+            TableError: the two disagree.
+        """
+        if (reason := self.cannot()) is not None:
+            _warn(reason)
+            return None
+        tree = self.tree
+        q = draw(tree, samples, np.random.default_rng(seed), with_special=True).q
+        ours = parameters.placements(q)
+        theirs = self.oracle().placements(q, tree.link_frames[1:])
+        error = np.abs(ours - theirs)[..., :3, :]
+        reach = parameters.reach(q)
+        units = max(
+            float((error[..., 3].max(axis=-1) / np.maximum(EPS * reach, 1e-300)).max(initial=0.0)),
+            float(error[..., :3].max(initial=0.0)) / EPS,
+        )
+        line = (
+            f"Pinocchio {version()}: {len(tree.links) - 1} links on {len(q)} samples within"
+            f" {error[..., 3].max(initial=0.0):.2e} m, {units:.2g} eps*scale"
+        )
+        tilt = max(sum(tree.joints[i].tilt for i in tree.path(leaf)) for leaf in tree.leaves())
+        if units > parameters.roundings + of_joints(0, tilt):
+            raise TableError(
+                f"the tree parameters of {tree.name} disagree", where=f"Pinocchio {version()}", found=line
+            )
+        return line
+
+
+def held_against(quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray) -> tuple[FloatArray, Bound]:
+    """(n, frames, ...) the same results by Pinocchio, and what the two are measured against."""
+    if quantity.against is not None:
+        return quantity.against(oracle, x, ours)
+    return pinocchios(quantity, oracle, x.asked), bound_of(quantity, x)
+
+
+def bound_of(quantity: Quantity, x: Part) -> Bound:
+    """What the two are measured against."""
+    v, a = (*x.rates, None, None)[:2]
+    size = magnitudes(x.plan, x.q, v, a, x.state)
+    return quantity.bound(x.plan, size, x.reference)
+
+
+def urdfkins(quantity: Quantity, x: Part) -> FloatArray:
+    """(n, frames, ...) as the recursion computes them."""
+    return quantity.ours(x.plan, (x.q, *x.rates), x.reference, base=x.state)
+
+
+@np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite disagrees
+def pinocchios(quantity: Quantity, oracle: Oracle, asked: Rows) -> FloatArray:
+    """(n, frames, ...) by Pinocchio, for what the user asked."""
+    return quantity.theirs(oracle, asked.inputs, asked.frames, asked.reference, asked.base)
+
+
+def _warn(reason: str) -> None:
+    """Warn where the package was called from."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_globals["__name__"].startswith("urdfkin."):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(f"not verified: {reason}", NotVerifiedWarning, stacklevel=level)
