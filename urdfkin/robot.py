@@ -523,7 +523,7 @@ class Robot:
         """
         from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  loads mpmath
 
-        return enclose(self, (q, v, a), frame, reference, base, digits)
+        return enclose(self.verifier, self.plan, (q, v, a), frame, reference, base, digits)
 
     def prepare(self, frame: str, reference: Reference | str = _ALIGNED) -> PreparedFrame:
         """One frame in one reference, for one configuration after the other, without a check: see there.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,12 +20,27 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.forking import importing
 
-if TYPE_CHECKING:
-    from urdfkin.robot import Robot
-
 #: q, or q and v, or q, v and a, and where to write or None: the result. For what it does not take as it is it
 #: returns None; the robot's way then does it all the same, or says what is wrong.
 Fast = Callable[..., FloatArray | None]
+
+
+class _Robot(Protocol):
+    """Who is asked where a kernel does not take what it is given."""
+
+    tree: Any
+    verifier: Any
+
+    @property
+    def prepare(self) -> Callable[..., PreparedFrame]: ...
+    @property
+    def placement(self) -> Callable[..., FloatArray]: ...
+    @property
+    def velocity(self) -> Callable[..., FloatArray]: ...
+    @property
+    def jacobian(self) -> Callable[..., FloatArray]: ...
+    @property
+    def acceleration(self) -> Callable[..., FloatArray]: ...
 
 
 class PreparedFrame:
@@ -53,7 +68,7 @@ class PreparedFrame:
         "_acceleration", "_jacobian", "_placement", "_plan", "_robot", "_velocity", "frame", "reference",
     )  # fmt: skip
 
-    def __init__(self, robot: Robot, frame: str, reference: Reference, plan: Plan) -> None:
+    def __init__(self, robot: _Robot, frame: str, reference: Reference, plan: Plan) -> None:
         self.frame, self.reference = frame, reference
         self._robot, self._plan = robot, plan
         # Compiled, or read from disk, when they are first called.

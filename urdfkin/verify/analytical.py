@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from urdfkin.model.reference import Reference
@@ -12,16 +14,24 @@ from urdfkin.verify.call import Part
 from urdfkin.verify.line_of_nodes import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.magnitudes import magnitudes
 from urdfkin.verify.pinocchio import Oracle
-from urdfkin.verify.quantities import JACOBIAN
 
 
-def held_against(oracle: Oracle, x: Part, ours: FloatArray) -> tuple[FloatArray, Bound]:
-    """(n, frames, 6 or 7, nv) the same results by Pinocchio, and what the two are measured against."""
+def held_against(
+    bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray
+) -> tuple[FloatArray, Bound]:
+    """(n, frames, 6 or 7, nv) the same results by Pinocchio, and what the two are measured against.
+
+    Args:
+        bound_of: The bound of the Jacobian that they are made from.
+        oracle: Pinocchio.
+        x: What was asked.
+        ours: What was handed out.
+    """
     aligned = Reference.LOCAL_WORLD_ALIGNED
     q, frames, base = x.asked.inputs[0], x.asked.frames, x.asked.base
     J_v = oracle.jacobians(q, frames, aligned, base)
     size = magnitudes(x.plan, x.q, None, None, x.state)
-    bound = JACOBIAN.bound(x.plan, size, aligned)
+    bound = bound_of(x.plan, size, aligned)
     if x.representation == "quaternion":
         quat = oracle.quaternions(q, frames, base)
         bound = bounds.quaternion_jacobian_bound(bound)

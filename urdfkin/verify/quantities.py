@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from importlib import import_module
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Literal
@@ -272,7 +273,7 @@ ANALYTICAL_JACOBIAN = replace(
     title="analytical Jacobian",
     equations=("7.118", "7.122"),
     compute=later("urdfkin.kinematics.bodies.representation:analytical_jacobian"),
-    against=later("urdfkin.verify.analytical:held_against"),
+    against=partial(later("urdfkin.verify.analytical:held_against"), JACOBIAN.bound),
     walked=False,
     referred=False,
     command="",

@@ -7,12 +7,13 @@ not in the proof: that is what Pinocchio's agreement says.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from urdfkin.compiled.plan import Plan
 from urdfkin.errors import InputError
 from urdfkin.errors.demands import whole_number, word
 from urdfkin.kinematics.inputs import floats
@@ -33,10 +34,7 @@ from urdfkin.verify.quantities import (
     VELOCITY,
     Quantity,
 )
-from urdfkin.verify.verifier import pinocchios, urdfkins
-
-if TYPE_CHECKING:
-    from urdfkin.robot import Robot
+from urdfkin.verify.verifier import Verifier, pinocchios, urdfkins
 
 #: Fewer digits than these a double has; more than those nobody waits for.
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
@@ -136,7 +134,8 @@ class Enclosures:
 
 
 def enclose(
-    robot: Robot,
+    verifier: Verifier,
+    plan_of: Callable[[Sequence[int]], Plan],
     inputs: tuple[ArrayLike, ArrayLike, ArrayLike],
     frame: str,
     reference: Reference | str,
@@ -146,7 +145,8 @@ def enclose(
     """What `Robot.enclose` says."""
     if digits is not None:
         digits = whole_number(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
-    call = Call(robot.tree, robot.plan, word(frame, "frame"), reference, base, inputs)
+    tree = verifier.tree
+    call = Call(tree, plan_of, word(frame, "frame"), reference, base, inputs)
     if call.shape:
         raise InputError(
             "a proof is for one sample",
@@ -154,20 +154,20 @@ def enclose(
             remedy="give q (nq,), v and a (nv,), and the base of one sample",
         )
     for x, name in zip(inputs, "qva", strict=True):
-        checked(robot.tree, x, name)
+        checked(tree, x, name)
     link, part = call.links[0], call.part(slice(0, 1))
-    path = robot.tree.path(link)
+    path = tree.path(link)
     digits = digits or ENOUGH_DIGITS + len(path)
     context = of_digits(digits)
     numbers = ([exact(x, context) for x in rows[0]] for rows in part.asked.inputs)
     motion = move(
-        robot.tree,
-        read_exact(robot.urdf, robot.tree, context, path),
+        tree,
+        read_exact(verifier.text, tree, context, path),
         *numbers,
         base=None if base is None else on_base(base, context, context.nearest_rotation),
         context=context,
     )
-    oracle = None if robot.verifier.cannot(base) else robot.verifier.oracle(base)
+    oracle = None if verifier.cannot(base) else verifier.oracle(base)
 
     def enclosed(row: Quantity) -> Enclosure:
         true = row.truth(motion, link, call.reference)
