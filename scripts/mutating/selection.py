@@ -37,15 +37,18 @@ def _below(path: Path) -> str:
 def near_tests(path: Path) -> list[str]:
     """Test files that name the module, and those of its part: who is near it asks first.
 
-    What lies in no part serves all of them, by way of a robot.
+    A part without tests of its own serves all the others, by way of a robot.
     """
     named = re.compile(rf"\b{re.escape(module_of(path))}\b(?!\.)|\b{re.escape(path.stem)}\b")
     part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
     near = {test for test, text in _texts().items() if named.search(text)}
-    parts = (part, f"test_{part}.py", *(_OF_ROBOTS if path.parent == PACKAGE else ()))
-    own = {test for test in _texts() if test.relative_to(TESTS).parts[0] in parts}
+    own = _tests_of(part, f"test_{part}.py") or _tests_of(*_OF_ROBOTS)
     order = sorted(near | own, key=lambda test: (path.stem not in test.stem, test not in near, str(test)))
     return [str(test.relative_to(ROOT)) for test in order]
+
+
+def _tests_of(*parts: str) -> set[Path]:
+    return {test for test in _texts() if test.relative_to(TESTS).parts[0] in parts}
 
 
 @cache

@@ -83,7 +83,7 @@ CASES = {
         fork(lambda: robot.placement(q[:3], "tool0"))
         """,
     "a deep robot, while another thread builds one": """
-        from urdfkin import deep_stack
+        from urdfkin.system import deep_stack
         held(deep_stack._one_at_a_time)
         fork(lambda: deep_stack.with_stack(2**24, lambda: None))
         """,

@@ -237,7 +237,7 @@ def test_a_robot_without_joints_has_jacobians_without_columns() -> None:
 
 
 def test_the_example_on_the_page_runs_and_prints_what_stands_there() -> None:
-    page = (Path(__file__).parents[1] / "docs" / "enclosures.md").read_text("utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "enclosures.md").read_text("utf-8")
     code, printed = re.findall(r"```(?:python|text)\n(.*?)```", page, re.DOTALL)
     names: dict[str, Enclosures] = {}
     with redirect_stdout(io.StringIO()) as out:
