@@ -17,9 +17,10 @@ from scripts.benchmarking.calls import Calls
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
 from scripts.benchmarking.timing import Work, times
 from urdfkin.compiled import cores
+from urdfkin.compiled.evaluate import is_staged, task_of
 from urdfkin.compiled.program import WIDTH, Head, Op, Program, program_of
 from urdfkin.compiled.single import single
-from urdfkin.compiled.task import Task, scratch
+from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
@@ -62,14 +63,10 @@ def cut(program: Program, parts: int) -> Program:
 
 def _core(subject: Subject, quantity: str, program: Program, who: str) -> Work:
     """A core at work on a whole batch."""
-    inputs = subject.inputs(quantity, subject.n)
-    out, memory = np.empty((subject.n, *subject.width(quantity))), scratch(program)
-    task = np.zeros(len(Task), dtype=np.int64)
-    task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
-    task[Task.SCRATCH], task[Task.OUT] = memory.ctypes.data, out.ctypes.data
-    task[Task.REFERENCE], task[Task.N] = Reference.LOCAL_WORLD_ALIGNED, subject.n
-    for place, x in zip((Task.Q, Task.V, Task.A), inputs, strict=False):
-        task[place] = x.ctypes.data
+    inputs = [STILL_STATE, *subject.inputs(quantity, subject.n)]
+    out = np.empty((subject.n, *subject.width(quantity)))
+    staged = who == "writing results" and is_staged(out)
+    task, memory = task_of(program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, staged=staged)
     core = getattr(cores, f"{quantity}s")
     kept = program, memory, out, inputs  # what the task holds addresses of
 

@@ -1,11 +1,13 @@
 """A batch gives the same numbers however it is cut."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 
 import urdfkin
+from urdfkin.compiled import evaluate
 from urdfkin.compiled.batch import in_blocks
 from urdfkin.compiled.registers import LANES
 from urdfkin.errors import InputError
@@ -35,6 +37,34 @@ def test_a_batch_large_enough_for_threads_by_itself_is_the_same(panda: urdfkin.R
     q = panda.sample(5000, seed=5)
     alone = panda.placement(q, "panda_hand", threads=1)
     np.testing.assert_array_equal(panda.placement(q, "panda_hand"), alone)
+
+
+@pytest.mark.parametrize("offset", range(8))
+@pytest.mark.parametrize("n", [1, LANES, 3 * LANES + 5])
+def test_what_is_written_past_the_caches_is_the_same_wherever_it_begins(
+    panda: urdfkin.Robot, monkeypatch: pytest.MonkeyPatch, offset: int, n: int
+) -> None:
+    q = panda.sample(n, seed=7)
+    v, a = np.random.default_rng(7).standard_normal((2, n, panda.nv))
+    frames = ["panda_hand", "panda_link3"]
+    jacobians, accelerations = panda.jacobian(q, frames), panda.acceleration(q, v, a, frames)
+    monkeypatch.setattr(evaluate, "_STREAMED", 0)
+    for threads in (1, 2):
+        with _between(jacobians, offset) as out:
+            panda.jacobian(q, frames, out=out, threads=threads)
+        with _between(accelerations, offset) as out:
+            panda.acceleration(q, v, a, frames, out=out, threads=threads)
+
+
+@contextmanager
+def _between(expected: FloatArray, offset: int) -> Iterator[FloatArray]:
+    """Memory to be filled with what is expected; what lies before and behind it must stay."""
+    around = np.full(expected.size + 16, np.pi)
+    out = around[offset : offset + expected.size].reshape(expected.shape)
+    yield out
+    np.testing.assert_array_equal(out, expected)
+    assert (around[:offset] == np.pi).all()
+    assert (around[offset + expected.size :] == np.pi).all()
 
 
 def test_less_than_one_thread_is_refused(panda: urdfkin.Robot) -> None:

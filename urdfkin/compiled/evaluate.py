@@ -11,12 +11,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urdfkin.compiled.batch import in_blocks
 from urdfkin.compiled.compiling import Core
 from urdfkin.compiled.plan import LARGE, Plan
 from urdfkin.compiled.program import Program, program_of
-from urdfkin.compiled.task import Task, scratch
+from urdfkin.compiled.registers import LANES
+from urdfkin.compiled.task import Task, lines, scratch
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
@@ -25,6 +27,11 @@ from urdfkin.system.forking import importing
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = Task.BASE, Task.Q, Task.V, Task.A
+#: Bytes of an output that no near cache keeps until it is read: it is written past them.
+_STREAMED = 2 << 20
+#: Numbers of a block that stay in half of the nearest cache until it is full.
+_MOST_STAGED = 3072
+
 _STRIDES = Task.STRIDE_BASE, Task.STRIDE_Q, Task.STRIDE_V, Task.STRIDE_A
 
 
@@ -157,23 +164,50 @@ def _run(
         NotFiniteError: an input is not finite.
         RangeError: a result is not, although the inputs are.
     """
-    moving = base is not STILL_STATE
     inputs = [x[:1] if _is_the_same_for_all(x) else x for x in inputs]
-    strides = [0 if len(x) == 1 else x.shape[1] for x in (base, *inputs)]
+    staged = is_staged(out)
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
-        memory, task = scratch(program), np.zeros(len(Task), dtype=np.int64)
-        task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
-        task[Task.SCRATCH], task[Task.OUT] = memory.ctypes.data, part.ctypes.data
-        task[Task.REFERENCE], task[Task.N] = reference, len(part)
-        for place, of_place, x, stride in zip(_PLACES, _STRIDES, parts, strides, strict=False):
-            task[place], task[of_place] = x.ctypes.data, stride
-        if not moving:
-            task[Task.BASE] = 0
-        return core(task.ctypes.data)
+        task, kept = task_of(program, reference, parts, part, staged=staged)
+        outcome = core(task.ctypes.data)
+        del kept
+        return outcome
 
     if in_blocks(compute, [base, *inputs], out, threads) or plan.is_large or _is_large(base):
         _demand_finite([base, *inputs], out)
+
+
+def is_staged(out: FloatArray) -> bool:
+    """Whether results are put together block by block, then written past the caches, whole lines at a time.
+
+    A line that is written in pieces is read before, and an output beyond a cache's size is nowhere near.
+    """
+    return out.nbytes >= _STREAMED and LANES * out[0].size <= _MOST_STAGED
+
+
+def task_of(
+    program: Program, reference: Reference, inputs: Sequence[FloatArray], out: FloatArray, *, staged: bool
+) -> tuple[NDArray[np.int64], object]:
+    """A core's task, and the memory that has to live until it is done.
+
+    Args:
+        program: The walk's.
+        reference: Of the results.
+        inputs: The base's state, q, and v, and a as far as they are wanted; of one row, or as many as `out`.
+        out: (n, ...) to be filled.
+        staged: Whether its blocks are (`is_staged`).
+    """
+    width, memory, task = out[0].size, scratch(program), np.zeros(len(Task), dtype=np.int64)
+    stage = lines(LANES * width if staged else 0)
+    task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
+    task[Task.SCRATCH], task[Task.OUT] = memory.ctypes.data, out.ctypes.data
+    task[Task.REFERENCE], task[Task.N], task[Task.WIDTH] = reference, len(out), width
+    task[Task.STAGE] = stage.ctypes.data if staged else 0
+    for place, of_place, x in zip(_PLACES, _STRIDES, inputs, strict=False):
+        task[place], task[of_place] = x.ctypes.data, 0 if len(x) == 1 else x.shape[1]
+    if inputs[0] is STILL_STATE:
+        task[Task.BASE] = 0
+    return task, (memory, stage)
 
 
 def _is_the_same_for_all(x: FloatArray) -> bool:

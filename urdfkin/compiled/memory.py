@@ -174,26 +174,20 @@ def ordinary(x, at, count):
     return total < LARGE
 
 
-def _fetching(to_write: int) -> Any:
+@intrinsic
+def _fetch(context: Any, x: Any, at: Any) -> Any:
     """Have the memory around `x[at]` brought near; an address beyond the end does no harm."""
 
-    @intrinsic
-    def fetch(context: Any, x: Any, at: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), ir.IntType(8).as_pointer())
-            number = ir.IntType(32)
-            kind = ir.FunctionType(ir.VoidType(), [address.type, number, number, number])
-            near, data = number(3), number(1)
-            function = builder.module.declare_intrinsic("llvm.prefetch", [address.type], kind)
-            builder.call(function, [address, number(to_write), near, data])
-            return context.get_dummy_value()
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), ir.IntType(8).as_pointer())
+        number = ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [address.type, number, number, number])
+        to_read, near, data = number(0), number(3), number(1)
+        function = builder.module.declare_intrinsic("llvm.prefetch", [address.type], kind)
+        builder.call(function, [address, to_read, near, data])
+        return context.get_dummy_value()
 
-        return types.void(_NUMBERS, types.intp), generate
-
-    return fetch
-
-
-_fetch_to_read, _fetch_to_write = map(_fetching, (0, 1))
+    return types.void(_NUMBERS, types.intp), generate
 
 
 @compiled
@@ -201,15 +195,45 @@ def fetch(x, at, count):
     """Ask for the `count` numbers from `x[at]` on: the next block's inputs, while this one is computed."""
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):
-            _fetch_to_read(x, number)
+            _fetch(x, number)
+
+
+@intrinsic
+def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
+    """A whole cache line of `x` to one of `to`, past the caches."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        x, i, to, at = arguments
+        line = builder.load(_vector_at(builder, x, i, LANES), align=8)
+        store = builder.store(line, _vector_at(builder, to, at, LANES), align=64)
+        store.set_metadata("nontemporal", builder.module.add_metadata([ir.IntType(32)(1)]))
+        return context.get_dummy_value()
+
+    return types.void(_NUMBERS, types.intp, _NUMBERS, types.intp), generate
 
 
 @compiled
-def fetch_to_write(x, at, count):
-    """Ask for what a block will write.
+def stream(x, count, to, at, address):
+    """`count` numbers to `to[at]` on, past the caches: a line that is written whole is not read before.
 
-    A block's output is scattered over more cache lines than the processor fetches at a time. Asked for while
-    the walk goes on, they are there when it writes.
+    `address` is that of `to[0]`.
     """
-    for number in range(at, at + count, LANES):
-        _fetch_to_write(x, number)
+    edge = -(address // 8 + at) % LANES
+    lines = edge + (count - edge) // LANES * LANES
+    for i in range(edge):
+        to[at + i] = x[i]
+    for i in range(edge, lines, LANES):
+        _stream_8(x, i, to, at + i)
+    for i in range(lines, count):
+        to[at + i] = x[i]
+
+
+@intrinsic
+def all_written(context: Any) -> Any:
+    """Wait until what was streamed is in memory, for whoever reads it on another processor."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.fence("seq_cst")
+        return context.get_dummy_value()
+
+    return types.void(), generate

@@ -37,6 +37,10 @@ class Task(IntEnum):
     STRIDE_A = auto()
     STRIDE_BASE = auto()
     OUT = auto()
+    #: Numbers that one configuration puts there.
+    WIDTH = auto()
+    #: Where a block's results come together on their way there; 0 where they go there at once.
+    STAGE = auto()
 
     CORE = auto()
     NQ = auto()
@@ -50,8 +54,12 @@ class Task(IntEnum):
 
 
 def scratch(program: Program) -> FloatArray:
-    """Memory for a walk to work in, whose address is a cache line's."""
-    count = program.rows * LANES
+    """Memory for a walk to work in."""
+    return lines(program.rows * LANES)
+
+
+def lines(count: int) -> FloatArray:
+    """Memory for so many numbers, whose address is a cache line's."""
     numbers = np.empty(count + _LINE // 8)
     first = -numbers.ctypes.data % _LINE // 8
     return numbers[first : first + count]

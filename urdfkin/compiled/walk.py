@@ -14,7 +14,7 @@ from __future__ import annotations
 from urdfkin.compiled import compiled_equations as eq
 from urdfkin.compiled.axes import seen, seen_after
 from urdfkin.compiled.compiling import compiled
-from urdfkin.compiled.memory import fetch, ordinary, read_rows
+from urdfkin.compiled.memory import all_written, fetch, ordinary, read_rows, stream
 from urdfkin.compiled.numbers import one, rounded, zero
 from urdfkin.compiled.program import ANGLE_ROW, ANGLE_WIDTH, ONE_ROW, STATE_ROWS, WIDTH, ZERO_ROW, Head, Op
 from urdfkin.compiled.registers import (
@@ -36,7 +36,7 @@ _N, _Q, _V, _A, _BASE = map(int, (Task.N, Task.Q, Task.V, Task.A, Task.BASE))
 _STRIDE_Q, _STRIDE_V, _STRIDE_A, _STRIDE_BASE = map(
     int, (Task.STRIDE_Q, Task.STRIDE_V, Task.STRIDE_A, Task.STRIDE_BASE)
 )
-_REFERENCE = int(Task.REFERENCE)
+_REFERENCE, _WIDTH, _STAGE = map(int, (Task.REFERENCE, Task.WIDTH, Task.STAGE))
 _CODE, _NQ, _NV, _ROW_Q, _ROW_V, _ROW_A, _ROW_BASE = map(
     int, (Head.CODE, Head.NQ, Head.NV, Head.Q, Head.V, Head.A, Head.BASE)
 )
@@ -334,7 +334,8 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
     _read_inputs(m, task, program, s, b, orders)
     _sines_and_cosines(s, program, g)
     state = follow(_start(axes, m, s, task, program[_ROW_BASE], b))
-    at, to = program[_CODE], numbers_at(task[_OUT])
+    at, stage = program[_CODE], task[_STAGE]
+    to, first = (numbers_at(stage), 0) if stage else (numbers_at(task[_OUT]), b)
     while program[at] != _END:
         op, x, y, z, c = program[at], program[at + 1], program[at + 2], program[at + 3], program[at + 4]
         at += WIDTH
@@ -351,7 +352,10 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
         elif op == _COLUMN:
             column(s, x, y, z, g, c, reference, state)
         else:
-            emit(m, s, program, x, y, b, reference, state, to)
+            emit(m, s, program, x, y, first, reference, state, to)
+    if stage:
+        width = task[_WIDTH]
+        stream(to, m * width, numbers_at(task[_OUT]), b * width, task[_OUT])
 
 
 @compiled
@@ -378,4 +382,6 @@ def walk(address, axes, orders, follow, keep, column, emit):
         b = min(first, n - m)  # the last block reaches back into the one before
         _block(axes, m, task, program, g, s, b, task[_REFERENCE], orders, follow, keep, column, emit)
         good &= _ordinary(m, task, program, b, orders)
+    if task[_STAGE]:
+        all_written()
     return 0 if good else 1
