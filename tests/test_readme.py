@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from urdfkin.cli import commands
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
@@ -31,6 +33,7 @@ def test_every_command_stands_on_the_front_page() -> None:
     assert [name for name in commands() if f"`{name}" not in README and f"urdfkin {name}" not in README] == []
 
 
+@pytest.mark.slow
 def test_the_transcript_is_what_one_sees() -> None:
     command, *expected = block("console").splitlines()
     words = command.removeprefix("$ urdfkin ").split()

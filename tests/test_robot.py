@@ -65,6 +65,7 @@ def test_a_verification_error_says_what_where_by_how_much_and_what_was_allowed(p
     assert copy.reproduce == error.reproduce
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quantity", ["placement", "velocity", "jacobian", "jacobian_rate", "acceleration"])
 @pytest.mark.parametrize("root_joint", [None, "floating"])
 @pytest.mark.usefixtures("no_room")

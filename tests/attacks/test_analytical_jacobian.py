@@ -42,6 +42,7 @@ def free() -> Robot:
 # -- what the certificate says -----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_minus_the_result_is_caught(ur5: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     right = module.representation_inverse
     monkeypatch.setattr(module, "representation_inverse", lambda *x: -right(*x))
@@ -71,6 +72,7 @@ def test_it_has_a_line_of_its_own_in_the_certificate() -> None:
     assert not robot.certificate().verified
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moving", [False, True])
 def test_its_replay_line_calls_itself(moving: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load("ur5")
@@ -91,6 +93,7 @@ def test_its_replay_line_calls_itself(moving: bool, monkeypatch: pytest.MonkeyPa
 # -- no false alarm ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("representation", REPRESENTATIONS)
 def test_it_is_verified_in_every_representation(representation: str) -> None:
     for name in ("ur5", "panda"):
@@ -104,6 +107,7 @@ def test_it_is_verified_in_every_representation(representation: str) -> None:
         assert robot.certificate().lines[0].share < 0.25
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SEQUENCES)
 def test_near_the_singularity_it_is_verified_and_the_bound_grows(free: Robot, name: str) -> None:
     rng = np.random.default_rng(3)

@@ -53,6 +53,7 @@ def test_an_offset_that_slipped_is_caught_when_the_joint_has_turned_far(q: float
         robot.acceleration([q], [1.0], [1.0], "l2", "local")
 
 
+@pytest.mark.slow
 def test_rules_read_twice_and_multiplied_out_twice_are_the_same_doubles() -> None:
     rng = np.random.default_rng(5)
     for _ in range(200):
@@ -63,6 +64,7 @@ def test_rules_read_twice_and_multiplied_out_twice_are_the_same_doubles() -> Non
         assert {joint.name: joint.mimic for joint in tree.joints if joint.mimic} == again
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("far", FAR)
 def test_chains_of_followers_are_verified_however_far_they_have_turned(far: float) -> None:
     rng = np.random.default_rng(int(np.log10(far)))

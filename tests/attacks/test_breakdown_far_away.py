@@ -24,6 +24,7 @@ def base_at(distance: float, rates: FloatArray) -> BaseMotion:
     return BaseMotion(T, rates[:6], rates[6:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reference", REFERENCES)
 @pytest.mark.parametrize("distance", [0.0, 1e4, 1e5, 1e6, 1e8, 1e12])
 def test_on_a_base_at_map_coordinates_it_is_verified_with_as_small_a_share(

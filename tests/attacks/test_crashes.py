@@ -103,6 +103,7 @@ def _full(_: Path) -> None:
     raise OSError(28, "No space left on device")
 
 
+@pytest.mark.slow
 def test_a_disagreement_stays_exit_1_when_its_report_cannot_be_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

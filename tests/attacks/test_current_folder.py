@@ -100,6 +100,7 @@ def test_compiling_runs_nothing_there(
     assert list((folder.parent / "cache").rglob("*.kernel"))
 
 
+@pytest.mark.slow
 def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -124,6 +125,7 @@ def test_python_m_takes_nothing_from_there_once_urdfkin_is_running(tmp_path: Pat
 # -- settings ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_numba_takes_no_settings_from_there(tmp_path: Path) -> None:
     (tmp_path / ".numba_config.yaml").write_text(
         f"cache_dir: {tmp_path}\ndisable_jit: 1\ncache_locator_classes: evil.Locator\n"

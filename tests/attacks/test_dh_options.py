@@ -143,6 +143,7 @@ def test_the_whole_tree_says_it_as_well() -> None:
     assert float(found[1]) > 5e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur10", "panda", "so101", "tiago", "romeo"])
 @pytest.mark.parametrize("digits", [3, 5, 17])
 @pytest.mark.parametrize("convention", ["standard", "modified"])

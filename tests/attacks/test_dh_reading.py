@@ -236,6 +236,7 @@ def _places(data: Any, here: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 _PLACES = _places(_GOOD)
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.sampled_from(_PLACES), _ANYTHING), min_size=1, max_size=3))
 @settings(max_examples=600)
 def test_anything_at_any_place_is_a_table_or_an_error_of_ours(
@@ -257,6 +258,7 @@ def test_anything_at_any_place_is_a_table_or_an_error_of_ours(
     assert np.isfinite(table.placement(np.zeros(len(table.joint_names)))).all()
 
 
+@pytest.mark.slow
 @given(st.text(max_size=60), st.sampled_from([".toml", ".json", ".csv"]))
 @settings(max_examples=300)
 def test_any_text_is_a_table_or_an_error_of_ours(text: str, suffix: str) -> None:

@@ -85,12 +85,14 @@ def test_a_standard_error_that_takes_nothing_changes_no_exit_code(closed: str) -
     assert shell(f"$URDFKIN info nothing_of_this_name {closed}")[0] == 2
 
 
+@pytest.mark.slow
 def test_a_closed_standard_input_is_told_in_a_line() -> None:
     code, out, err = shell("$URDFKIN info - <&-")
     assert (code, out) == (2, "")
     assert "standard input: cannot be read: found Bad file descriptor" in one_line(err)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", ["robots", "--help", "explain 7.130"])
 def test_a_reader_that_leaves_ends_a_command_quietly_and_as_no_disagreement(words: str) -> None:
     code, _, err = shell(f"set -o pipefail; (sleep 0.01; $URDFKIN {words}) | true")
@@ -223,6 +225,7 @@ def test_reading_ends_one_byte_after_what_is_allowed(tmp_path: Path) -> None:
     assert len(read_bytes(tmp_path / "file", 5000)) == 5000
 
 
+@pytest.mark.slow
 def test_a_process_substitution_is_a_file(arm: Path) -> None:
     code, out, err = shell("$URDFKIN check <(sleep 0.3; cat arm.urdf) && echo good", arm.parent)
     assert code == 0, err

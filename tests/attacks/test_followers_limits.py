@@ -46,6 +46,7 @@ def test_a_leader_stays_where_its_follower_keeps_its_limits(
     assert reached >= 0.4 * wanted, "the range that is left is used"
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(
     st.floats(-3.0, 3.0), st.floats(1e-3, 3.0),

@@ -180,6 +180,7 @@ def test_the_message_of_a_refused_robot_stays_short_and_counts_everything() -> N
     assert len(message) < 2_000
 
 
+@pytest.mark.slow
 def test_errors_of_another_kind_are_not_hidden_by_many_of_one() -> None:
     findings = urdfkin.check(DOUBLES.replace("</robot>", "<joint name='j' type='x'/></robot>"), fold=True)
     assert {"URDF402", "URDF501", "URDF210"} <= {finding.code for finding in findings}
@@ -213,6 +214,7 @@ def test_who_is_nearest_is_found_without_comparing_for_ever() -> None:
     assert nearest("elbwo", ["shoulder", "elbow", "wrist"]) == ["elbow"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("inside", "filling"),
     [

@@ -27,6 +27,7 @@ def quaternions(scale: float) -> list[str]:
     return [f'quat_xyzw="{words}"' for words in written]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 1e-9, 3e20])
 @pytest.mark.parametrize("version", ["1.1", "1.2"])
 def test_true_errors_of_robots_with_quaternions_are_rounding(version: str, scale: float) -> None:

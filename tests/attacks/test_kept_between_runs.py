@@ -88,6 +88,7 @@ def test_a_kernel_is_compiled_once_and_read_afterwards(folder: Path) -> None:
     assert ask(again) == 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_kernel_is_said_compiled_again_and_mended(damage: str, folder: Path) -> None:
     ask(fresh())
@@ -110,6 +111,7 @@ def test_a_kernel_that_is_whole_but_of_another_time_is_compiled_again(folder: Pa
     assert not was_compiled(fresh())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_tree_is_said_read_again_and_mended(damage: str, folder: Path) -> None:
     data = read_source("ur5").data
@@ -137,6 +139,7 @@ def no_room(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     return code
 
 
+@pytest.mark.slow
 def test_where_nothing_can_be_written_everything_goes_on_and_it_is_said_once(
     folder: Path, no_room: int
 ) -> None:

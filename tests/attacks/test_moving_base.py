@@ -60,6 +60,7 @@ def nearest_at_50_digits(M: FloatArray) -> FloatArray:
         return np.array(X.tolist(), dtype=object)
 
 
+@pytest.mark.slow
 def test_both_sides_take_the_nearest_rotation_to_rounding() -> None:
     ours, theirs = list[float](), list[float]()
     for M in orientations(60, 1):

@@ -168,6 +168,7 @@ def test_a_duration_that_is_no_time_is_refused(odd: str, robot: Robot) -> None:
         line(robot, robot.neutral(), robot.neutral(), ODD[odd], 5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("odd", [1.5, "2", True, 0, -1, None.__class__, math.nan])
 @pytest.mark.parametrize("n", [1, 3, 40])
 def test_threads_are_a_whole_number_whatever_the_batch(odd: object, n: int, robot: Robot) -> None:
@@ -175,6 +176,7 @@ def test_threads_are_a_whole_number_whatever_the_batch(odd: object, n: int, robo
         robot.jacobian(robot.sample(n), "c", threads=odd)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_many_threads_are_no_more_work_than_the_batch_and_the_processors(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -182,6 +182,7 @@ def table(name: str) -> DHTable:
     return replace(_table(), robot=name, base_frame=name, tip_frame=name, rows=rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", IN_XML)
 def test_what_was_snapped_is_told_with_names_as_words(kind: str) -> None:
     def page(name: str) -> _Elements:
@@ -232,6 +233,7 @@ def test_a_name_in_latex_is_words(kind: str) -> None:
     assert lines[0] == lines[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["numpy", "roboticstoolbox"])
 @pytest.mark.parametrize("kind", NAMES)
 def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
@@ -247,6 +249,7 @@ def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
     assert code(NAMES[kind]) == code("tame_name")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", NAMES)
 def test_c_code_is_the_same_under_any_name_and_compiles(kind: str, tmp_path: Path) -> None:
     def code(name: str) -> str:
@@ -311,6 +314,7 @@ def test_a_drawing_has_names_as_words_alone() -> None:
     assert elements(same) == elements(tame)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["J$$(x)", "$x^2$", "J$$", r"$\frac{", r"\$x$"])
 def test_dollars_in_a_name_are_no_mathematics(name: str) -> None:
     svg = etree.fromstring(drawing(table(name)).encode())

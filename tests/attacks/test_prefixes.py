@@ -98,6 +98,7 @@ def _nested(parts: list[str]) -> str:
     return f"{parts[0]}{_nested(parts[1 : cut + 1])}</{tag}>{_nested(parts[cut + 1 :])}"
 
 
+@pytest.mark.slow
 @given(st.lists(st.sampled_from(PARTS), max_size=7))
 def test_it_is_told_whenever_readers_that_know_namespaces_refuse(parts: list[str]) -> None:
     text = f'<robot name="r"><link name="base"/>{_nested(parts)}</robot>'

@@ -169,6 +169,7 @@ def _moved(d: Any) -> None:
     _joint(d)["placement"][0][3] += 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("edit", "what"), [(_turned, "axis"), (_moved, "placement")])
 def test_another_axis_or_place_is_told_as_a_change_of_the_robot(
     edit: Callable[[Any], None], what: str, tmp_path: Path

@@ -127,6 +127,7 @@ def test_no_name_acts_on_the_terminal(words: list[str], files: dict[str, str]) -
     harmless(run(files, words), words)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words", [[c, *more] for c, lists in OTHERS.items() for more in lists], ids=lambda w: ascii(" ".join(w))
 )
@@ -210,6 +211,7 @@ def on_a_terminal(words: list[str]) -> str:
     return shown.decode()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
 def test_a_terminal_of_any_encoding_shows_escapes(encoding: str, files: dict[str, str]) -> None:
     done = subprocess.run(

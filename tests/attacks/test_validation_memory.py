@@ -60,6 +60,7 @@ def test_comparing_in_blocks_changes_no_number(
     assert list(parts.tallies) == list(whole.tallies)
 
 
+@pytest.mark.slow
 def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPatch) -> None:
     sizes: list[int] = []
 
@@ -138,6 +139,7 @@ def test_processes_share_what_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
     assert memory.share() is None
 
 
+@pytest.mark.slow
 def test_what_a_robot_needs_grows_with_the_cube_of_its_rates_and_with_its_links() -> None:
     trees = [urdfkin.load(chain(n, "revolute")).tree for n in (100, 200)]
     needs = [memory.needed(tree, 28) for tree in trees]

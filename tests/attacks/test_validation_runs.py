@@ -92,6 +92,7 @@ def test_a_process_pool_of_someone_elses_can_run_the_chunks() -> None:
     assert [robot.verdict for robot in report.robots] == ["verified", "bad input"]
 
 
+@pytest.mark.slow
 def test_an_executor_has_a_bounded_number_of_chunks_at_a_time_and_all_of_them_in_the_end(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

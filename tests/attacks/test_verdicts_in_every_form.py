@@ -163,6 +163,7 @@ def test_every_form_tells_the_verdict_and_its_reason(name: str, monkeypatch: pyt
     assert ">Verified against" not in forms["html"].replace("\n", "")
 
 
+@pytest.mark.slow
 def test_a_run_that_passed_says_nothing_else_in_any_form() -> None:
     document = arms()
     assert (document["passed"], document["reason"], outcome_of(document).exit_code) == (True, None, 0)

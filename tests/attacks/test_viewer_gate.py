@@ -145,6 +145,7 @@ def test_no_client_can_have_the_viewer_published(server: Any, monkeypatch: pytes
     assert opened == []
 
 
+@pytest.mark.slow
 def test_a_viser_that_begins_its_server_in_another_way_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     """As if its next version called something else: the server runs, but not through the gate."""
     plain = SimpleNamespace(serve=websockets.asyncio.server.serve)

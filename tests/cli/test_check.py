@@ -45,6 +45,7 @@ def test_an_error_exits_1_with_its_place_and_where_to_read_on(folder: Path) -> N
     assert lines[2].startswith("'urdfkin explain URDF402'")
 
 
+@pytest.mark.slow
 def test_a_warning_exits_0_and_1_when_strict(folder: Path) -> None:
     assert urdfkin("check", "warned.urdf", cwd=folder).returncode == 0
     done = urdfkin("check", "--strict", "warned.urdf", cwd=folder)
@@ -74,6 +75,7 @@ def test_standard_input_is_a_file_like_any_other() -> None:
     assert (done.returncode, done.stdout.split(":")[0]) == (1, "<stdin>")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("style", ["json", "sarif"])
 def test_the_machine_formats_are_one_document(folder: Path, style: str) -> None:
     done = urdfkin("check", "--format", style, "bad.urdf", "good.urdf", cwd=folder)
@@ -90,6 +92,7 @@ def test_limits_can_be_lowered(folder: Path) -> None:
     assert (done.returncode, "URDF108" in done.stdout) == (1, True)
 
 
+@pytest.mark.slow
 def test_explain_prints_a_page_and_lists_all_codes() -> None:
     page = urdfkin("explain", "urdf502")
     assert page.returncode == 0

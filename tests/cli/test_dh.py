@@ -37,6 +37,7 @@ def test_the_forms_of_the_command_are_those_of_the_package() -> None:
     assert set(FORMATS) == {*EXPORTED, "urdf", "svg"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMATS)
 def test_every_form_is_written(form: str, tmp_path: Path) -> None:
     if form == "svg":

@@ -109,6 +109,7 @@ def test_a_commands_help_imports_neither_numpy_nor_pinocchio(command: str) -> No
     assert done.stdout.endswith("\n[]\n"), done.stdout[-200:]
 
 
+@pytest.mark.slow
 def test_help_is_there_at_once() -> None:
     # 0.06 s was measured; a processor that others use too is slower, but counts no more than its own time.
     assert min(_seconds() for _ in range(3)) < 0.6

@@ -47,6 +47,7 @@ def bare(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("style", ["terminal", "json", "sarif", "github"])
 def test_the_hooks_command_needs_what_the_hook_installs(style: str) -> None:
     assert "entry: urdfkin check\n" in hook()
@@ -55,6 +56,7 @@ def test_the_hooks_command_needs_what_the_hook_installs(style: str) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_so_does_the_command_that_explains_what_it_found(tmp_path: Path) -> None:
     bad = tmp_path / "bad.urdf"
     bad.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')

@@ -52,6 +52,7 @@ def test_validate_writes_every_form_at_once(tmp_path: Path) -> None:
     assert max(map(len, done.text.splitlines())) <= 80
 
 
+@pytest.mark.slow
 def test_the_judge_says_that_the_base_moved_where_it_was_told_to(tmp_path: Path) -> None:
     data, page = tmp_path / "a.json", tmp_path / "a.html"
     words = "validate", "polar", "--samples", "1", "--judge", "--judge-samples", "1", "--json", data
@@ -67,6 +68,7 @@ def test_the_judge_says_that_the_base_moved_where_it_was_told_to(tmp_path: Path)
     assert before["lines"] != after["lines"]
 
 
+@pytest.mark.slow
 def test_a_report_rendered_later_is_the_one_rendered_at_once(tmp_path: Path) -> None:
     first = [tmp_path / f"first.{ending}" for ending in ("html", "xml", "md")]
     later = [tmp_path / f"later.{ending}" for ending in ("html", "xml", "md")]
@@ -94,6 +96,7 @@ def test_report_hands_out_the_schema() -> None:
     assert json.loads(done.text)["$id"] == "urn:urdfkin:validation:1"
 
 
+@pytest.mark.slow
 def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Path, tmp_path: Path) -> None:
     done = urdfkin("compare", good, bad, "--markdown", tmp_path / "c.md")
     assert done.code == 1
@@ -106,6 +109,7 @@ def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Pa
     assert found["regressions"] == sum(change["regression"] for change in found["changes"]) > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [

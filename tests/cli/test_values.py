@@ -55,6 +55,7 @@ def command(quantity: str, n: int, reference: str, format_: str) -> bytes:
     return done.out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 3])
 @pytest.mark.parametrize("quantity", QUANTITIES)
 def test_json_csv_and_npy_give_the_librarys_numbers_to_the_last_digit(quantity: str, n: int) -> None:
@@ -90,6 +91,7 @@ def test_the_table_says_what_was_computed_checked_and_how_closely(
         assert all(name in text for name in library.load("panda").rate_names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [("jacobian",), ("acceleration", "--v", "random", "--explain")])
 @pytest.mark.parametrize("columns", [80, 200])
 def test_a_table_folds_no_name_and_is_no_wider_than_the_terminal(
@@ -113,6 +115,7 @@ def test_a_table_folds_no_name_and_is_no_wider_than_the_terminal(
         assert np.allclose(np.array(shown).T, J.data["result"][0], rtol=1e-5, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", [60, 80, 110, 200])
 @pytest.mark.parametrize("name", ["panda", "tiago_dual"])
 def test_info_folds_no_name_and_puts_each_joints_numbers_in_its_line_or_the_next(
@@ -135,6 +138,7 @@ def test_info_folds_no_name_and_puts_each_joints_numbers_in_its_line_or_the_next
             assert found[-2:] == [f"{joint.limit.lower:.6g}", f"{joint.limit.upper:.6g}"]
 
 
+@pytest.mark.slow
 def test_a_terminal_that_knows_no_lines_gets_dashes() -> None:
     done = process("info", "panda", COLUMNS="80", PYTHONIOENCODING="ascii")
     assert (done.code, done.err) == (0, "")

@@ -55,6 +55,7 @@ def _twist_exponential(twist: FloatArray) -> tuple[FloatArray, FloatArray]:
     return T[:, :3, :3], T[:, :3, 3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reference", list(Reference))
 def test_it_is_the_derivative_of_the_jacobian_along_the_motion(
     odd: KinematicTree, reference: Reference

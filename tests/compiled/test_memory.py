@@ -47,6 +47,7 @@ def outputs(robot: Robot) -> Iterator[tuple[str, tuple[int, ...], tuple[str, ...
         yield "acceleration", (6,), (reference,)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", COUNTS)
 @pytest.mark.parametrize("name", ["panda", "planar_and_floating_in_the_middle", "mimic_hand_40_sliding"])
 def test_a_batch_is_written_to_its_last_number_and_no_further(name: str, n: int) -> None:
@@ -88,6 +89,7 @@ def test_so_are_all_frames_and_each_part_of_each_thread(n: int) -> None:
         assert not (six == GUARD).any()
 
 
+@pytest.mark.slow
 def test_a_plan_comes_back_from_a_pickle_with_addresses_of_its_own() -> None:
     robot = urdfkin.load("a1", verify=False)
     links = [robot.tree.frame_link(frame) for frame in ("FR_foot", "RL_hip", "trunk")]

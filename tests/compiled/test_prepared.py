@@ -356,6 +356,7 @@ def test_threads_that_share_one_get_their_own_results() -> None:
     assert robot.certificate().lines[0].unchecked == 4 + 800
 
 
+@pytest.mark.slow
 def test_threads_that_share_one_without_the_interpreters_lock_get_right_results_or_none() -> None:
     robot = urdfkin.load("panda", verify=False)
     fast, qs = robot.prepare(FRAME), robot.sample(2, 10)

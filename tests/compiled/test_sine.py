@@ -35,12 +35,14 @@ def units_off(angles: FloatArray) -> FloatArray:
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("largest", [1e-3, 0.8, 4.0, 100.0, 1.6e6, 1e9])
 def test_sine_and_cosine_are_right_to_two_thirds_of_a_unit_in_the_last_place(largest: float) -> None:
     angles = np.random.default_rng(0).uniform(-largest, largest, 3000)
     assert np.abs(units_off(angles)).max() < 2.0 / 3.0
 
 
+@pytest.mark.slow
 def test_their_typical_error_is_that_of_rounding() -> None:
     off = units_off(np.random.default_rng(1).uniform(-np.pi, np.pi, 5000))
     assert np.sqrt(np.square(off).mean(axis=0)).max() < 1.02 / np.sqrt(12.0)

@@ -55,6 +55,7 @@ def taken_for_a_coordinate_axis(tree: KinematicTree) -> bool:
     return any(0.0 < x < 1e-10 for x in off)
 
 
+@pytest.mark.slow
 @given(trees(min_joints=1, mimics=False), st.sampled_from(["standard", "modified"]))
 @settings(max_examples=30)
 def test_urdf_to_table_to_urdf_is_one_robot_to_pinocchio(tree: KinematicTree, convention: str) -> None:
@@ -66,6 +67,7 @@ def test_urdf_to_table_to_urdf_is_one_robot_to_pinocchio(tree: KinematicTree, co
     agree(table, before, after, q)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "base", "tip"),
     [

@@ -82,6 +82,7 @@ def test_the_table_of_a_reversed_path_is_as_exact(tree: KinematicTree, conventio
     assert max(residual(table, path, configurations(len(path.joint_names)))) <= 1.0
 
 
+@pytest.mark.slow
 @given(trees(), st.sampled_from(CONVENTIONS))
 @settings(max_examples=30)
 def test_the_table_agrees_with_pinocchio(tree: KinematicTree, convention: str) -> None:

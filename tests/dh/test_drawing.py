@@ -17,6 +17,7 @@ pytest.importorskip("matplotlib")
 LINK = shift(0.3, 0.1, 0.2) @ rotation("x", 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 def test_it_is_an_svg_with_every_frame_and_joint(convention: str) -> None:
     text = drawing(dh_table(arm(LINK, LINK, LINK, kinds="RPR", tip=LINK), "tip", convention=convention))
@@ -29,6 +30,7 @@ def test_it_is_an_svg_with_every_frame_and_joint(convention: str) -> None:
     assert written.count("z") >= 4
 
 
+@pytest.mark.slow
 def test_the_same_table_gives_the_same_file() -> None:
     table = dh_table(arm(LINK, LINK), "tip")
     assert drawing(table) == drawing(table)

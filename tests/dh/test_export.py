@@ -112,6 +112,7 @@ def check(
     assert np.abs(found - theirs).max() <= 300 * EPS * (1 + table.span)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 @pytest.mark.parametrize("name", TREES)
 @pytest.mark.parametrize("run", [run_numpy, run_c, run_octave])

@@ -19,6 +19,7 @@ from urdfkin.model.tree import KinematicTree
 EPS = float(np.finfo(np.float64).eps)
 
 
+@pytest.mark.slow
 @given(trees(min_joints=1), st.sampled_from(["standard", "modified"]))
 @settings(max_examples=30)
 def test_jacobian_and_acceleration_agree_with_pinocchio(tree: KinematicTree, convention: str) -> None:

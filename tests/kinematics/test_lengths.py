@@ -50,6 +50,7 @@ def both(result: Any) -> tuple[Any, ...]:
     return result if isinstance(result, tuple) else (result,)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EQUATIONS)
 @given(data=st.data())
 @settings(max_examples=60, deadline=None)
@@ -69,6 +70,7 @@ def test_no_result_of_an_equation_is_longer_than_it_is_on_lengths(name: str, dat
         assert np.hypot.reduce(vector) <= bound * (1.0 + 8.0 * EPS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EQUATIONS)
 @given(data=st.data())
 @settings(max_examples=30, deadline=None)
@@ -91,6 +93,7 @@ def test_a_product_is_no_less_than_the_smallest_normal_number_unless_a_factor_is
         assert xy == max(x * y, SMALLEST) if x and y else xy == 0.0
 
 
+@pytest.mark.slow
 @given(trees(max_joints=6), st.integers(0, 2**32), st.sampled_from([1.0, 1e-3, 1e3, 1e-170]))
 @settings(max_examples=40, deadline=None)
 def test_no_motion_of_any_link_of_any_tree_exceeds_its_size(

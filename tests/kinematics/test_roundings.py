@@ -93,6 +93,7 @@ PARTS: dict[str, tuple[Callable[[FloatArray], Matrix], float]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PARTS)
 def test_no_part_of_a_joint_rounds_more_than_the_table_says_nor_much_less(name: str) -> None:
     part, counted = PARTS[name]
@@ -101,6 +102,7 @@ def test_no_part_of_a_joint_rounds_more_than_the_table_says_nor_much_less(name: 
     assert f" {counted} |" in table
 
 
+@pytest.mark.slow
 def test_all_of_a_joints_roundings_conspiring_are_within_the_count() -> None:
     together = PARTS["a joint of urdfkin's"][1] + PARTS["a joint of Pinocchio's"][1]
     assert together == pytest.approx(22.5)

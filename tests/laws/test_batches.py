@@ -70,6 +70,7 @@ def test_any_leading_shape_comes_back(quantity: str, shape: tuple[int, ...]) -> 
     assert shaped.dtype == np.float64
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(st.data())
 def test_q_v_a_and_base_broadcast_as_numpy_does(data: st.DataObject) -> None:
@@ -221,6 +222,7 @@ def test_threads_get_what_a_single_one_gets() -> None:
     assert set(lines.values()) == {sum(len(q) for q, _, _ in batches)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("single", ["q", "v", "a", "qv", "qa", "va"])
 def test_one_configuration_for_many_rates_is_as_if_it_had_been_repeated(single: str, threads: int) -> None:
@@ -292,6 +294,7 @@ def test_the_nearest_to_a_singularity_is_told_whichever_part_it_is_in(threads: i
     assert caught.value.distance == distances.min()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reference", list(Reference))
 def test_a_breakdown_is_the_same_by_parts_threads_and_into_an_array(reference: Reference) -> None:
     robot, n = robot_of("planar_and_floating_in_the_middle"), 2 * PART + 5

@@ -140,6 +140,7 @@ def test_frames_joined_by_fixed_joints_move_as_one_body(robot: Robot) -> None:
         assert close(robot.acceleration(q, v, a, child), acceleration)
 
 
+@pytest.mark.slow
 def test_a_moving_base_is_the_same_robot_on_a_floating_root_joint() -> None:
     for name in ("panda", "mimic_hand_40_sliding", "planar_and_floating_in_the_middle"):
         robot, free = robot_of(name), robot_of(name, root_joint="floating")

@@ -84,6 +84,7 @@ def all_frames_faults(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray)
                     yield f"{what} of {frame} {reference.name}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", [*range(1, 21), 30, 33, 64, 70])
 def test_a_chain_of_any_width(joints: int) -> None:
     robot = chain(joints)
@@ -110,12 +111,14 @@ def test_each_tip_of_a_tree_though_it_needs_only_some_of_the_coordinates(branche
         assert list(faults(robot, frame, *state(robot, LANES + 1, 4))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tree_8", "mimic_hand_40_sliding", "planar_and_floating_in_the_middle"])
 def test_each_frame_of_a_tree_is_the_same_among_all_and_by_itself(name: str) -> None:
     robot = robot_of(name)
     assert list(all_frames_faults(robot, *state(robot, LANES + 1, 5))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1e5, 1e7, 1e300])
 def test_large_angles_do_not_change_what_stands_beside_them(size: float) -> None:
     for robot in (robot_of("panda"), mixed(floating=True)):

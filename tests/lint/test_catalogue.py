@@ -22,6 +22,7 @@ def script() -> ModuleType:
     return module
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", catalogue())
 def test_no_robot_of_the_catalogue_has_an_error(robot: str) -> None:
     assert [str(finding) for finding in check(robot) if finding.severity is Severity.ERROR] == []
@@ -32,6 +33,7 @@ def test_the_missing_leaders_are_errors_when_mimic_is_asked_for() -> None:
     assert [finding.code for finding in errors] == ["URDF520"] * 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", catalogue())
 def test_no_robot_of_the_catalogue_is_unverifiable(robot: str) -> None:
     assert [str(finding) for finding in check(robot) if finding.oracle is not None] == []

@@ -44,6 +44,7 @@ def walker() -> KinematicTree:
     )
 
 
+@pytest.mark.slow
 @given(trees())
 @settings(max_examples=50)
 def test_every_path_of_a_tree_is_placed_as_pinocchio_places_it(tree: KinematicTree) -> None:
@@ -73,6 +74,7 @@ def test_a_joint_passed_backwards_has_its_axis_reversed_and_keeps_its_sign(walke
     np.testing.assert_allclose(product, np.eye(4), atol=4 * EPS)
 
 
+@pytest.mark.slow
 @given(trees(min_joints=1))
 @settings(max_examples=50)
 def test_a_chain_and_its_reverse_undo_each_other(tree: KinematicTree) -> None:
@@ -111,6 +113,7 @@ def test_interorigin_vectors_add_up_from_the_first_joint_to_the_tip(walker: Kine
     np.testing.assert_allclose(np.linalg.norm(path.axes(q), axis=-1), 1.0, atol=8 * EPS)
 
 
+@pytest.mark.slow
 @given(trees())
 @settings(max_examples=50)
 def test_the_lengths_bound_the_distance_between_origins(tree: KinematicTree) -> None:

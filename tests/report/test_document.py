@@ -33,6 +33,7 @@ def test_the_schema_is_a_schema() -> None:
     Draft202012Validator.check_schema(schema())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [arms, failing, hostile])
 def test_every_report_keeps_to_the_schema(make: Any) -> None:
     assert errors(make()) == []
@@ -64,6 +65,7 @@ def test_the_schema_describes_everything_that_is_written() -> None:
         assert [e.message for e in Draft202012Validator(strict).iter_errors(document)] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "spoil",
     [

@@ -144,6 +144,7 @@ def test_configurations_and_rates_are_those_of_pinocchios_mimic_model(robot: Rob
     assert np.abs(robot.velocity(q[0], v, f"link:{link}") - velocity).max() < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("root_joint", ["floating", "planar"])
 @pytest.mark.parametrize("name", ["panda", "ur5", "a1", "icub", "talos"])
 def test_a_root_joint_is_laid_out_as_pinocchios(name: str, root_joint: str) -> None:

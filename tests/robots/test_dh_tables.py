@@ -17,6 +17,7 @@ LENGTH_BOUND = 10.0
 robots = [pytest.param(name, marks=() if name in FAST else pytest.mark.slow) for name in examples()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 @pytest.mark.parametrize("name", robots)
 def test_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long_row(name: str, convention: str) -> None:
@@ -33,6 +34,7 @@ def test_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long_row(name: st
         assert all(max(abs(row.a), abs(row.d)) <= LENGTH_BOUND * reach for row in table.rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "base", "tip"),
     [

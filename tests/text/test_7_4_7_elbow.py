@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from tests.text.robots import close, motion, robot
 from urdfkin.dh import motion as motion_of
@@ -41,6 +42,7 @@ def test_7_109_the_upper_right_block_is_zero_and_the_lower_rows_are_the_axes() -
         assert close(J[:3, i], np.cross(Z[i], MOVING.origin(6) - MOVING.origin(i)))
 
 
+@pytest.mark.slow
 def test_7_110_moment_arms_follow_recursively_from_the_wrist() -> None:
     for i in range(6):
         assert close(arm(i), MOVING.origin(6) - MOVING.origin(i))

@@ -96,6 +96,7 @@ def test_7_70_and_7_71_recursively_it_is_that_of_the_link_before_and_the_joints_
         assert close(w[i], ELBOW.w(i))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("i", range(1, 7))
 def test_7_72_the_axis_turns_with_the_link_before_and_the_normal_with_the_link(i: int) -> None:
     row = ELBOW.rows[i - 1]
@@ -106,6 +107,7 @@ def test_7_72_the_axis_turns_with_the_link_before_and_the_normal_with_the_link(i
     assert close(whole, parts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("i", range(1, 7))
 def test_7_73_so_the_whole_interorigin_vector_turns_with_the_link(i: int) -> None:
     d_vector = array(ELBOW.between(i)(mp.mpf(0)))

@@ -63,6 +63,7 @@ def test_7_129_angular_acceleration_gains_a_term_where_a_turning_link_carries_an
     assert close(slider, POLAR.alpha(1))
 
 
+@pytest.mark.slow
 def test_7_130_linear_acceleration_of_a_rotary_chain() -> None:
     acc = np.zeros(3)
     for i in range(1, 7):

@@ -76,6 +76,7 @@ def test_angles_give_the_rotation_back_even_where_pitch_is_a_quarter_turn(R: Flo
     np.testing.assert_allclose(rotation(*rpy_of(R)), R, rtol=0, atol=6 * EPS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off", [0.0, 1e-300, 1e-17, 1e-12, 1e-9, 1e-8, 1e-7, 1e-4])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_angles_are_exact_on_the_way_into_the_gimbal_lock(off: float, sign: float) -> None:

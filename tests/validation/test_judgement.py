@@ -86,6 +86,7 @@ def test_the_rate_of_the_jacobian_is_its_difference_quotient_to_many_digits() ->
                 assert abs(x - (late - early) / (2 * step)) < 1e-25
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "root_joint"), [("ur3_gripper", None), ("anymal", "floating"), ("solo8", "planar")]
 )
@@ -96,6 +97,7 @@ def test_it_judges_followers_and_free_joints_too(name: str, root_joint: str | No
         assert line.pinocchio.worst < 40.0, line
 
 
+@pytest.mark.slow
 def test_an_error_of_sixteen_units_in_the_last_place_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     right = {line.quantity: line for line in judge(urdfkin.load("ur5"), samples=2).lines}
     original = evaluate.placements
@@ -192,6 +194,7 @@ def test_a_moving_base_is_a_floating_joint_that_moves_alike() -> None:
             assert abs(one - other[:, 6:]).max(initial=0) < 1e-40, (name, reference)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "root_joint"), [("ur3_gripper", None), ("polar", "planar")])
 def test_it_judges_a_moving_base_too(name: str, root_joint: str | None) -> None:
     robot = urdfkin.load(name, root_joint=root_joint)
@@ -275,6 +278,7 @@ def test_about_fixed_axes_the_numbers_are_those_about_turning_ones_last_row_firs
     assert (fixed[:, 3:] == turning[:, :2:-1]).all()
 
 
+@pytest.mark.slow
 def test_an_analytical_jacobian_is_judged_in_every_representation_and_an_error_of_its_own_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -58,6 +58,7 @@ def test_a_line_computes_the_joint_that_was_compared_and_not_the_link_of_its_nam
     pytest.fail("no joint was compared")
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("loaded", [False, True])
 def test_a_file_called_as_a_robot_of_the_catalogue_stays_a_file(

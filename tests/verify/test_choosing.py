@@ -96,6 +96,7 @@ BATCHES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shape", "base"), BATCHES)
 @pytest.mark.usefixtures("lies")
 def test_the_worst_sample_is_named_in_whatever_part_it_stands(
@@ -144,6 +145,7 @@ def test_the_certificate_does_not_depend_on_the_parts(
     assert found[0].verified
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("base", [None, (), (250,)])
 @pytest.mark.parametrize("size", SIZES)
 def test_of_a_large_batch_a_sample_is_checked_and_the_rest_stated(

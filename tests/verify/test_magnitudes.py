@@ -28,6 +28,7 @@ def exceed(found: FloatArray, size: FloatArray) -> bool:
     return bool((found > size * (1.0 + 100.0 * EPS) + 100.0 * EPS * (size > 0.0)).any())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moving", [False, True])
 @pytest.mark.parametrize("sizes", [(1.0, 1.0), (1e-3, 1e3), (1e3, 1e-3), (0.0, 1.0), (1.0, 0.0)])
 @pytest.mark.parametrize("subject", NAMES)

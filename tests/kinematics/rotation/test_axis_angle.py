@@ -27,11 +27,13 @@ def test_rotation_about_is_scipys_and_pinocchios(axis: FloatArray, angle: float)
     assert abs(float(determinant(R)) - 1.0) <= ROUNDING
 
 
+@pytest.mark.slow
 @given(axes, angles)
 def test_exp_is_pinocchios_exp3(axis: FloatArray, angle: float) -> None:
     assert np.abs(exp_rotation(angle * axis) - pin.exp3(angle * axis)).max() <= ROUNDING * max(1, abs(angle))
 
 
+@pytest.mark.slow
 @given(axes, angles)
 def test_log_undoes_exp_also_at_half_a_turn(axis: FloatArray, angle: float) -> None:
     R = rotation_about(axis, angle)

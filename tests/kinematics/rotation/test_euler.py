@@ -26,6 +26,7 @@ def test_there_are_twelve_turning_and_twelve_fixed_sequences() -> None:
     assert sum(name.isupper() for name in SEQUENCES) == 12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(three_angles)
@@ -34,6 +35,7 @@ def test_a_rotation_from_angles_is_scipys(name: str, turns: tuple[float, float, 
     assert np.abs(rotation_from_euler(name, turns) - expected).max() <= ROUNDING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(three_angles)

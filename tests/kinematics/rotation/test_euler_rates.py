@@ -46,6 +46,7 @@ def test_euler_rates_give_the_angular_velocity_and_back(name: str) -> None:
     assert np.abs(euler_rates(name, ANGLES, w) - RATES).max() <= 16 * ROUNDING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(st.tuples(angles, st.floats(0.2, 1.3), angles))
@@ -54,6 +55,7 @@ def test_the_closed_inverse_is_the_inverse(name: str, turns: tuple[float, float,
     assert np.abs(product - np.eye(3)).max() <= 16 * ROUNDING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(st.floats(-4.0, 4.0))

@@ -11,6 +11,7 @@ from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.rotation import conjugate, multiply, quaternion_of, rotation_about, rotation_of
 
 
+@pytest.mark.slow
 @given(axes, angles)
 def test_quaternion_and_rotation_are_each_others_inverse(axis: FloatArray, angle: float) -> None:
     R = rotation_about(axis, angle)
@@ -20,6 +21,7 @@ def test_quaternion_and_rotation_are_each_others_inverse(axis: FloatArray, angle
     assert np.abs(Rotation.from_quat(quat).as_matrix() - R).max() <= ROUNDING
 
 
+@pytest.mark.slow
 @given(axes, angles, axes, angles)
 def test_a_product_of_quaternions_is_the_product_of_rotations(
     k: FloatArray, phi: float, m: FloatArray, psi: float

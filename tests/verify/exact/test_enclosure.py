@@ -72,6 +72,7 @@ def holds(enclosure: Enclosure, true: NDArray[np.object_]) -> bool:
     return all(exact(low) <= mp.mpf(number) <= exact(high) for low, number, high in rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moves", [False, True], ids=["standing", "moving"])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_number_at_fifty_digits_lies_in_its_interval_at_any_precision(name: str, moves: bool) -> None:
@@ -102,6 +103,7 @@ def test_quaternions_in_the_file_and_joints_that_the_root_hangs_from_are_enclose
             assert holds(one, QUANTITIES[one.quantity].truth(motion, link, Reference.LOCAL)), one
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "tree_3", "tree_5", "mimic_hand_40_sliding", "deep_with_fixed"])
 def test_the_ends_are_neighbouring_doubles_unless_fewer_digits_are_asked_for(name: str) -> None:
     robot = robot_of(name)

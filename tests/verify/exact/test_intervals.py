@@ -65,6 +65,7 @@ def test_the_root_of_a_square_is_exact() -> None:
     assert true_ends(intervals(53).sqrt(intervals(53).mpf(25.0))) == (Fraction(5), Fraction(5))
 
 
+@pytest.mark.slow
 @unhurried
 @pytest.mark.parametrize("bits", BITS)
 @given(angle=st.one_of(finite, st.floats(-7.0, 7.0), st.integers(-9, 9).map(lambda k: k * math.pi / 2)))
@@ -97,6 +98,7 @@ def orthogonal_factor(M: FloatArray) -> Any:
     return X
 
 
+@pytest.mark.slow
 @unhurried
 @pytest.mark.parametrize("digits", [15, 50])
 @given(R=rotations, off=st.integers(0, 2**32 - 1).map(np.random.default_rng))
