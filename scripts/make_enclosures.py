@@ -10,7 +10,7 @@ import numpy as np
 import urdfkin
 from urdfkin.robot import Robot
 from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
-from urdfkin.verify.pinocchio import version
+from urdfkin.verify.pinocchio_module import version
 
 PAGE = Path(__file__).parents[1] / "docs" / "enclosures.md"
 #: Arms, a hand with followers, humanoids, a quadruped, a hobby arm.

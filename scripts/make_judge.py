@@ -9,7 +9,7 @@ import numpy as np
 import urdfkin
 from urdfkin.validation.judgement import Judgement, Line, judge
 from urdfkin.verify.exact.vectors import DIGITS
-from urdfkin.verify.pinocchio import version
+from urdfkin.verify.pinocchio_module import version
 from urdfkin.verify.sampling import draw_base
 
 PAGE = Path(__file__).parents[1] / "docs" / "judge.md"

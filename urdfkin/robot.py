@@ -422,6 +422,7 @@ class Robot:
         representation, nearest = word(representation, "representation"), real_number(nearest, "nearest")
         options = {"representation": representation, "nearest": nearest}
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,), **options)
+        self.verifier.ready(verify)
         if self.verifier.wanted(verify):
             nearest = max(nearest, nearest_singularity(call.plan))
         rows = 7 if representation == QUATERNION else 6
@@ -471,6 +472,7 @@ class Robot:
             The parts, with the caller's batch shape in front.
         """
         call = Call(self.tree, self.plan, word(frame, "frame"), reference, base, (q, v, a))
+        self.verifier.ready(verify)
         to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(KINDS), 6))
         flat = (self.tree, call.links[0], call.q, *call.rates, call.reference, call.state)
         parts: AccelerationBreakdown = call.compute(
@@ -667,6 +669,7 @@ class Robot:
         row = QUANTITIES[name]
         call = Call(self.tree, self.plan, frame, reference, base, inputs)
         to = call.flat(out, row.own_shape(self.nv))
+        self.verifier.ready(verify)
         flat = (call.plan, (call.q, *call.rates), call.reference)
         found = call.compute(row.ours, *flat, base=call.state, out=to, threads=threads)
         result = call.in_shape(found) if out is None else out

@@ -77,13 +77,14 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
         return
     from importlib import metadata  # noqa: PLC0415  not needed for --help
 
-    found = []
-    for package in ("urdfkin", "pin"):
-        try:
-            found.append(metadata.version(package))
-        except metadata.PackageNotFoundError:
-            found.append("not installed")
-    click.echo(f"urdfkin {found[0]}, Pinocchio {found[1]}")
+    from urdfkin.verify.pinocchio_module import pinocchio, version  # noqa: PLC0415
+
+    try:
+        own = metadata.version("urdfkin")
+    except metadata.PackageNotFoundError:
+        own = "of a checkout"
+    click.echo(f"urdfkin {own}, Pinocchio {version()}")
+    pinocchio()  # says why there is none, and what cures it
     ctx.exit()
 
 

@@ -25,7 +25,7 @@ from urdfkin.dh.to_tree import to_urdf
 from urdfkin.dh.tree_parameters import tree_parameters
 from urdfkin.errors import InputError
 from urdfkin.robot import Robot
-from urdfkin.verify.pinocchio import version
+from urdfkin.verify.pinocchio_module import version
 from urdfkin.verify.sampling import draw
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES

@@ -94,6 +94,10 @@ class OracleError(UrdfkinError):
     """Pinocchio refuses a robot, or reads another robot from the same text."""
 
 
+class InstallationError(UrdfkinError, ImportError):
+    """A library that urdfkin needs is missing, or another one goes by its name."""
+
+
 class SourceError(UrdfkinError, OSError):
     """A file that cannot be read or written."""
 

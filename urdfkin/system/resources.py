@@ -50,5 +50,5 @@ def _example_candidates() -> Iterator[Path]:
     spec = importlib.util.find_spec("pinocchio")
     if spec is not None and spec.origin is not None:
         # <prefix>/lib/python3.x/site-packages/pinocchio/__init__.py
-        yield Path(spec.origin).parents[4] / below
+        yield from (prefix / below for prefix in Path(spec.origin).parents[4:5])
     yield Path(sys.prefix) / below

@@ -26,6 +26,7 @@ from urdfkin.validation.gathering import Gathering, Progress
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.results import ValidationReport
 from urdfkin.validation.workers import Processes
+from urdfkin.verify.pinocchio_module import pinocchio
 
 
 def validate(
@@ -63,6 +64,7 @@ def validate(
 
     Raises:
         InputError: a negative number of samples, a negative seed or no job.
+        InstallationError: Pinocchio is missing, or another project goes by its name.
 
     >>> report = validate("ur5", samples=10)
     >>> report.passed, report.robots[0].failed
@@ -72,6 +74,7 @@ def validate(
     jobs, isolate = whole_number(jobs, "jobs", 1), switch(isolate, "isolate")
     many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started, begin = datetime.datetime.now(datetime.UTC), time.perf_counter()
+    pinocchio()  # before the work, not robot by robot
     subjects, unread = _subjects(many, mimic, root_joint, xacro_args)
     most = memory.share(jobs) if executor is None else None  # an executor's machines know their own
     tasks = [

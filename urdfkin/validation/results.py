@@ -20,6 +20,7 @@ from urdfkin.validation.clock import Clock
 from urdfkin.validation.outcome import Outcome, Verdict, outcome
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
 from urdfkin.validation.tally import HISTOGRAM_EDGES, Key, Tally, WorstCase
+from urdfkin.verify.pinocchio_module import version as pinocchio_version
 from urdfkin.verify.quantities import QUANTITIES
 from urdfkin.verify.replay import replay_line
 
@@ -256,8 +257,9 @@ def _named(origins: Sequence[Origin]) -> str:
 
 def versions() -> dict[str, str]:
     """What computed and what checked."""
-    packages: Sequence[str] = ("urdfkin", "pin", "numpy", "numba", "yourdfpy", "example-robot-data")
-    return {"python": platform.python_version()} | {package: _version(package) for package in packages}
+    packages: Sequence[str] = ("urdfkin", "numpy", "numba", "yourdfpy", "example-robot-data")
+    found = {package: _version(package) for package in packages}
+    return {"python": platform.python_version(), "pin": pinocchio_version()} | found
 
 
 def _version(package: str) -> str:

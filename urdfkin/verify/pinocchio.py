@@ -1,4 +1,4 @@
-"""Everything that asks Pinocchio: the only module that imports it.
+"""Everything that asks Pinocchio.
 
 The oracle reads the URDF text itself, with its own parser, so that nothing of urdfkin's reading is shared.
 Nor is anything between a user's arguments and the result: which frame a name means
@@ -13,7 +13,6 @@ q_full = G q + g_0, v_full = G v, J = J_full G.
 
 from __future__ import annotations
 
-import importlib.metadata
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -29,6 +28,7 @@ from urdfkin.verify.followers import rules_of_text
 from urdfkin.verify.pinocchio_base import BaseNumbers, free_flyer, free_flyer_rates, free_flyer_second_rates
 from urdfkin.verify.pinocchio_frames import Frames
 from urdfkin.verify.pinocchio_layout import Layout
+from urdfkin.verify.pinocchio_module import pinocchio, version
 
 __all__ = ["MOST_RATES", "Oracle", "OracleError", "version"]
 
@@ -41,11 +41,6 @@ MOST_RATES = 315
 
 #: What carries a robot whose base moves.
 _BASE = "base"
-
-
-def version() -> str:
-    """The version of Pinocchio that checks, found without importing it."""
-    return importlib.metadata.version("pin")
 
 
 class Oracle:
@@ -64,6 +59,7 @@ class Oracle:
 
     Raises:
         OracleError: Pinocchio does not accept the text, or finds other joints in it.
+        InstallationError: Pinocchio is missing, or another project goes by its name.
     """
 
     def __init__(
@@ -75,9 +71,7 @@ class Oracle:
         moving_base: bool = False,
         root_joint: str | None = None,
     ) -> None:
-        import pinocchio as pin  # noqa: PLC0415  heavy: only when something is checked
-
-        self._pin = pin
+        self._pin = pin = pinocchio()
         self._tree = tree
         self._moving_base = moving_base
         self._root_joint = root_joint

@@ -26,7 +26,8 @@ from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate, Comparison, Ledger, VerificationError, compare
 from urdfkin.verify.choosing import SAMPLE, Verify, checked_choice, parts
 from urdfkin.verify.magnitudes import magnitudes
-from urdfkin.verify.pinocchio import Oracle, OracleError, version
+from urdfkin.verify.pinocchio import Oracle, OracleError
+from urdfkin.verify.pinocchio_module import pinocchio, version
 from urdfkin.verify.quantities import Quantity
 from urdfkin.verify.replay import replay_line
 from urdfkin.verify.sampling import draw
@@ -100,6 +101,15 @@ class Verifier:
     def wanted(self, verify: Verify | None) -> Verify:
         """Which results are to be checked; None leaves it to the policy."""
         return checked_choice(self.policy if verify is None else verify)
+
+    def ready(self, verify: Verify | None) -> None:
+        """Ask for Pinocchio before the work and not after it.
+
+        Raises:
+            InstallationError: it is to check results and is missing, or another project goes by its name.
+        """
+        if self.wanted(verify) is not False and self.unverifiable is None:
+            pinocchio()
 
     def certificate(self) -> Certificate:
         """What was checked so far, how closely it agreed, by which Pinocchio, and what was not checked."""

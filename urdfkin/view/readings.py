@@ -7,7 +7,7 @@ import numpy as np
 from urdfkin.errors.printable import markdown_text
 from urdfkin.model.tree import FloatArray
 from urdfkin.motion.frame_motion import FrameMotion
-from urdfkin.verify.pinocchio import version
+from urdfkin.verify.pinocchio_module import version
 from urdfkin.view.overlays import PART_COLOURS
 
 

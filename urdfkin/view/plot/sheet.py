@@ -12,7 +12,7 @@ from urdfkin.errors import UnknownNameError
 from urdfkin.motion.frame_motion import FrameMotion
 from urdfkin.motion.trajectory import Trajectory
 from urdfkin.robot import Robot
-from urdfkin.verify.pinocchio import version
+from urdfkin.verify.pinocchio_module import version
 from urdfkin.view.figure import label, new_figure, style
 from urdfkin.view.plot.panels import PANELS
 
