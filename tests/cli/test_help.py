@@ -15,6 +15,7 @@ from tests.cli.running import process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.cli import cli, commands
 from urdfkin.system.resources import robots_dir
+from urdfkin.urdf.catalogue import catalogue
 
 #: Heavy, or needless where nothing is computed.
 HEAVY = {"numpy", "numba", "llvmlite", "pinocchio", "yourdfpy", "trimesh", "lxml", "scipy", "rich"}
@@ -133,3 +134,9 @@ def test_every_summary_and_module_is_there() -> None:
     group = click.Context(cli)
     for name in commands():
         assert isinstance(cli.get_command(group, name), click.Command)
+
+
+def test_the_families_that_the_help_names_are_those_that_exist() -> None:
+    page = " ".join(urdfkin("robots", "--help").text.split())
+    named = page.partition("Only one of: ")[2].partition(".")[0].split(", ")
+    assert named == sorted({entry.family for entry in catalogue().values()})

@@ -46,6 +46,14 @@ MISTAKES = {
     "no such option": (["jacobian", "panda", "--fram", "x"], "No such option"),
     "no such reference": (["jacobian", "panda", "--reference", "global"], "Invalid value for '--reference'"),
     "no such format": (["jacobian", "panda", "--format", "xml"], "Invalid value for '--format'"),
+    "an ending of no form": (["jacobian", "ur5", "-o", "J.mat"], "J.mat: no form has that ending"),
+    "an ending against --format": (
+        ["jacobian", "ur5", "-o", "J.npy", "--format", "json"],
+        "J.npy: --format json contradicts the ending",
+    ),
+    "a xacro argument for none": (["validate", "ur5", "--xacro-arg", "a:=1"], "--xacro-arg does nothing"),
+    "a file that is not there": (["check", "no.urdf"], "no.urdf: no such file"),
+    "no value": (["jacobian", "ur5", "--q"], "Option '--q' requires an argument"),
     "no such family": (["robots", "--family", "armchair"], "no robot of family 'armchair'; there are: "),
     "a negative seed": (["jacobian", "panda", "--seed", "-1"], "Invalid value for '--seed'"),
     "no robot": (["validate"], "name robots, or say --all"),
@@ -70,7 +78,8 @@ def test_a_mistake_gives_one_clear_message_and_exit_2(
     assert done.out == b""
     assert "Traceback" not in done.err
     lines = [line for line in done.err.splitlines() if not line.startswith("warning: joint")]
-    assert lines[0].startswith(("urdfkin: error: ", "Usage: "))
+    assert lines[0].startswith("urdfkin: error: ")
+    assert not any(line.startswith(("Usage:", "Try '", "Error:")) for line in lines), "one style"
     assert list(tmp_path.iterdir()) == []
 
 

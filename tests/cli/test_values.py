@@ -101,7 +101,7 @@ def test_a_table_folds_no_name_and_is_no_wider_than_the_terminal(
     done = urdfkin(words[0], "talos", "--frame", "gripper_left_base_link", "--q", "random:1", *words[1:])
     robot = library.load("talos")
     *lines, _ = done.text.splitlines()  # the last one is the certificate
-    assert max(map(len, lines)) <= columns
+    assert max(map(len, lines[2:])) <= columns  # text above the table is the terminal's to wrap
     path = [name for name in robot.rate_names if name.startswith(("torso", "arm_left"))]
     assert len(path) == 9
     stands = [line.split()[0] for line in lines if line.split()]
@@ -316,3 +316,37 @@ def test_a_table_is_a_robot_to_every_command() -> None:
     robot = library.load(read_table(path))
     J = robot.jacobian([0.1, 0.2, 0.3, 0.4, 0.5, 0.6], robot.tip_frame)
     assert json.loads(done.out)["result"] == [J.tolist()]
+
+
+#: Longer than any terminal's line together with what belongs to it.
+LONG = "a_joint_of_the_left_manipulator_whose_name_is_as_long_as_names_of_people_who_use_prefixes_are"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "info ROBOT", "jacobian ROBOT", "acceleration ROBOT --explain --v 1", "dh ROBOT", "dh ROBOT --tree",
+        "validate ROBOT --samples 0", "validate ROBOT elbow --samples 0",
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("columns", ["80", ""])
+def test_names_are_never_folded_and_nothing_wraps_in_a_pipe(
+    words: str, columns: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    path = tmp_path / f"{LONG}.urdf"
+    path.write_text(
+        f'<robot name="{LONG}_robot"><link name="{LONG}_base"/><link name="{LONG}_tool"/>'
+        f'<joint name="{LONG}" type="continuous"><parent link="{LONG}_base"/><child link="{LONG}_tool"/>'
+        '<origin xyz="1 0 0"/><axis xyz="0 1 0"/></joint></robot>'
+    )
+    done = urdfkin(*words.replace("ROBOT", str(path)).split())
+    assert done.code == 0, done.err
+    named = [line for line in done.text.splitlines() if "a_joint_of" in line]
+    assert named
+    assert all(line.count("a_joint_of") == line.count("prefixes_are") for line in named)
+    if words.startswith("validate"):
+        assert str(path) in done.text
+    if not columns and "info" in words:
+        assert sum("nq 1" in line and f"{LONG}_robot" in line for line in named) == 1
+        assert sum("default base" in line and f"{LONG}_tool" in line for line in named) == 1

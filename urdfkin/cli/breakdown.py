@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.door import say
-from urdfkin.cli.listing import print_named
 from urdfkin.cli.output import check_line, console, write_file
 from urdfkin.errors.printable import csv_cell, json_text
+from urdfkin.report.listing import print_named
 from urdfkin.verify.quantities import SIX
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def _print(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> None
         noise = 1e-15 * float(abs(parts.terms[k]).max(initial=0.0))
         rows = [*_rows(parts, k), ("sum", "", parts.total[k])]
         cells = ((joint, kind, *_cells(six, noise)) for joint, kind, six in rows)
-        print_named(out, _COLUMNS, cells, words=2)
+        print_named(out, _COLUMNS, cells, left=range(2))
     if len(parts.base) > _SHOWN:
         more = len(parts.base) - _SHOWN
         out.print(f"... and {more} more samples: --format csv, json or npy has them all")

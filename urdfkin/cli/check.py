@@ -82,6 +82,7 @@ def command(
     limits = Limits(max_bytes, max_depth, max_elements, max_attributes, max_name, max_number, max_markup)
     fold = style == "terminal" and not each
     findings: list[Finding] = []
+    read: list[str] = []
     unreadable: list[UrdfkinError] = []
     for file in files:
         try:
@@ -96,8 +97,9 @@ def command(
         except (SourceError, UnknownNameError, XacroError) as error:
             unreadable.append(error)
             continue
+        read.append(file)
         findings += [_judged(f, strict) for f in found if _wanted(f, ignored, no_notes)]
-    _print(findings, files, style)
+    _print(findings, read, style)
     for failure in unreadable:
         say(f"urdfkin: error: {failure}", err=True)
     failed = any(finding.severity is Severity.ERROR for finding in findings)
@@ -134,7 +136,7 @@ def _print(findings: list[Finding], files: Sequence[str], style: str) -> None:
     elif style == "github":
         if findings:
             command_lines(as_github(findings))
-    else:
+    elif files:
         _print_terminal(findings, len(files))
 
 

@@ -10,6 +10,7 @@ import traceback
 import click
 
 from urdfkin.cli import streams
+from urdfkin.cli.door import say
 from urdfkin.errors import UrdfkinError
 
 #: EX_SOFTWARE of sysexits.h.
@@ -31,8 +32,7 @@ def run(command: click.Command, name: str) -> int:
         finally:
             streams.finish()
     except click.ClickException as error:
-        error.show()
-        return error.exit_code
+        return _refuse_usage(error)
     except click.Abort:
         click.echo("urdfkin: interrupted", err=True)
         return _INTERRUPTED
@@ -47,6 +47,14 @@ def refuse(error: UrdfkinError) -> int:
     """Say an error that was raised on purpose; its exit code."""
     click.echo(f"urdfkin: error: {error}", err=True)
     return 1 if error.is_disagreement else 2
+
+
+def _refuse_usage(error: click.ClickException) -> int:
+    """Say what click refused, as everything else is said."""
+    context = getattr(error, "ctx", None)
+    page = f"; see: {context.command_path} --help" if context is not None else ""
+    say(f"urdfkin: error: {error.format_message().rstrip('.')}{page}", err=True)
+    return error.exit_code
 
 
 def crash(error: Exception) -> int:

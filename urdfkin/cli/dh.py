@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from urdfkin.cli.arguments import load_robot, robot_argument, together, verify_option
+from urdfkin.cli.endings import form_of
 from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.numbers import Number, Whole
 from urdfkin.cli.output import compiling, output_option
@@ -17,6 +18,12 @@ FORMATS = (
     *("terminal", "markdown", "latex", "csv", "json", "toml"),
     *("numpy", "matlab", "matlab-rst", "roboticstoolbox", "c", "urdf", "svg"),
 )
+
+ENDINGS = {
+    ".txt": ("terminal",), ".md": ("markdown",), ".tex": ("latex",), ".csv": ("csv",), ".json": ("json",),
+    ".toml": ("toml",), ".py": ("numpy", "roboticstoolbox"), ".m": ("matlab", "matlab-rst"), ".c": ("c",),
+    ".h": ("c",), ".urdf": ("urdf",), ".svg": ("svg",),
+}  # fmt: skip
 
 EXAMPLE = "urdfkin dh ur5 --base base --tip tool0 --snap 1e-6 --degrees --millimetres"
 
@@ -65,7 +72,12 @@ compare_options = together(
 )
 form_options = together(
     click.option(
-        "--format", "format_", type=click.Choice(FORMATS), default="terminal", show_default=True, help="Form."
+        "--format",
+        "format_",
+        type=click.Choice(FORMATS),
+        default="terminal",
+        show_default=True,
+        help="Form; a file's ending says it, too.",
     ),
     click.option("--degrees/--radians", default=False, help="Angles in what people read."),
     click.option("--millimetres/--metres", default=False, help="Lengths in what people read."),
@@ -129,6 +141,7 @@ def command(
     from urdfkin.cli.dh_work import Work, run  # noqa: PLC0415  keeps --help fast
     from urdfkin.dh.read import is_table_file  # noqa: PLC0415
 
+    options["format_"] = form_of(context, output, ENDINGS, "terminal")
     _refuse_idle(context, is_table_file(robot), options)
     loaded = load_robot(robot, mimic, root_joint, verify=verify)
     with compiling():

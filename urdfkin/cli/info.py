@@ -39,8 +39,8 @@ def command(robot: str, mimic: bool | None, root_joint: str | None, format_: str
 
 
 def _print(robot: Robot) -> None:
-    from urdfkin.cli.listing import fits, make_table, print_named  # noqa: PLC0415
     from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
+    from urdfkin.report.listing import fits, make_table, print_named  # noqa: PLC0415
 
     tree, out = robot.tree, console()
     out.print(
@@ -60,13 +60,13 @@ def _print(robot: Robot) -> None:
         for i, joint in moving
     ]
     if fits(out, _COLUMNS, rows):
-        out.print(make_table(_COLUMNS, rows, words=5))
+        out.print(make_table(_COLUMNS, rows, left=range(5)))
     else:
         short = [
             (f"{joint}: {parent} -> {child}", kind, q, *limits)
             for joint, kind, q, parent, child, *limits in rows
         ]
-        print_named(out, ["joint: parent -> child", "kind", "q", "lower", "upper"], short, words=3)
+        print_named(out, ["joint: parent -> child", "kind", "q", "lower", "upper"], short, left=range(3))
     fixed = [joint.name for joint in tree.joints if not joint.kind.nv]
     if fixed:
         out.print(f"fixed joints ({len(fixed)}): {', '.join(fixed)}")

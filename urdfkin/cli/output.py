@@ -17,10 +17,10 @@ import click
 
 from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.door import say
-from urdfkin.cli.listing import make_table, print_named
 from urdfkin.errors import SourceError
 from urdfkin.errors.numerals import whole
 from urdfkin.errors.printable import csv_cell, json_text
+from urdfkin.report.listing import make_table, print_named
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from urdfkin.verify.quantities import Quantity
 
 FORMATS = ("table", "json", "csv", "npy")
+ENDINGS = {".json": ("json",), ".csv": ("csv",), ".npy": ("npy",)}
 #: Columns beyond which a table gets no wider: padding takes memory.
 _WIDEST = 10_000
 #: How many samples of a batch a table shows.
@@ -42,13 +43,14 @@ format_option = click.option(
     type=click.Choice(FORMATS),
     default="table",
     show_default=True,
-    help="Output format.",
+    help="Output format; a file's ending says it, too.",
 )
 output_option = click.option(
     "--output",
     "-o",
     type=click.Path(path_type=Path),
-    help="Write to a file instead of standard output; a table is written as csv.",
+    callback=lambda _context, _parameter, path: None if path == Path("-") else path,
+    help="Write to a file instead of standard output, in the form of its ending.",
 )
 
 
@@ -63,18 +65,17 @@ def compiling() -> Iterator[None]:
 
 
 def console(*, err: bool = False) -> Console:
-    """A terminal 80 columns wide or as wide as it is; colours only where there is a terminal."""
+    """A terminal as wide as it is, a pipe as wide as COLUMNS says or, if it does not, as a line takes."""
     from urdfkin.cli.terminal import Terminal  # noqa: PLC0415  keeps --help fast
 
     stream = sys.stderr if err else sys.stdout
-    width = None if stream.isatty() else _columns()
-    return Terminal(stream, width=width, soft_wrap=False)
+    return Terminal(stream, width=None if stream.isatty() else _columns())
 
 
 def _columns() -> int:
     """How wide a pipe is, as COLUMNS says; a shell may leave it empty, and 0 stands for what nobody knows."""
     wanted = whole(os.environ.get("COLUMNS", "")) or 0
-    return min(wanted, _WIDEST) if wanted > 0 else 100
+    return min(wanted, _WIDEST) if wanted > 0 else _WIDEST
 
 
 def write_file(path: Path, data: bytes) -> None:
@@ -121,8 +122,6 @@ def emit(
 ) -> None:
     """Show or write (n, ...) results with their certificate."""
     certificate = inputs.robot.certificate()
-    if output == Path("-"):
-        output = None
     if format_ == "table" and output is None:
         _print_table(inputs, quantity, reference, result, certificate)
         return

@@ -20,7 +20,8 @@ from urdfkin.cli.arguments import (
     verify_option,
 )
 from urdfkin.cli.breakdown import emit_breakdown
-from urdfkin.cli.output import compiling, emit, exit_code, format_option, output_option
+from urdfkin.cli.endings import form_of
+from urdfkin.cli.output import ENDINGS, compiling, emit, exit_code, format_option, output_option
 from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
 
 _ROBOT = (
@@ -54,6 +55,7 @@ def command_of(quantity: Quantity) -> click.Command:
         reference: str = "local_world_aligned",
         explain: bool = False,
     ) -> None:
+        format_ = form_of(context, output, ENDINGS, "csv")
         loaded = load_robot(robot, mimic, root_joint, verify=verify)
         x = read_inputs(loaded, frame, seed, q, v, a)
         if explain:

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 
-from urdfkin.cli.door import say
 from urdfkin.cli.output import console
-from urdfkin.cli.reports import check_writable, report_options, write_reports
+from urdfkin.cli.reports import check_writable, report_options, say_written, write_reports
 
 EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 
@@ -44,10 +43,9 @@ def command(
     document = read_document(results)
     check_writable(html, junit, markdown)
     failed = write_reports(document, html=html, junit=junit, markdown=markdown)
-    if paths := [str(path) for path in (html, junit, markdown) if path]:
-        if not failed:
-            say(f"wrote {', '.join(paths)}")
-    else:
+    if not failed:
+        say_written(html, junit, markdown)
+    if not (html or junit or markdown):
         from urdfkin.report.terminal import print_report  # noqa: PLC0415
 
         print_report(document, console(), cases=cases)

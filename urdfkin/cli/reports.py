@@ -12,6 +12,7 @@ import click
 
 from urdfkin.cli.arguments import together
 from urdfkin.cli.crash import crash, refuse
+from urdfkin.cli.door import say
 from urdfkin.cli.output import write_file
 from urdfkin.errors import SourceError, UrdfkinError
 
@@ -60,6 +61,12 @@ def write_reports(
     forms = ((json_, _json), (html, _html), (junit, _junit), (markdown, _markdown))
     codes = (_written(path, form, document) for path, form in forms if path is not None)
     return next(filter(None, list(codes)), 0)
+
+
+def say_written(*paths: Path | None) -> None:
+    """Name the files that were written, if any."""
+    if named := [str(path) for path in paths if path]:
+        say(f"wrote {', '.join(named)}")
 
 
 def _written(path: Path, form: Callable[[Document], bytes], document: Document) -> int:

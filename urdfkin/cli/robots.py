@@ -10,10 +10,11 @@ import click
 from urdfkin.urdf.catalogue import Entry, catalogue
 
 EXAMPLE = "urdfkin robots --family arm"
+_FAMILIES = sorted({entry.family for entry in catalogue().values()})
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")
-@click.option("--family", metavar="NAME", help="Only arms, hands, humanoids, quadrupeds, ...")
+@click.option("--family", metavar="NAME", help=f"Only one of: {', '.join(_FAMILIES)}.")
 @click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
 def command(family: str | None, format_: str) -> None:
     """Robots that can be called by a short name.
@@ -23,18 +24,17 @@ def command(family: str | None, format_: str) -> None:
     """
     entries = [entry for entry in catalogue().values() if family in (None, entry.family)]
     if not entries:
-        families = sorted({entry.family for entry in catalogue().values()})
-        raise click.UsageError(f"no robot of family {family!r}; there are: {', '.join(families)}")
+        raise click.UsageError(f"no robot of family {family!r}; there are: {', '.join(_FAMILIES)}")
     if format_ == "json":
         json.dump([_as_dict(entry) for entry in entries], sys.stdout, indent=2)
         click.echo()
         return
-    from urdfkin.cli.listing import print_named  # noqa: PLC0415
     from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
+    from urdfkin.report.listing import print_named  # noqa: PLC0415
 
     rows = ((entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries)
     out = console()
-    print_named(out, ["name", "family", "base", "tip"], rows, words=4)
+    print_named(out, ["name", "family", "base", "tip"], rows, left=range(4))
     out.print(f"{len(entries)} robots")
     for entry in entries:
         if entry.reason:

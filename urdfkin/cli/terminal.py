@@ -19,5 +19,6 @@ class Terminal(Console):
         door.styled = self.is_terminal
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """As rich does; tables bring their own cells."""
+        """As rich does; tables bring their own cells. Text is never wrapped: what is copied stays whole."""
+        options = {"soft_wrap": all(isinstance(o, str) for o in objects)} | options
         super().print(*(printable(o) if isinstance(o, str) else o for o in objects), **options)

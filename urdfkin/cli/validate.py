@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, cast
 import click
 
 from urdfkin.cli.arguments import xacro_args, xacro_option
+from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.judgement import judge_all
 from urdfkin.cli.numbers import Whole
 from urdfkin.cli.output import compiling, console
-from urdfkin.cli.reports import check_writable, report_options, write_reports
+from urdfkin.cli.reports import check_writable, report_options, say_written, write_reports
 from urdfkin.cli.stopping import stoppable
 from urdfkin.errors.printable import printable
 from urdfkin.urdf.catalogue import examples
@@ -78,10 +79,13 @@ def command(
         raise click.UsageError("name robots, or say --all for the whole catalogue")
     from urdfkin.report.document import Document  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.terminal import print_report  # noqa: PLC0415
+    from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415
     from urdfkin.validation.campaign import validate  # noqa: PLC0415
 
     check_writable(json_, html, junit, markdown)
     how: dict[str, Any] = {"mimic": mimic, "root_joint": root_joint, "xacro_args": xacro_args()}
+    if xacro_args() and not any(map(is_xacro, robots)):
+        refuse_idle(context, ("xacro_arg",), "without a .xacro file")
     given = [_once(robot, how) if judged else robot for robot in robots or examples()]
     with stoppable() as stop, compiling(), _progress() as progress:
         report = validate(
@@ -98,6 +102,8 @@ def command(
     document = cast("Document", report.as_dict())
     written = write_reports(document, json_=json_, html=html, junit=junit, markdown=markdown)
     print_report(document, console(), cases=cases)
+    if not written:
+        say_written(json_, html, junit, markdown)
     context.exit(stop.exit_code(report.exit_code) or written)
 
 

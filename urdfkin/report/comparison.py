@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from urdfkin.errors.printable import markdown_text as text
 from urdfkin.report.compare import Change, Comparison, figures
 from urdfkin.report.document import Document, Units
+from urdfkin.report.listing import print_named
 from urdfkin.report.markdown import LIMIT, shortened
-from urdfkin.report.terminal import plain_table
 from urdfkin.report.words import counted, quantity_name, summary, units
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def print_comparison(old: Document, new: Document, found: Comparison, out: Conso
         out.print(f"{title}: {document['started']}, {summary(document)}")
     heads = ["worst, eps*scale", "old", "new"]
     rows = [[quantity_name(name), _cell(a), _cell(b)] for name, a, b in figures(old, new)]
-    out.print(plain_table(heads, rows, words=(0,)))
+    print_named(out, heads, rows)
     for change in sorted(found.changes, key=lambda change: not change.regression):
         mark = "REGRESSION " if change.regression else ""
         out.print(f"{mark}{change}", style="bold red" if change.regression else "")

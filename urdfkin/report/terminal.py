@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from urdfkin.errors.printable import printable
 from urdfkin.report.document import Check, Document, Judgement, Robot, outcome_of
+from urdfkin.report.listing import print_named
 from urdfkin.report.words import (
     SIDES,
     check_name,
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 #: From this width on a column for each quantity fits beside the robots.
 _WIDE = 100
-_ROBOT_WIDTH = 20
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
@@ -50,16 +50,17 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
         style="bold",
     )
     if len(robots) == 1 and robots[0]["checks"]:
-        out.print(_checks(robots[0]))
+        _print_checks(robots[0], out)
     elif out.width >= _WIDE:
-        out.print(_wide(robots))
+        _print_wide(robots, out)
     else:
-        out.print(_robots(robots))
-        out.print(_quantities(robots))
+        _print_robots(robots, out)
+        _print_quantities(robots, out)
     for robot in robots:
         _print_robot(robot, out, cases=cases)
     found = outcome_of(document)
-    out.print(summary(document), style="bold green" if found.passed else "bold red")
+    passed = "verified: " if found.passed else ""
+    out.print(passed + summary(document), style="bold green" if found.passed else "bold red")
     if found.reason:
         out.print(f"not passed: {found.reason}", style="bold red")
 
@@ -72,10 +73,7 @@ def plain_table(heads: Sequence[str], rows: Iterable[Sequence[str]], words: Sequ
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
     for i, head in enumerate(heads):  # a head may have two lines
         left = i in words
-        width = _ROBOT_WIDTH if i == 0 and len(words) > 1 else None
-        table.add_column(
-            head, justify="left" if left else "right", overflow="fold", max_width=width, vertical="top"
-        )
+        table.add_column(head, justify="left" if left else "right", overflow="fold", vertical="top")
     for row in rows:
         table.add_row(*map(printable, row))
     return table
@@ -85,17 +83,17 @@ def _counts(robot: Robot) -> list[str]:
     return [robot["source"], str(len(robot["joints"])), str(len(robot["frames"])), f"{robot['results']:,}"]
 
 
-def _wide(robots: Sequence[Robot]) -> Table:
+def _print_wide(robots: Sequence[Robot], out: Console) -> None:
     quantities_of = columns(robots)
     heads = ["robot", "joints", "frames", "results", *quantities_of, "verdict"]
     rows = (
         [*_counts(robot), *(worst_of(robot, names) for names in quantities_of.values()), robot["verdict"]]
         for robot in robots
     )
-    return plain_table(heads, rows, words=(0, len(heads) - 1))
+    print_named(out, heads, rows, left=(0, len(heads) - 1))
 
 
-def _robots(robots: Sequence[Robot]) -> Table:
+def _print_robots(robots: Sequence[Robot], out: Console) -> None:
     heads = ["robot", "joints", "frames", "results", "worst", "of bound", "verdict"]
     rows = (
         [
@@ -106,10 +104,10 @@ def _robots(robots: Sequence[Robot]) -> Table:
         ]
         for robot in robots
     )
-    return plain_table(heads, rows, words=(0, 6))
+    print_named(out, heads, rows, left=(0, 6))
 
 
-def _quantities(robots: Sequence[Robot]) -> Table:
+def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
     """One row a quantity, over all robots."""
     rows = []
     for name in quantities(robots):
@@ -121,7 +119,7 @@ def _quantities(robots: Sequence[Robot]) -> Table:
             if any(check["worst"] == largest for check in of_quantity(robot, name))
         )
         rows.append([quantity_name(name), *_figures(checks), where])
-    return plain_table(["quantity", "results", "worst", "of bound", "robot"], rows, words=(0, 4))
+    print_named(out, ["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4))
 
 
 def _figures(checks: Sequence[Check]) -> list[str]:
@@ -132,9 +130,9 @@ def _figures(checks: Sequence[Check]) -> list[str]:
     ]
 
 
-def _checks(robot: Robot) -> Table:
+def _print_checks(robot: Robot, out: Console) -> None:
     """One robot: a row for each quantity and reference."""
-    heads = [printable(robot["source"]), "results", "outside", "median", "99 %", "worst", "of bound"]
+    heads = ["quantity, reference", "results", "outside", "median", "99 %", "worst", "of bound"]
     rows = (
         [
             check_name(check),
@@ -147,7 +145,8 @@ def _checks(robot: Robot) -> Table:
         ]
         for check in in_order(robot)
     )
-    return plain_table(heads, rows, words=(0,))
+    out.print(robot["source"], style="bold")
+    print_named(out, heads, rows)
 
 
 def _judged(judgement: Judgement) -> Table:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING, Literal
 
 from urdfkin.errors.printable import printable
@@ -12,8 +12,10 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-def make_table(columns: Sequence[str], rows: Iterable[Sequence[str | float]], *, words: int = 1) -> Table:
-    """A plain table: the first `words` columns left, the others right, numbers at six digits.
+def make_table(
+    columns: Sequence[str], rows: Iterable[Sequence[str | float]], *, left: Collection[int] = (0,)
+) -> Table:
+    """A plain table: the columns in `left` on the left, the others on the right, numbers at six digits.
 
     What is below rounding of the table's largest number is shown as 0: full precision is for machines.
     """
@@ -22,15 +24,19 @@ def make_table(columns: Sequence[str], rows: Iterable[Sequence[str | float]], *,
 
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, header_style="bold")
     for i, column in enumerate(columns):
-        justify: Literal["left", "right"] = "left" if i < words else "right"
-        table.add_column(column, justify=justify, overflow="fold", no_wrap=i >= words)
+        justify: Literal["left", "right"] = "left" if i in left else "right"
+        table.add_column(column, justify=justify, overflow="fold", no_wrap=i not in left)
     for row in _texts(rows):
         table.add_row(*row)
     return table
 
 
 def print_named(
-    out: Console, columns: Sequence[str], rows: Iterable[Sequence[str | float]], *, words: int = 1
+    out: Console,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[str | float]],
+    *,
+    left: Collection[int] = (0,),
 ) -> None:
     """A table like `make_table`'s whose first column holds names, which are never folded.
 
@@ -42,7 +48,7 @@ def print_named(
     texts = _texts(rows)
     widths = _widths(columns, texts)
     if fits(out, columns, texts):
-        out.print(make_table(columns, texts, words=words))
+        out.print(make_table(columns, texts, left=left))
         return
     room = max(2, out.width - 1 - sum(width + 1 for width in widths[1:]))
 
@@ -55,7 +61,7 @@ def print_named(
 
     def padded(i: int, cell: str, width: int) -> str:
         gap = " " * (width - cell_len(cell))
-        return cell + gap if i < words else gap + cell
+        return cell + gap if i in left else gap + cell
 
     show(columns, "bold")
     out.print(("-" if out.options.ascii_only else "\u2500") * out.width)
