@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from urllib.request import urlopen
 
@@ -15,9 +15,11 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.report.browser import opened, require_chromium
+from tests.report.browser import Browser, opened, require_chromium
 from urdfkin.errors import InputError
+from urdfkin.view.opening import opened_page
 from urdfkin.view.server import new_server
+from urdfkin.view.sliders import coordinate_rows, read, within_limits
 from urdfkin.view.viewer import Viewer
 
 viser = pytest.importorskip("viser")
@@ -47,20 +49,104 @@ def test_it_answers_on_loopback_and_nowhere_else(viewer: Viewer) -> None:
             socket.create_connection((own, port), timeout=2).close()
 
 
-def test_sliders_move_the_robot_and_the_numbers_are_checked(viewer: Viewer) -> None:
-    viewer.set_q(viewer.robot.neutral())
-    at, slider = viewer.sliders[1]
-    slider.value = -0.7
-    viewer._read()
-    assert viewer.q[at] == -0.7
+def test_a_slider_moves_its_own_joint_and_the_numbers_are_checked(viewer: Viewer) -> None:
+    viewer.set_q(viewer.robot.sample(1, 5)[0])
+    before = viewer.q
+    viewer.sliders.handles[1].value = -0.7
+    assert viewer.q[1] == -0.7
+    np.testing.assert_array_equal(np.delete(viewer.q, 1), np.delete(before, 1))
     expected = viewer.robot.placement(viewer.q, viewer.frame.value)
     np.testing.assert_array_equal(viewer.motion.placement[0], expected)
     assert viewer.motion.agrees
     assert "verified" in viewer.words.content
 
 
+def shown(viewer: Viewer) -> list[float]:
+    scale = np.pi / 180.0 if viewer.units.value == "degrees" else 1.0
+    return [
+        handle.value * (scale if row.turns else 1.0)
+        for row, handle in zip(viewer.sliders.rows, viewer.sliders.handles, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("units", ["radians", "degrees"])
+def test_every_slider_equals_q_however_q_was_set(viewer: Viewer, units: str) -> None:
+    viewer.units.value = units
+    for seed in range(3):
+        q = viewer.robot.sample(1, seed)[0]
+        viewer.set_q(q)
+        np.testing.assert_array_equal(viewer.q, q)
+        np.testing.assert_allclose(shown(viewer), q, rtol=1e-15)
+        viewer.sliders.handles[seed].value = 0.25
+        np.testing.assert_allclose(shown(viewer), viewer.q, rtol=1e-15)
+        assert read(viewer.words_of_q.value, viewer.robot.coordinate_names).tolist() == viewer.q.tolist()
+    far = np.full(viewer.robot.nq, 7.0)  # beyond every limit of a UR5
+    viewer.set_q(far)
+    np.testing.assert_allclose(shown(viewer), far, rtol=1e-15)
+    viewer.units.value = "radians"
+
+
+def test_a_slider_ends_where_its_joint_does() -> None:
+    robot = urdfkin.load("panda")
+    rows = {row.name: row for row in coordinate_rows(robot)}
+    limit = robot.tree.joints[[joint.name for joint in robot.tree.joints].index("panda_joint4")].limit
+    assert limit is not None
+    assert (rows["panda_joint4"].lower, rows["panda_joint4"].upper) == (limit.lower, limit.upper)
+    assert within_limits(robot, robot.neutral())[3] == limit.upper < 0.0
+    assert [row.name for row in coordinate_rows(urdfkin.load("ur5", root_joint="floating"))][:4] == [
+        "root_joint.x", "root_joint.y", "root_joint.z", "shoulder_pan_joint",
+    ]  # fmt: skip
+
+
+def test_each_joint_has_a_rate_of_its_own(viewer: Viewer) -> None:
+    viewer.set_rates(np.zeros(6), np.zeros(6))
+    viewer.rates.handles[2].value = 0.5
+    viewer.second_rates.handles[0].value = -1.0
+    assert viewer.v.tolist() == [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
+    assert viewer.a.tolist() == [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    expected = viewer.robot.acceleration(viewer.q, viewer.v, viewer.a, viewer.frame.value)
+    np.testing.assert_array_equal(viewer.motion.acceleration[0], expected)
+    viewer.set_rates(np.zeros(6), np.zeros(6))
+
+
+def test_tables_frames_are_seen_through_the_shapes(viewer: Viewer) -> None:
+    viewer.dh.value = "modified"
+    assert viewer.shapes.value == "see-through"
+    assert all(not handle.visible for _, handle in viewer.stage._shapes)
+    assert len(viewer.stage._ghosts) == len(viewer.stage._shapes) > 0
+    assert all(handle.visible and handle.opacity < 0.5 for handle in viewer.stage._ghosts)
+    viewer.dh.value = "none"
+    assert viewer.shapes.value == "solid"
+    assert all(handle.visible for _, handle in viewer.stage._shapes)
+
+
+@pytest.mark.parametrize(("kind", "name"), [("links", "wrist_1_link"), ("joints", "elbow_joint")])
+def test_names_stand_beside_the_frames(viewer: Viewer, kind: str, name: str) -> None:
+    viewer.names.value = kind
+    labels = [handle for handles in viewer.stage._labels.values() for handle in handles if handle.visible]
+    assert name in [handle.text for handle in labels]
+    viewer.names.value = "none"
+    assert not any(handle.visible for handles in viewer.stage._labels.values() for handle in handles)
+
+
+def test_the_browser_is_started_with_a_file_that_nobody_else_can_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr("webbrowser.open", asked.append)
+    address = "http://127.0.0.1:8080/the-key/"
+    with opened_page(address):
+        (url,) = asked
+        assert "the-key" not in url
+        page = Path(url.removeprefix("file://"))
+        assert address in page.read_text()
+        assert page.parent.stat().st_mode & 0o077 == 0
+    assert not page.exists()
+
+
 def test_every_overlay_can_be_shown_in_every_reference(viewer: Viewer) -> None:
-    viewer.speed.value, viewer.push.value, viewer.parts.value = 1.0, 0.5, True
+    viewer.set_rates(np.ones(6), np.full(6, 0.5))
+    viewer.parts.value = True
     for reference in ("local", "world", "local_world_aligned"):
         for what in ("linear", "angular", "none"):
             viewer.reference.value, viewer.columns.value, viewer.ellipsoid.value = reference, what, what
@@ -118,6 +204,64 @@ def test_a_browser_draws_it_without_errors_and_without_asking_elsewhere(
         assert [url for url in elsewhere if not url.startswith("ws://127.0.0.1")] == []
         # Viser's sorter of splats, which are not drawn here, makes functions of strings: the policy refuses.
         assert [error for error in browser.errors() if "EvalError" not in error] == []
+
+
+_PRESS = "[...document.querySelectorAll('button')].find((b) => b.innerText == arguments[0]).click()"
+_EDGES = """return [...document.querySelectorAll('[role=slider]')].map((thumb) => {
+  const box = thumb.getBoundingClientRect();
+  return [box.left, box.right];
+})"""
+
+
+def _sliders(browser: Browser, count: int) -> list[float]:
+    code = "return [...document.querySelectorAll('[role=slider]')].map((s) => +s.ariaValueNow)"
+    values: list[float] = browser.js(code)
+    return values[:count]
+
+
+def _until(holds: Callable[[], bool]) -> bool:
+    for _ in range(60):
+        if holds():
+            return True
+        time.sleep(0.25)
+    return False
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [1280, 390])
+def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(tmp_path: Path, width: int) -> None:
+    require_chromium()
+    server = new_server(port=free_port())
+    try:
+        viewer = Viewer(server, urdfkin.load("panda"))
+        n = len(viewer.sliders.rows)
+
+        def equal() -> bool:
+            shown = _sliders(browser, n)
+            return len(shown) == n and bool(np.allclose(shown, viewer.q, rtol=0.0, atol=1e-12))
+
+        with opened(tmp_path, width=width, height=844) as browser:
+            browser.chrome.get(server.address)
+            assert _until(equal)
+            viewer.set_q(viewer.robot.sample(1, 3)[0])
+            assert _until(equal)
+            for label in ("random", "neutral, within the limits", "random"):
+                before = viewer.q.copy()
+                browser.js(_PRESS, label)
+                assert _until(lambda before=before: bool((viewer.q != before).any())), label  # type: ignore[misc]
+                assert _until(equal), label
+            before = viewer.q.copy()
+            thumb = browser.chrome.find_elements("css selector", "[role=slider]")[4]
+            thumb.send_keys("\ue014")  # one step to the right
+            assert _until(lambda: viewer.q[4] != before[4])
+            assert (np.delete(viewer.q, 4) == np.delete(before, 4)).all(), "the others stay, to the bit"
+            assert _until(equal)
+            # On a telephone, too, nothing lies beyond the edge.
+            assert all(0 <= left < right <= width for left, right in browser.js(_EDGES)[:n])
+            browser.screenshot(f"viewer-{width}")
+    finally:
+        server.stop()
 
 
 @pytest.mark.slow

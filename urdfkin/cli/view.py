@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import sys
+from contextlib import nullcontext
 
 import click
 
-from urdfkin.cli.arguments import load_robot, robot_argument
+from urdfkin.cli.arguments import load_robot, q_option, read_inputs, robot_argument, seed_option
 from urdfkin.cli.door import say
 from urdfkin.cli.numbers import Whole
 from urdfkin.cli.output import compiling
+from urdfkin.errors import InputError
 
-EXAMPLE = "urdfkin view panda"
+EXAMPLE = "urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04"
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")
@@ -22,26 +24,44 @@ EXAMPLE = "urdfkin view panda"
     show_default=True,
     help="Whom to listen to: this machine alone, or 0.0.0.0 for the whole network.",
 )
+@q_option
+@seed_option
+@click.option("--browser/--no-browser", default=None, help="Whether to open it.  [default: on a screen]")
 @click.option("--port", type=Whole(1, 65535), default=8080, show_default=True)
-def command(robot: str, mimic: bool | None, root_joint: str | None, host: str, port: int) -> None:
-    """Show a robot in a browser tab: meshes, sliders, frames, DH frames, velocity and acceleration arrows.
+def command(
+    robot: str,
+    mimic: bool | None,
+    root_joint: str | None,
+    q: str,
+    seed: int,
+    host: str,
+    port: int,
+    browser: bool | None,
+) -> None:
+    """Show a robot in a browser tab: sliders, shapes, frames, DH frames, velocity and acceleration arrows.
 
-    The numbers of the chosen frame are checked by Pinocchio as the robot moves. Needs the extra
-    `urdfkin[view]`. Press Ctrl-C to end it.
+    It begins at --q, or in the neutral configuration, moved to within the limits. The numbers of the chosen
+    frame are checked by Pinocchio as the robot moves. Needs the extra `urdfkin[view]`. Ctrl-C ends it.
 
     The address that is printed holds a key: open it as it stands, and show it to nobody who should not see
     or move the robot. Other pages and other users of this machine are refused.
     """
+    from urdfkin.view.opening import has_screen, opened_page  # noqa: PLC0415
     from urdfkin.view.server import new_server  # noqa: PLC0415  keeps --help fast
     from urdfkin.view.viewer import Viewer  # noqa: PLC0415
 
     loaded = load_robot(robot, mimic, root_joint)
+    begin = None if q == "neutral" else read_inputs(loaded, None, seed, q).q
+    if begin is not None and len(begin) != 1:
+        raise InputError("the viewer begins at one configuration", where="--q", found=str(len(begin)))
     server = new_server(host, port)
     with compiling():
-        Viewer(server, loaded)
+        Viewer(server, loaded, None if begin is None else begin[0])
     try:
         say(f"{loaded.name}: {server.address}")
         sys.stdout.flush()  # whoever reads a pipe wants the address now
-        server.sleep_forever()
+        wanted = sys.stdout.isatty() and has_screen() if browser is None else browser
+        with opened_page(server.address) if wanted else nullcontext():
+            server.sleep_forever()
     except KeyboardInterrupt:
         server.stop()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from urdfkin.dh.table import DHTable
+from urdfkin.errors.printable import printable
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.view.meshes import mesh
@@ -14,6 +16,12 @@ from urdfkin.view.overlays import Arrows, Ellipsoid, scalar_first
 from urdfkin.view.shapes import GREY, Shape, shapes
 
 _BONE, _TURN, _SLIDE = (142, 153, 168), (47, 111, 208), (208, 122, 28)
+#: How the shapes can be seen, and which names stand beside the frames.
+SOLID, SEE_THROUGH = "solid", "see-through"
+SHAPES = (SOLID, SEE_THROUGH, "hidden")
+NAMES = ("none", "links", "joints")
+#: How much of what lies behind a shape that is seen through it hides.
+_THIN = 0.3
 _NORMAL, _OFFSET = (194, 52, 139), (22, 128, 138)
 
 
@@ -35,9 +43,10 @@ class Stage:
             "/floor", width=3 * self.reach, height=3 * self.reach, cell_size=self.reach / 5,
             position=(0.0, 0.0, min(0.0, float(Ts[:, 2, 3].min()))),
         )  # fmt: skip
-        middle = 0.5 * (Ts[:, :3, 3].max(axis=0) + Ts[:, :3, 3].min(axis=0))
-        server.initial_camera.position = middle + self.reach * np.array([1.1, -1.3, 0.6])
-        server.initial_camera.look_at = middle
+        self._middle = 0.5 * (Ts[:, :3, 3].max(axis=0) + Ts[:, :3, 3].min(axis=0))
+        self._camera = self._middle + self.reach * np.array([1.1, -1.3, 0.6])
+        server.initial_camera.position, server.initial_camera.look_at = self._camera, self._middle
+        server.on_client_connect(self._look)
         self._links = [self._scene.add_frame(f"/robot/{i}", show_axes=False) for i in range(len(tree.links))]
         self._axes = self._scene.add_batched_axes(
             "/axes",
@@ -47,11 +56,13 @@ class Stage:
             axes_radius=0.0015 * self.reach,
             visible=False,
         )
+        self._labels = {kind: self._add_names(kind, tree) for kind in NAMES[1:]}
         self._skeleton: list[Any] = []
-        self._shapes: list[Any] = []
+        self._shapes: list[tuple[Shape, Any]] = []
+        self._ghosts: list[Any] = []
         bare = self._add_shapes(tree)
         self._add_skeleton(tree, Ts)
-        self.show(shapes=True, skeleton=bare, axes=False)
+        self.show(shapes=SOLID, skeleton=bare, axes=False, names=NAMES[0])
         self._dh: list[Any] = []
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
@@ -62,7 +73,7 @@ class Stage:
             if handle is None:
                 self.missing.append(shape)
             else:
-                self._shapes.append(handle)
+                self._shapes.append((shape, handle))
         return not self._shapes or bool(self.missing)
 
     def _add_shape(self, name: str, shape: Shape) -> Any | None:
@@ -105,11 +116,60 @@ class Stage:
                     )
                 )
 
-    def show(self, *, shapes: bool, skeleton: bool, axes: bool) -> None:
-        """Which parts are seen."""
+    def _add_names(self, kind: str, tree: KinematicTree) -> list[Any]:
+        """Names of links, or of the joints that move, each where its frame is."""
+        of_joints = [joint.name if joint.kind.nv else "" for joint in tree.joints]
+        words = tree.links if kind == "links" else ("", *of_joints)
+        return [
+            self._scene.add_label(
+                f"/robot/{i}/{kind}",
+                printable(word),
+                font_screen_scale=0.7,
+                anchor="bottom-left",
+                visible=False,
+            )
+            for i, word in enumerate(words)
+            if word
+        ]
+
+    def _add_ghosts(self) -> list[Any]:
+        """The shapes once more, to be seen through: made when somebody first asks for them."""
+        ghosts = []
+        for shape, solid in self._shapes:
+            name = f"{solid.name}-ghost"
+            if shape.kind != "mesh":
+                ghosts.append(self._add_shape(name, replace(shape, colour=(*GREY[:3], _THIN))))
+            elif (whole := mesh(shape)) is not None:
+                look = {"color": tuple(round(255 * x) for x in GREY[:3]), "opacity": _THIN}
+                ghosts.append(self._scene.add_mesh_simple(name, whole.vertices, whole.faces, **look))
+        return ghosts
+
+    def look(self) -> None:
+        """Everybody looks from where they began."""
+        for client in self._server.get_clients().values():
+            self._look(client)
+
+    def _look(self, client: Any) -> None:
+        """Past the panel, which covers the lower half of a telephone."""
+        down = np.zeros(3)
+        if client.camera.aspect < 1.0:
+            down[2] = -0.35 * float(np.linalg.norm(self._camera - self._middle))
+        with client.atomic():
+            client.camera.up_direction = (0.0, 0.0, 1.0)
+            client.camera.position, client.camera.look_at = self._camera + down, self._middle + down
+
+    def show(self, *, shapes: str, skeleton: bool, axes: bool, names: str) -> None:
+        """Which parts are seen: `shapes` is one of `SHAPES`, `names` one of `NAMES`."""
         self.skeleton_shown = skeleton
-        for handle in self._shapes:
-            handle.visible = shapes
+        if shapes == SEE_THROUGH and not self._ghosts:
+            self._ghosts = self._add_ghosts()
+        for _, handle in self._shapes:
+            handle.visible = shapes == SOLID
+        for handle in self._ghosts:
+            handle.visible = shapes == SEE_THROUGH
+        for kind, labels in self._labels.items():
+            for handle in labels:
+                handle.visible = names == kind
         for handle in self._skeleton:
             handle.visible = skeleton
         self._axes.visible = axes

@@ -6,6 +6,7 @@ import threading
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
@@ -17,7 +18,8 @@ from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.robot import Robot
 from urdfkin.view.overlays import acceleration_arrows, jacobian_arrows, velocity_ellipsoid
 from urdfkin.view.readings import legend, numbers
-from urdfkin.view.stage import Stage
+from urdfkin.view.sliders import Sliders, coordinate_rows, rate_rows, read, within_limits, written
+from urdfkin.view.stage import NAMES, SEE_THROUGH, SHAPES, SOLID, Stage
 
 _REFERENCES = tuple(reference.name.lower() for reference in Reference)
 
@@ -25,106 +27,167 @@ _REFERENCES = tuple(reference.name.lower() for reference in Reference)
 class Viewer:
     """A robot in a browser tab.
 
+    Args:
+        server: Of `urdfkin.view.server.new_server`.
+        robot: What to show.
+        q: (nq,) where it begins; None: the neutral configuration, moved to within the limits.
+
     Attributes:
         q: (nq,) what the sliders say.
+        v: (nv,) its rate.
+        a: (nv,) the rate's rate.
         motion: The chosen frame's motion in the chosen reference, checked.
     """
 
-    def __init__(self, server: Any, robot: Robot) -> None:
+    def __init__(self, server: Any, robot: Robot, q: ArrayLike | None = None) -> None:
         self.server, self.robot = server, robot
         self.stage = Stage(server, robot)
-        self.q = robot.neutral()
-        self._direction = np.ones((2, robot.nv))
+        self._start = within_limits(robot, robot.neutral())
+        self.q = self._start if q is None else checked(robot.tree, q, "q").copy()
+        self.v, self.a = np.zeros(robot.nv), np.zeros(robot.nv)
         self._rng = np.random.default_rng(0)
         self._table: DHTable | None = None
         self._lock = threading.RLock()
         self._build()
+        self._say_q()
         self.update()
 
     # -- controls ------------------------------------------------------------------------------------
 
     def _build(self) -> None:
-        gui = self.server.gui
+        gui, robot = self.server.gui, self.robot
         gui.configure_theme(show_share_button=False, control_width="large")
-        self.words = gui.add_markdown("")
+        joints = gui.add_folder("Joints")
+        with joints:
+            self.units = gui.add_dropdown("angles", ("radians", "degrees"))
+        self.sliders = Sliders(gui, joints, coordinate_rows(robot), "", self._move)
+        self.sliders.build(self.q, degrees=False)
+        with joints:
+            self.words_of_q = gui.add_text("q, to copy or type", "", hint="In rad and m, as --q takes it.")
+            self.wrong = gui.add_markdown("")
+            neutral, random = gui.add_button("neutral, within the limits"), gui.add_button("random")
         with gui.add_folder("Frame"):
-            self.frame = gui.add_dropdown("frame", self.robot.frame_names, initial_value=self._tip())
+            self.frame = gui.add_dropdown("frame", robot.frame_names, initial_value=self._tip())
             self.reference = gui.add_dropdown("reference", _REFERENCES, initial_value="local_world_aligned")
+            self.words = gui.add_markdown("")
         with gui.add_folder("Show"):
-            self.meshes = gui.add_checkbox("shapes", initial_value=True)
+            self.shapes = gui.add_dropdown("shapes", SHAPES)
             self.skeleton = gui.add_checkbox("skeleton", initial_value=self.stage.skeleton_shown)
             self.axes = gui.add_checkbox("link frames", initial_value=False)
+            self.names = gui.add_dropdown("names", NAMES)
             self.columns = gui.add_dropdown("Jacobian's columns", ("none", "linear", "angular"))
             self.ellipsoid = gui.add_dropdown("ellipsoid of velocity", ("none", "linear", "angular"))
             self.parts = gui.add_checkbox("acceleration's parts", initial_value=False)
             gui.add_markdown(legend())
             self.dh = gui.add_dropdown("DH frames", ("none", "standard", "modified"))
             self.dh_words = gui.add_markdown("")
-        with gui.add_folder("Rates"):
-            self.speed = gui.add_slider("v", min=-3.0, max=3.0, step=0.01, initial_value=0.0)
-            self.push = gui.add_slider("a", min=-5.0, max=5.0, step=0.01, initial_value=0.0)
-            turn = gui.add_button("another direction")
-        with gui.add_folder("Joints"):
-            neutral, random = gui.add_button("neutral"), gui.add_button("random")
-            self.sliders = list(self._sliders())
+            camera = gui.add_button("reset camera")
+        self._build_rates()
         if self.stage.missing:
             count = len(self.stage.missing)
             gui.add_markdown(f"{count} mesh{'es' if count > 1 else ''} could not be shown; the skeleton is.")
-        for handle in (self.frame, self.reference, self.dh):
+        for handle in (self.frame, self.reference):
             handle.on_update(lambda _: self._choose())
-        shown = (self.meshes, self.skeleton, self.axes, self.columns, self.ellipsoid, self.parts)
-        for handle in (*shown, self.speed, self.push):
+        self.dh.on_update(lambda _: self._choose_convention())
+        for handle in (
+            self.shapes, self.skeleton, self.axes, self.names, self.columns, self.ellipsoid, self.parts
+        ):  # fmt: skip
             handle.on_update(lambda _: self.update())
-        turn.on_click(lambda _: self._turn())
-        neutral.on_click(lambda _: self.set_q(self.robot.neutral()))
-        random.on_click(lambda _: self.set_q(self.robot.sample(1, int(self._rng.integers(2**31)))[0]))
+        self.units.on_update(lambda _: self._in_units())
+        self.words_of_q.on_update(self._typed)
+        neutral.on_click(lambda _: self.set_q(self._start))
+        random.on_click(lambda _: self.set_q(robot.sample(1, int(self._rng.integers(2**31)))[0]))
+        camera.on_click(lambda _: self.stage.look())
+
+    def _build_rates(self) -> None:
+        gui, robot = self.server.gui, self.robot
+        with gui.add_folder("Rates", expand_by_default=False):
+            rest, random = gui.add_button("at rest"), gui.add_button("random rates")
+            first = gui.add_folder("v, the rate of q", expand_by_default=True)
+            second = gui.add_folder("a, the rate of v", expand_by_default=False)
+        self.rates = Sliders(gui, first, rate_rows(robot, second=False), "/s", self._rate)
+        self.second_rates = Sliders(gui, second, rate_rows(robot, second=True), "/s²", self._second_rate)
+        for sliders, values in ((self.rates, self.v), (self.second_rates, self.a)):
+            sliders.build(values, degrees=False)
+        rest.on_click(lambda _: self.set_rates(np.zeros(robot.nv), np.zeros(robot.nv)))
+        random.on_click(lambda _: self.set_rates(*self._rng.uniform(-1.0, 1.0, (2, robot.nv))))
 
     def _tip(self) -> str:
         tip = self.robot.tip_frame
         return tip if tip in self.robot.frame_names else self.robot.frame_names[-1]
 
-    def _sliders(self) -> Any:
-        """One for each coordinate that a slider can hold: a quaternion's four numbers cannot."""
-        tree = self.robot.tree
-        for joint, at in zip(tree.joints, tree.q_index, strict=True):
-            if joint.nq == 0 or joint.kind.nq == 7:
-                continue
-            for k in range(joint.nq):
-                name = self.robot.coordinate_names[at + k]
-                turns = joint.kind.turns or (joint.nq == 3 and k == 2)
-                whole = np.pi if turns else 1.0
-                lower, upper = -whole, whole
-                if joint.limit is not None and joint.kind.value != "continuous":
-                    lower = max(joint.limit.lower, -4.0 * whole)
-                    upper = min(joint.limit.upper, 4.0 * whole)
-                lower, upper = min(lower, 0.0), max(upper, 1e-6)
-                slider = self.server.gui.add_slider(
-                    name, min=float(lower), max=float(upper), step=float((upper - lower) / 1000),
-                    initial_value=0.0,
-                )  # fmt: skip
-                slider.on_update(lambda _: self._read())
-                yield at + k, slider
-
-    def _read(self) -> None:
+    def _move(self, at: int, value: float) -> None:
         with self._lock:
-            q = self.q.copy()
-            for at, slider in self.sliders:
-                q[at] = slider.value
-            self.q = q
+            self.q = self.q.copy()
+            self.q[at] = value
+            self._say_q()
             self.update()
 
-    def set_q(self, q: FloatArray) -> None:
-        """Put the robot into a configuration and the sliders with it."""
+    def _rate(self, at: int, value: float) -> None:
         with self._lock:
-            self.q = checked(self.robot.tree, q, "q").copy()
-            for at, slider in self.sliders:
-                slider.value = float(np.clip(self.q[at], slider.min, slider.max))
-            self.q = checked(self.robot.tree, q, "q").copy()
+            self.v = self.v.copy()
+            self.v[at] = value
             self.update()
 
-    def _turn(self) -> None:
-        self._direction = self._rng.uniform(-1.0, 1.0, self._direction.shape)
-        self.update()
+    def _second_rate(self, at: int, value: float) -> None:
+        with self._lock:
+            self.a = self.a.copy()
+            self.a[at] = value
+            self.update()
+
+    def set_q(self, q: ArrayLike) -> None:
+        """Put the robot into a configuration and every slider with it.
+
+        Raises:
+            InputError: as every function that takes a `q`.
+        """
+        with self._lock:
+            self.q = checked(self.robot.tree, q, "q").copy()
+            self.sliders.show(self.q)
+            self._say_q()
+            self.update()
+
+    def set_rates(self, v: FloatArray, a: FloatArray) -> None:
+        """Give the joints rates and their rates, and the sliders with them."""
+        with self._lock:
+            self.v, self.a = v, a
+            self.rates.show(v)
+            self.second_rates.show(a)
+            self.update()
+
+    def _say_q(self) -> None:
+        self.words_of_q.value = written(self.q)
+        self.wrong.content = ""
+
+    def _typed(self, event: Any) -> None:
+        """Somebody types other numbers in place of those to be copied; they stay as they are typed."""
+        if event.client is None:
+            return
+        with self._lock:
+            try:
+                q = read(self.words_of_q.value, self.robot.coordinate_names)
+                self.q = checked(self.robot.tree, q, "q").copy()
+            except UrdfkinError as error:
+                self.wrong.content = markdown_text(str(error))
+                return
+            self.wrong.content = ""
+            self.sliders.show(self.q)
+            self.update()
+
+    def _in_units(self) -> None:
+        with self._lock:
+            degrees = self.units.value == "degrees"
+            self.sliders.build(self.q, degrees=degrees)
+            self.rates.build(self.v, degrees=degrees)
+            self.second_rates.build(self.a, degrees=degrees)
+
+    def _choose_convention(self) -> None:
+        """A table's frames lie inside the shapes: let them be seen through these."""
+        with self._lock:
+            shown = self.dh.value != "none"
+            if self.shapes.value == (SOLID if shown else SEE_THROUGH):
+                self.shapes.value = SEE_THROUGH if shown else SOLID
+            self._choose()
 
     def _choose(self) -> None:
         """Another frame, reference or convention: the table is derived and checked once."""
@@ -146,17 +209,21 @@ class Viewer:
     def update(self) -> None:
         """Compute, check and draw."""
         with self._lock:
-            v, a = self._direction * np.array([[self.speed.value], [self.push.value]])
-            self.motion = self._motion(v, a, Reference.of(self.reference.value))
+            self.motion = self._motion(Reference.of(self.reference.value))
             aligned = Reference.LOCAL_WORLD_ALIGNED
-            drawn = self.motion if self.motion.reference is aligned else self._motion(v, a, aligned)
+            drawn = self.motion if self.motion.reference is aligned else self._motion(aligned)
             self.words.content = numbers(self.motion)
-            self.stage.show(shapes=self.meshes.value, skeleton=self.skeleton.value, axes=self.axes.value)
+            self.stage.show(
+                shapes=self.shapes.value,
+                skeleton=self.skeleton.value,
+                axes=self.axes.value,
+                names=self.names.value,
+            )
             self.stage.move(self.robot.placement(self.q, self.robot.link_frames, verify=False))
             self._draw(drawn)
 
-    def _motion(self, v: FloatArray, a: FloatArray, reference: Reference) -> FrameMotion:
-        q, v, a = (x[np.newaxis] for x in (self.q, v, a))
+    def _motion(self, reference: Reference) -> FrameMotion:
+        q, v, a = (x[np.newaxis] for x in (self.q, self.v, self.a))
         return frame_motion(self.robot, q, v, a, self.frame.value, reference)
 
     def _draw(self, x: FrameMotion) -> None:
