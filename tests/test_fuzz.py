@@ -7,6 +7,7 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+import pinocchio
 import pytest
 
 import urdfkin
@@ -17,9 +18,8 @@ from scripts.fuzzing.judge import judge as judge_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
 from tests.lint.cases.arm import arm, fixed
 from urdfkin.compiled.prepared import PreparedFrame
-from urdfkin.errors import OracleError
 from urdfkin.kinematics.inputs import FloatArray
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.urdf.records import FURTHER_LIMITS
 
 pytestmark = pytest.mark.slow
 
@@ -55,6 +55,8 @@ def test_robots_are_of_every_oddity() -> None:
     for version in ("1.0", "1.1", "1.2"):
         assert f'version="{version}"' in texts["versions"]
     assert "quat_xyzw=" in texts["versions"]
+    for limit in FURTHER_LIMITS:
+        assert re.search(f'{limit}="(-1.0|-5e-324|inf|nan||1e400|0x10|1.0 )"', texts["versions"]), limit
     assert texts["followers"].count("<mimic ") > 200
     assert {each.root_joint for each in made["roots"]} == {None, "floating", "planar"}
     for kind in robots.KINDS:
@@ -122,12 +124,14 @@ def test_what_pinocchio_refuses_though_check_found_nothing_is_a_finding_of_its_o
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def refuses(*arguments: object, **options: object) -> None:
-        raise OracleError("Pinocchio does not accept this robot", where="r", found="no reason")
+        raise ValueError("no reason")
 
-    monkeypatch.setattr(Oracle, "_parse", refuses)
+    monkeypatch.setattr(pinocchio, "buildModelFromXML", refuses)
     outcome = judge(arm())
     assert outcome.word == "Pinocchio refuses what passed check"
     assert "no reason" in outcome.details
+    assert "please report this" in outcome.details
+    assert outcome.word not in GOOD
 
 
 def test_numbers_that_differ_between_two_ways_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:

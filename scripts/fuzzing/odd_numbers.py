@@ -124,5 +124,12 @@ def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
     )
 
 
+def odd_limit(rng: random.Random) -> str:
+    """Of effort or jerk, as a file may have it: mostly a magnitude, sometimes what urdfdom refuses."""
+    refused = ("-1.0", "-5e-324", "inf", "nan", "", "1e400", "0x10", "1.0 ")
+    fine = ("0", "-0.0", "1e300", "5e-324", "1e-400")
+    return rng.choice(refused) if rng.random() < 0.03 else rng.choice((*fine, written(rng, rng.random())))
+
+
 def _scaled(numbers: list[float], factor: float) -> list[float]:
     return [x * factor for x in numbers]

@@ -12,6 +12,7 @@ from xml.sax.saxutils import quoteattr
 
 from scripts.fuzzing import Case
 from scripts.fuzzing import odd_numbers as odd
+from urdfkin.urdf.records import FURTHER_LIMITS
 
 #: What may be odd about a robot: a family each. In the family "everything" each is, or is not.
 ODDITIES = ("names", "prefixes", "versions", "followers", "lengths", "angles", "axes", "limits", "roots")
@@ -148,18 +149,24 @@ class _Robot:
     def limit(self, kind: str) -> str:
         """Its limits, where the kind has them."""
         rng = self.rng
-        if kind not in _ONE_COORDINATE or (kind == "continuous" and rng.random() < 0.7):
+        # From 1.2 on a limit counts on every kind of joint.
+        least = 0.8 if "versions" in self.strange else 1.0
+        idle = kind not in _ONE_COORDINATE and rng.random() < least
+        if idle or (kind == "continuous" and rng.random() < 0.7):
             return ""
         lower, upper, effort = -1.0 - rng.random(), 1.0 + rng.random(), 1.0
         if "limits" in self.strange:
             lower, upper = odd.odd_range(rng, kind == "revolute")
             effort = rng.choice((0.0, 1.0, 1e300, 5e-324, abs(odd.odd_length(rng))))
         words = [f'lower="{odd.written(rng, lower)}"', f'upper="{odd.written(rng, upper)}"']
-        if kind == "continuous":
+        if kind == "continuous" or (kind not in _ONE_COORDINATE and rng.random() < 0.5):
             words = []
         elif "limits" in self.strange and rng.random() < 0.2:
             words.pop(rng.randrange(2))
         words += [f'{word}="{odd.written(rng, effort)}"' for word in ("effort", "velocity")]
+        if "versions" in self.strange:
+            further = [name for name in FURTHER_LIMITS if rng.random() < 0.3]
+            words += [f'{name}="{odd.odd_limit(rng)}"' for name in further]
         return f"<limit {' '.join(words)}/>"
 
     def mimic(self, i: int) -> str:

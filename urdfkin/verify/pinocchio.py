@@ -129,8 +129,12 @@ class Oracle:
             else:
                 model = pin.buildModelFromXML(text, mimic=False)
         except (ValueError, RuntimeError) as error:
+            # What `check` knows to be refused is not asked about: this, it has overlooked.
             raise OracleError(
-                "Pinocchio does not accept this robot", where=tree.name, found=str(error).strip()
+                "Pinocchio does not accept this robot",
+                where=tree.name,
+                found=str(error).strip(),
+                remedy="`urdfkin check` knows no reason: please report this as its error, with the URDF",
             ) from error
         return model
 

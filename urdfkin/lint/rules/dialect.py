@@ -204,13 +204,17 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
     version = (int(match[1]), int(match[2])) if match and len(written) < 20 else None
     known = version is not None and (1, 0) <= version <= NEWEST
     if version is None or not known:
+        later = version is not None and version > NEWEST
+        what = "there is no such URDF version" if version else "a URDF version is two numbers and a point"
         report.add(
             VERSION,
-            "there is no such URDF version" if version else "a URDF version is two numbers and a point",
+            "the URDF version is later than 1.2, the last that urdfdom and Pinocchio read" if later else what,
             root,
             attribute="version",
             found=quoted(written),
-            remedy='write version="1.0" if the file follows it, or leave it out',
+            remedy="write the version whose rules the file keeps, 1.0 to 1.2"
+            if later
+            else 'write version="1.0" if the file follows it, or leave it out',
         )
         return (1, 0)
     if version != (1, 0):
