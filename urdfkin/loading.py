@@ -13,6 +13,7 @@ from urdfkin.errors import InputError
 from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rules.axes import tilts
+from urdfkin.lint.rules.dialect import NEWER_VERSION
 from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_tilts
 from urdfkin.robot import Robot
@@ -23,6 +24,7 @@ from urdfkin.urdf.remembering import remembered_tree
 from urdfkin.urdf.sources import Source, Text, as_word, read_source
 from urdfkin.verify.choosing import Verify, checked_choice
 from urdfkin.verify.made_of_table import demand_the_tables
+from urdfkin.verify.witnesses import WitnessName, witness_of
 
 
 def load(
@@ -32,19 +34,22 @@ def load(
     mimic: bool | None = None,
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
+    oracle: WitnessName = "pinocchio",
 ) -> Robot:
     """A robot from a URDF, checked before it is read.
 
     Args:
-        source: A path (.urdf or .xacro), a name of the catalogue (`urdfkin robots` lists them), URDF text,
-            bytes, an open file, or `-` for standard input; or a Denavit-Hartenberg table, as it is or as a
-            file (.toml, .json, .csv): its base frame is the root, its tip the leaf.
+        source: A path (.urdf or .xacro), a name of the catalogue
+            (`urdfkin robots` lists them), URDF text, bytes, an open file, or `-` for standard input;
+            or a Denavit-Hartenberg table, as it is or as a file (.toml, .json, .csv): its base frame is the
+            root, its tip the leaf.
         verify: Whether every result is held against Pinocchio's; "sample" has 100 configurations of each
             call checked.
         mimic: Whether mimic joints follow their leaders, as the URDF says; False lets each move freely.
             None: True, except for the robots whose catalogue entry says that theirs cannot work.
         root_joint: `"floating"` or `"planar"` hangs the root link from a moving joint.
         xacro_args: Arguments for a .xacro file, which is expanded first (needs the extra `xacro`).
+        oracle: Who checks quantities: "pinocchio", or "mujoco" (needs the extra `mujoco`).
 
     Returns:
         The robot. Its findings are warned of (`UrdfWarning`), except for robots of the catalogue.
@@ -65,9 +70,11 @@ def load(
     0.7
     """
     if isinstance(source, DHTable) or is_table_file(source):
-        return _load_table(source, xacro_args, verify=verify, mimic=mimic, root_joint=root_joint)
+        return _load_table(
+            source, xacro_args, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle
+        )
     text = read_source(source, xacro_args=xacro_args)
-    return _robot(text, verify=verify, mimic=mimic, root_joint=root_joint)
+    return _robot(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle)
 
 
 def _load_table(
@@ -77,6 +84,7 @@ def _load_table(
     verify: Verify,
     mimic: bool | None,
     root_joint: str | None,
+    oracle: WitnessName,
 ) -> Robot:
     if xacro_args:
         raise InputError("xacro_args go with the path of a .xacro file", found="a table")
@@ -86,7 +94,7 @@ def _load_table(
         path = at_home(source)
         table, name = read_table(path), as_word(path)
     text = Text(to_urdf(table).encode(), name, name)
-    robot = _robot(text, verify=verify, mimic=mimic, root_joint=root_joint)
+    robot = _robot(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, made=True)
     if checked_choice(verify):
         plain = mimic is not False and root_joint is None
         demand_the_tables((robot if plain else _robot(text)).verifier, table)
@@ -94,20 +102,30 @@ def _load_table(
 
 
 def _robot(
-    text: Text, *, verify: Verify = True, mimic: bool | None = None, root_joint: str | None = None
+    text: Text,
+    *,
+    verify: Verify = True,
+    mimic: bool | None = None,
+    root_joint: str | None = None,
+    oracle: WitnessName = "pinocchio",
+    listed: tuple[Finding, ...] = (),
+    made: bool = False,
 ) -> Robot:
-    origin = Origin(text.source, mimic, root_joint, text.xacro_args)
+    witness_of(oracle)
+    other = None if oracle == "pinocchio" else oracle
+    origin = Origin(text.source, mimic, root_joint, text.xacro_args, other)
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data)
     urdf = read_urdf(report, mimic=mimic, root_joint=root_joint)
-    findings = report.findings()
+    findings = (*listed, *report.findings())
     if urdf is None or report.failed:
         raise UrdfError(findings)
     if text.entry is None:
         for finding in findings:
-            if finding.severity is Severity.WARNING:
-                warnings.warn(str(finding), UrdfWarning, stacklevel=3)
+            # What was made of something else may need URDF 1.2: no news for who has no URDF.
+            if finding.severity is Severity.WARNING and not (made and finding.code == NEWER_VERSION.id):
+                warnings.warn(str(finding), UrdfWarning, stacklevel=4 if made else 3)
     read = read_tree if text.entry is None else remembered_tree
     tree = read(urdf, mimic=mimic, root_joint=root_joint)
     if tilted := tilts(urdf):
@@ -120,6 +138,7 @@ def _robot(
         mimic=mimic,
         findings=findings,
         unverifiable=_unverifiable(findings),
+        oracle=oracle,
         base_frame=text.entry.base if text.entry else None,
         tip_frame=text.entry.tip if text.entry else None,
     )

@@ -47,6 +47,7 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.sampling import sample
 from urdfkin.verify.verifier import Verifier
+from urdfkin.verify.witnesses import WitnessName
 
 if TYPE_CHECKING:
     from urdfkin.verify.exact.enclosure import Enclosures
@@ -79,11 +80,14 @@ class Robot:
         mimic: bool = True,
         findings: tuple[Finding, ...] = (),
         unverifiable: str | None = None,
+        oracle: WitnessName = "pinocchio",
         base_frame: str | None = None,
         tip_frame: str | None = None,
     ) -> None:
         self.tree = tree
-        self.verifier = Verifier(urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable)
+        self.verifier = Verifier(
+            urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
+        )
         self.findings = findings
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
@@ -643,7 +647,7 @@ class Robot:
     # -- what it is worth ----------------------------------------------------------------------------
 
     def certificate(self) -> Certificate:
-        """What was checked so far, how closely it agreed, by which Pinocchio, and what was not checked."""
+        """What was checked so far, how closely it agreed, by whom, and what was not checked."""
         return self.verifier.certificate()
 
     # -- inside --------------------------------------------------------------------------------------

@@ -66,6 +66,46 @@ def theirs(x: FloatArray) -> Matrix:
     return eq.product(turn(x[4:], fused=False), joint)  # type: ignore[no-any-return]
 
 
+def quaternion(angles: FloatArray, *, exact: bool) -> list[Counted]:
+    """(w, x, y, z) of roll, pitch and yaw: a product of three turns, brought to norm 1."""
+    parts = []
+    for i, angle in enumerate(angles[:3]):
+        s, c = sine_cosine(0.5 * float(angle), fused=False)
+        nothing = Counted(0.0)
+        parts.append([c, *(s if j == i else nothing for j in range(3))])
+    found = unit(hamilton(hamilton(parts[2], parts[1]), parts[0]))
+    return [Counted(x.value) for x in found] if exact else found
+
+
+def hamilton(p: list[Counted], q: list[Counted]) -> list[Counted]:
+    """`mju_mulQuat`."""
+    return [
+        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
+        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
+    ]
+
+
+def matrix_of(q: list[Counted]) -> Matrix:
+    """`mju_quat2Mat`."""
+    w, x, y, z = q
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    return (
+        (ww + xx - yy - zz, 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), ww - xx + yy - zz, 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), ww - xx - yy + zz),
+    )
+
+
+def mujocos(x: FloatArray) -> Matrix:
+    """The orientation so far, the constant, the turn about an axis that was normalised; then the norm."""
+    s, c = sine_cosine(0.5 * float(x[3]), fused=False)
+    turned = hamilton(quaternion(x[4:], exact=True), quaternion(x, exact=False))
+    axis = unit([Counted(float(a)) for a in rotation_from_rpy(x[1:4])[0]])
+    return matrix_of(unit(hamilton(turned, [c, *(s * a for a in axis)])))
+
+
 def most(measure: Callable[[Matrix], float], part: Callable[[FloatArray], Matrix]) -> float:
     """The largest of a search: from random angles, and from the worst of these on."""
     rng = np.random.default_rng(0)
@@ -90,6 +130,7 @@ PARTS: dict[str, tuple[Callable[[FloatArray], Matrix], float]] = {
     "Pinocchio's reading": (through_a_quaternion, 12.5),
     "a joint of urdfkin's": (ours, 5.7),
     "a joint of Pinocchio's": (theirs, 16.8),
+    "a joint of MuJoCo's": (mujocos, 21.5),
 }
 
 
@@ -108,6 +149,11 @@ def test_all_of_a_joints_roundings_conspiring_are_within_the_count() -> None:
     assert together == pytest.approx(22.5)
     assert together < roundings.ROUNDINGS
     assert math.hypot(most(deviation, ours), most(deviation, theirs)) < roundings.ROUNDINGS / 9.0
+
+
+def test_a_joint_of_mujocos_and_one_of_urdfkins_are_within_their_count() -> None:
+    together = PARTS["a joint of urdfkin's"][1] + PARTS["a joint of MuJoCo's"][1]
+    assert together + 1.5 < roundings.MUJOCO
 
 
 def test_a_file_of_round_angles_is_snapped_by_less_than_a_turn_counts_as() -> None:

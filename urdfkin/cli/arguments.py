@@ -20,6 +20,7 @@ from urdfkin.system.files import read_standard_input, read_text
 if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
+    from urdfkin.verify.witnesses import WitnessName
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -94,6 +95,12 @@ reference_option = click.option(
 verify_option = click.option(
     "--verify/--no-verify", default=True, help="Whether Pinocchio checks each result (the default)."
 )
+oracle_option = click.option(
+    "--oracle",
+    type=click.Choice(["pinocchio", "mujoco"]),
+    default="pinocchio",
+    help="Who checks: Pinocchio (the default), or MuJoCo.",
+)
 seed_option = click.option(
     "--seed", type=Whole(0), default=0, show_default=True, help="What `random` is drawn from."
 )
@@ -114,13 +121,21 @@ class Inputs:
     a: FloatArray
 
 
-def load_robot(source: str, mimic: bool | None, root_joint: str | None, *, verify: bool = True) -> Robot:
+def load_robot(
+    source: str,
+    mimic: bool | None,
+    root_joint: str | None,
+    *,
+    verify: bool = True,
+    oracle: WitnessName = "pinocchio",
+) -> Robot:
     """The robot of a command; its warnings go to stderr, one line each."""
     from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        robot = load(source, mimic=mimic, root_joint=root_joint, xacro_args=xacro_args(), verify=verify)
+        how: dict[str, Any] = {"mimic": mimic, "root_joint": root_joint, "xacro_args": xacro_args()}
+        robot = load(source, **how, verify=verify, oracle=oracle)
     for warning in caught:
         say(str(warning.message), err=True)
     return robot

@@ -139,7 +139,7 @@ def emit(
 
 def check_line(certificate: Certificate) -> str:
     """One line: what was checked and how closely, or why not."""
-    by = f"Pinocchio {certificate.pinocchio}"
+    by = certificate.oracle
     if certificate.not_verified:
         return f"NOT VERIFIED by {by}: {'; '.join(certificate.not_verified)}"
     parts = [

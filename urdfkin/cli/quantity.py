@@ -10,6 +10,7 @@ from urdfkin.cli.arguments import (
     a_option,
     frame_option,
     load_robot,
+    oracle_option,
     q_option,
     read_inputs,
     reference_option,
@@ -23,6 +24,7 @@ from urdfkin.cli.breakdown import emit_breakdown
 from urdfkin.cli.endings import form_of
 from urdfkin.cli.output import ENDINGS, compiling, emit, exit_code, format_option, output_option
 from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
+from urdfkin.verify.witnesses import WitnessName
 
 _ROBOT = (
     "ROBOT is a path (a table, .toml, .json or .csv, is made a robot), a name that `urdfkin robots` lists, or"
@@ -47,6 +49,7 @@ def command_of(quantity: Quantity) -> click.Command:
         frame: str | None,
         seed: int,
         verify: bool,
+        oracle: WitnessName,
         format_: str,
         output: Path | None,
         q: str,
@@ -56,7 +59,7 @@ def command_of(quantity: Quantity) -> click.Command:
         explain: bool = False,
     ) -> None:
         format_ = form_of(context, output, ENDINGS, "csv")
-        loaded = load_robot(robot, mimic, root_joint, verify=verify)
+        loaded = load_robot(robot, mimic, root_joint, verify=verify, oracle=oracle)
         x = read_inputs(loaded, frame, seed, q, v, a)
         if explain:
             with compiling():
@@ -72,7 +75,14 @@ def command_of(quantity: Quantity) -> click.Command:
     rates = [option for letter, option in (("v", v_option), ("a", a_option)) if letter in quantity.inputs]
     options = together(
         *(robot_argument, frame_option, *([reference_option] if quantity.referred else []), q_option, *rates),
-        *(seed_option, verify_option, *([_explain] if explained else []), format_option, output_option),
+        *(
+            seed_option,
+            verify_option,
+            oracle_option,
+            *([_explain] if explained else []),
+            format_option,
+            output_option,
+        ),
     )
     summary = f"{quantity.summary[0].upper()}{quantity.summary[1:]} (eq. {', '.join(quantity.equations)})."
     compute.__doc__ = f"{summary}\n\n{quantity.page}\n\n{_ROBOT}"

@@ -22,6 +22,7 @@ from urdfkin.urdf.catalogue import examples
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.validation.gathering import Progress
+    from urdfkin.verify.witnesses import WitnessName
 
 EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 
@@ -40,6 +41,12 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @click.option("--jobs", type=Whole(1), default=1, show_default=True, help="Local processes.")
 @click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow (the default).")
 @click.option("--root-joint", type=click.Choice(["floating", "planar"]), help="Hang the root from a joint.")
+@click.option(
+    "--oracle",
+    type=click.Choice(["pinocchio", "mujoco"]),
+    default="pinocchio",
+    help="mujoco: MuJoCo is a second witness.",
+)
 @click.option("--isolate", is_flag=True, help="Each robot in a process of its own, whose death is a result.")
 @xacro_option
 @click.option("--judge", "judged", is_flag=True, help="Say whose last digits are right, at 50 digits.")
@@ -62,6 +69,7 @@ def command(
     judge_samples: int,
     judge_moving_base: bool,
     isolate: bool,
+    oracle: WitnessName,
     json_: Path | None,
     html: Path | None,
     junit: Path | None,
@@ -94,6 +102,7 @@ def command(
             seed=seed,
             jobs=jobs,
             isolate=isolate,
+            oracle=oracle,
             progress=progress,
             **how,
         )

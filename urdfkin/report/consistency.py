@@ -86,7 +86,8 @@ def _subjects(robot: Robot) -> dict[str, list[str]]:
 def _verdict(robot: Robot, samples: int) -> Iterator[str]:
     """The verdict follows from what was compared; what is not verified needs a reason."""
     verdict, reason = Verdict(robot["verdict"]), robot["reason"]
-    outside = robot["failed"] > 0 or any(chain_disagreement(chain) for chain in robot["chains"])
+    witnessed = any(check["witness"]["urdfkin"]["failed"] for check in robot["checks"] if "witness" in check)
+    outside = robot["failed"] > 0 or witnessed or any(chain_disagreement(chain) for chain in robot["chains"])
     if outside != (verdict is Verdict.DISAGREES):
         yield f"verdict: {verdict}, but {'something lies' if outside else 'nothing lies'} outside its bound"
     if verdict is Verdict.VERIFIED:

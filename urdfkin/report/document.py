@@ -155,6 +155,32 @@ class Case(TypedDict):
     replay: str
 
 
+class Pair(TypedDict):
+    """One side's answers held against a second witness's."""
+
+    failed: int
+    worst: Units
+    share_of_bound: Units
+
+
+class Alone(TypedDict):
+    """How many results each disagrees about with two others who agree."""
+
+    urdfkin: int
+    pinocchio: int
+    witness: int
+
+
+class Witness(TypedDict):
+    """What a second witness says."""
+
+    by: str
+    urdfkin: Pair
+    pinocchio: Pair
+    alone: Alone
+    undecided: int
+
+
 class Check(TypedDict):
     """One quantity in one reference."""
 
@@ -171,6 +197,7 @@ class Check(TypedDict):
     subjects: Literal["frames", "joints", "columns"]
     worst_by_subject: list[Units]
     worst_case: Case | None
+    witness: NotRequired[Witness]
 
 
 class Timings(TypedDict):
@@ -180,6 +207,7 @@ class Timings(TypedDict):
     urdfkin: float
     pinocchio: float
     compare: float
+    witness: NotRequired[float]
 
 
 class Robot(TypedDict):

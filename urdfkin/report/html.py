@@ -11,8 +11,10 @@ from urdfkin.report.distributions import distributions
 from urdfkin.report.document import Document, Robot, asset, outcome_of
 from urdfkin.report.scene import scene
 from urdfkin.report.words import (
+    check_name,
     columns,
     counted,
+    in_order,
     judged_on,
     percent,
     pinocchio,
@@ -20,6 +22,9 @@ from urdfkin.report.words import (
     summary,
     units,
     verdict_counts,
+    witness_cells,
+    witness_heads,
+    witness_title,
     worst,
 )
 from urdfkin.validation.portrait import chain_disagreement
@@ -117,6 +122,13 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
             for chain in robot["chains"]
         ],
         "checks": pages.check_rows(robot),
+        "witness": (title := witness_title([robot])),
+        "witness_heads": witness_heads(title) if title else [],
+        "witnessed": [
+            [check_name(check), *witness_cells([check], title)]
+            for check in in_order(robot)
+            if title and "witness" in check
+        ],
         "judged": pages.judged_rows(robot["judge"]) if robot["judge"] else [],
         "judged_on": judged_on(robot["judge"]) if robot["judge"] else "",
         "heat_heads": heads,

@@ -10,7 +10,15 @@ import re
 from xml.etree import ElementTree as ET
 
 from urdfkin.report.document import Case, Check, Document, Robot, outcome_of
-from urdfkin.report.words import check_name, in_order, percent, units
+from urdfkin.report.words import (
+    check_name,
+    in_order,
+    percent,
+    units,
+    witness_cells,
+    witness_heads,
+    witness_title,
+)
 
 #: What XML 1.0 cannot hold, not even escaped.
 _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -121,6 +129,9 @@ def _text(check: Check, robot: Robot) -> str:
     ]
     if tightest is not None and widest is not None:
         lines.append(f"bounds: {tightest:.0f} to {widest:.0f} eps*scale")
+    if "witness" in check and (title := witness_title([robot])) is not None:
+        cells = zip(witness_heads(title), witness_cells([check], title), strict=True)
+        lines += [f"{head}: {cell}" for head, cell in list(cells)[1:]]
     if case is not None:
         lines += [f"worst case: sample {case['sample']}, {case['frame']}", f"replay: {case['replay']}"]
     return "\n".join(lines)

@@ -12,10 +12,15 @@ from urdfkin.report.words import (
     check_name,
     columns,
     counted,
+    of_quantity,
     percent,
+    quantities,
     share_of,
     summary,
     units,
+    witness_cells,
+    witness_heads,
+    witness_title,
     worst_of,
 )
 
@@ -39,6 +44,7 @@ def as_markdown(document: Document, limit: int = LIMIT) -> str:
     ]
     foot = [
         "",
+        *_three_sides(document["robots"]),
         "Worst disagreement for each quantity in eps·scale: 1 to 10 is what rounding gives.",
         "",
         f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
@@ -50,6 +56,24 @@ def as_markdown(document: Document, limit: int = LIMIT) -> str:
     robots = sorted(document["robots"], key=lambda robot: VERDICTS.index(robot["verdict"]))
     room = limit - len("\n".join(head + foot))
     return "\n".join(head + _body(robots, room) + foot)
+
+
+def _three_sides(robots: list[Robot]) -> list[str]:
+    """A table of the pairs, where a second witness was asked; every quantity over all robots."""
+    if (title := witness_title(robots)) is None:
+        return []
+    heads = ["quantity", *map(text, witness_heads(title))]
+    lines = [
+        f"{text(title)} was asked too; the largest share of each pair's bound:",
+        "",
+        _row(heads),
+        _row(["---", *["---:"] * (len(heads) - 2), "---"]),
+    ]
+    for name in quantities(robots):
+        checks = [check for robot in robots for check in of_quantity(robot, name) if "witness" in check]
+        if checks:
+            lines.append(_row([text(name), *map(text, witness_cells(checks, title))]))
+    return [*lines, ""]
 
 
 def _body(robots: list[Robot], room: int) -> list[str]:

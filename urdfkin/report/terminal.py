@@ -24,6 +24,9 @@ from urdfkin.report.words import (
     share_of,
     summary,
     units,
+    witness_cells,
+    witness_heads,
+    witness_title,
     worst,
     worst_of,
 )
@@ -56,6 +59,11 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
     else:
         _print_robots(robots, out)
         _print_quantities(robots, out)
+    if (title := witness_title(robots)) is not None:
+        out.print(
+            f"three sides, the largest share of each pair's bound: {title} is a second witness", style="bold"
+        )
+        out.print(_three_sides(robots, title))
     for robot in robots:
         _print_robot(robot, out, cases=cases)
     found = outcome_of(document)
@@ -120,6 +128,17 @@ def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
         )
         rows.append([quantity_name(name), *_figures(checks), where])
     print_named(out, ["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4))
+
+
+def _three_sides(robots: Sequence[Robot], title: str) -> Table:
+    """One row a quantity, over all robots and references."""
+    rows = []
+    for name in quantities(robots):
+        checks = [check for robot in robots for check in of_quantity(robot, name) if "witness" in check]
+        if checks:
+            rows.append([quantity_name(name), *witness_cells(checks, title)])
+    heads = [head.replace(", ", ",\n") for head in witness_heads(title)]
+    return plain_table(["quantity", *heads], rows, words=(0, 5))
 
 
 def _figures(checks: Sequence[Check]) -> list[str]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Literal
 
-from urdfkin.report.document import Check, Document, Judged, Judgement, Robot, Units
+from urdfkin.report.document import Check, Document, Judged, Judgement, Robot, Units, Witness
 from urdfkin.validation.outcome import Verdict
 from urdfkin.verify.quantities import QUANTITIES
+from urdfkin.verify.witnesses import WITNESSES
 
 SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
 #: Worse verdicts first.
@@ -96,6 +97,40 @@ def judged_on(judgement: Judgement) -> str:
     """The samples of a judgement, and whether they moved."""
     moving = " on a moving base" if judgement.get("moving_base") else ""
     return counted(judgement["samples"], "sample") + moving
+
+
+def witness_title(robots: Sequence[Robot]) -> str | None:
+    """What the second witness is called; None if there was none."""
+    names = (check["witness"]["by"] for robot in robots for check in robot["checks"] if "witness" in check)
+    name = next(names, None)
+    return next((one.title for one in WITNESSES.values() if one.name == name), name)
+
+
+def witness_heads(title: str) -> list[str]:
+    """The columns of a table of three sides: the pairs, and who stands alone."""
+    return ["results", "urdfkin, Pinocchio", f"urdfkin, {title}", f"Pinocchio, {title}", "stands alone"]
+
+
+def witness_cells(checks: Sequence[Check], title: str) -> list[str]:
+    """The cells under `witness_heads`, of some checks together: the largest share of each pair's bound."""
+    found = [(check, check["witness"]) for check in checks if "witness" in check]
+    return [
+        f"{sum(check['results'] for check, _ in found):,}",
+        percent(worst(check["share_of_bound"] for check, _ in found)),
+        percent(worst(witness["urdfkin"]["share_of_bound"] for _, witness in found)),
+        percent(worst(witness["pinocchio"]["share_of_bound"] for _, witness in found)),
+        _alone([witness for _, witness in found], title),
+    ]
+
+
+def _alone(found: Sequence[Witness], title: str) -> str:
+    counts = {
+        "urdfkin": sum(witness["alone"]["urdfkin"] for witness in found),
+        "Pinocchio": sum(witness["alone"]["pinocchio"] for witness in found),
+        title: sum(witness["alone"]["witness"] for witness in found),
+        "undecided": sum(witness["undecided"] for witness in found),
+    }
+    return ", ".join(f"{who} ({count:,})" for who, count in counts.items() if count) or "nobody"
 
 
 def share_of(robot: Robot) -> Units:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass
+from typing import Literal
 
 from urdfkin.errors.demands import switch, word
 
@@ -17,6 +18,7 @@ class Origin:
         mimic: As it was given.
         root_joint: As it was given.
         xacro_args: Names and values.
+        oracle: Who checks besides Pinocchio or in its place, if anybody.
 
     Raises:
         InputError: `mimic` is neither True, False nor None, or `root_joint` is no name.
@@ -26,6 +28,7 @@ class Origin:
     mimic: bool | None = None
     root_joint: str | None = None
     xacro_args: tuple[tuple[str, str], ...] = ()
+    oracle: Literal["pinocchio", "mujoco"] | None = None
 
     def __post_init__(self) -> None:
         if self.mimic is not None:
@@ -50,6 +53,8 @@ class Origin:
             words.append("--mimic" if self.mimic else "--no-mimic")
         if self.root_joint is not None:
             words.append(f"--root-joint {shlex.quote(self.root_joint)}")
+        if self.oracle is not None:
+            words.append(f"--oracle {self.oracle}")
         return " ".join(words)
 
     @property
@@ -74,6 +79,7 @@ class Origin:
             "mimic": self.mimic,
             "root_joint": self.root_joint,
             "xacro_args": dict(self.xacro_args) or None,
+            "oracle": self.oracle,
         }
         arguments = [f"{name}={value!r}" for name, value in given.items() if value is not None]
         return f"urdfkin.load({', '.join([repr(self.again), *arguments])})"

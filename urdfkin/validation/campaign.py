@@ -8,6 +8,7 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from pathlib import Path
 
 from urdfkin.compiled.announcing import load_kernels
@@ -27,6 +28,7 @@ from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.results import ValidationReport
 from urdfkin.validation.workers import Processes
 from urdfkin.verify.pinocchio_module import pinocchio
+from urdfkin.verify.witnesses import PINOCCHIO, WitnessName, witness_of
 
 
 def validate(
@@ -38,6 +40,7 @@ def validate(
     mimic: bool | None = None,
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
+    oracle: WitnessName = "pinocchio",
     isolate: bool = False,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -53,6 +56,8 @@ def validate(
         mimic: As in `load`.
         root_joint: As in `load`.
         xacro_args: As in `load`, for each .xacro file among the robots.
+        oracle: "mujoco": MuJoCo is asked about every frame besides Pinocchio, and the report says who stands
+            alone where two of the three agree (needs the extra `mujoco`).
         isolate: Each robot is checked in a process of its own, `jobs` at a time; when one dies, that robot is
             reported as not verified with the reason, and the others go on.
         executor: Runs the chunks instead of local processes.
@@ -63,7 +68,7 @@ def validate(
         whatever it raises; an interrupt ends the run and keeps what had finished.
 
     Raises:
-        InputError: a negative number of samples, a negative seed or no job.
+        InputError: a negative number of samples, a negative seed or no job; an oracle that is not installed.
         InstallationError: Pinocchio is missing, or another project goes by its name.
 
     >>> report = validate("ur5", samples=10)
@@ -76,6 +81,8 @@ def validate(
     started, begin = datetime.datetime.now(datetime.UTC), time.perf_counter()
     pinocchio()  # before the work, not robot by robot
     subjects, unread = _subjects(many, mimic, root_joint, xacro_args)
+    if witness_of(oracle) is not PINOCCHIO:
+        subjects = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in subjects]
     most = memory.share(jobs) if executor is None else None  # an executor's machines know their own
     tasks = [
         Task(i, chunk) for i, subject in enumerate(subjects) for chunk in chunks(subject, samples, seed, most)

@@ -21,11 +21,12 @@ from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.origin import Origin
 from urdfkin.validation import memory
 from urdfkin.validation.clock import Clock
-from urdfkin.validation.comparing import tallies
+from urdfkin.validation.comparing import SecondWitness, tallies
 from urdfkin.validation.portrait import Portrait
 from urdfkin.validation.tally import Key, Tally
 from urdfkin.verify.pinocchio import Oracle, OracleError
 from urdfkin.verify.sampling import Samples, draw
+from urdfkin.verify.witnesses import PINOCCHIO
 
 #: Samples in a chunk: small enough to spread a single robot over many workers.
 CHUNK_SAMPLES = 25
@@ -62,7 +63,12 @@ class Subject:
         """The robot; its warnings are in its portrait."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
-            robot = load(self.source, mimic=self.origin.mimic, root_joint=self.origin.root_joint)
+            robot = load(
+                self.source,
+                mimic=self.origin.mimic,
+                root_joint=self.origin.root_joint,
+                oracle=self.origin.oracle or PINOCCHIO.name,
+            )
         robot.verifier.origin = self.origin  # what was read here may be the text of a file
         return robot
 
@@ -133,17 +139,20 @@ def chunks(subject: Subject, samples: int, seed: int, most: int | None = None) -
 
 #: The robot that was checked last. The chunks of a robot come one after another; a worker need not read it
 #: again for each, and two large ones at a time would be too much.
-_kept: dict[Subject, tuple[Robot, Oracle]] = {}
+_kept: dict[Subject, tuple[Robot, Oracle, SecondWitness | None]] = {}
 
 
-def _loaded(chunk: Chunk) -> tuple[Robot, Oracle]:
+def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondWitness | None]:
     if (found := _kept.get(chunk.subject)) is not None:
         return found
     _kept.clear()
     robot = chunk.subject.load()
     most = memory.share() if chunk.memory is None else chunk.memory
     memory.demand(robot.tree, CHUNK_SAMPLES + SPECIAL, most)
-    found = robot, robot.verifier.oracle()
+    second = None
+    if (by := robot.verifier.witness) is not PINOCCHIO:
+        second = SecondWitness(by, robot.verifier.oracle(by=by))
+    found = robot, robot.verifier.oracle(), second
     _kept[chunk.subject] = found
     return found
 
@@ -151,10 +160,10 @@ def _loaded(chunk: Chunk) -> tuple[Robot, Oracle]:
 def run_chunk(chunk: Chunk) -> ChunkResult:
     """Compute every quantity of every frame in all references, and compare."""
     begin, clock = time.perf_counter(), Clock()
-    robot, oracle = _loaded(chunk)
+    robot, oracle, second = _loaded(chunk)
     portrait = Portrait.of(robot, oracle) if chunk.index == 0 else None
     clock.read = time.perf_counter() - begin
-    found = tallies(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, clock)
+    found = tallies(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, clock, second)
     seconds = time.perf_counter() - begin
     clock.close(seconds)
     return ChunkResult(

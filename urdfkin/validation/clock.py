@@ -19,6 +19,7 @@ class Clock:
         read: Reading the file and building both models.
         urdfkin: Computing with urdfkin.
         pinocchio: Computing with Pinocchio.
+        second: Computing with a second witness.
         compare: Bounds and comparison.
     """
 
@@ -26,6 +27,7 @@ class Clock:
     urdfkin: float = 0.0
     pinocchio: float = 0.0
     compare: float = 0.0
+    second: float = 0.0
 
     def ours(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Call something of urdfkin's."""
@@ -43,9 +45,17 @@ class Clock:
         finally:
             self.pinocchio += time.perf_counter() - begin
 
+    def witness(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        """Call something of a second witness's."""
+        begin = time.perf_counter()
+        try:
+            return function(*args, **kwargs)
+        finally:
+            self.second += time.perf_counter() - begin
+
     def close(self, seconds: float) -> None:
         """What the whole took."""
-        self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio)
+        self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -54,7 +64,7 @@ class Clock:
             "urdfkin": round(self.urdfkin, 4),
             "pinocchio": round(self.pinocchio, 4),
             "compare": round(self.compare, 4),
-        }
+        } | ({"witness": round(self.second, 4)} if self.second else {})
 
 
 def total(clocks: Iterable[Clock]) -> Clock:
@@ -65,4 +75,5 @@ def total(clocks: Iterable[Clock]) -> Clock:
         whole.urdfkin += clock.urdfkin
         whole.pinocchio += clock.pinocchio
         whole.compare += clock.compare
+        whole.second += clock.second
     return whole

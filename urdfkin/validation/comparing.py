@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import reduce
+from typing import Any
 
 import numpy as np
 
@@ -20,17 +22,45 @@ from urdfkin.model.tree import FloatArray, KinematicTree, freed
 from urdfkin.robot import Robot
 from urdfkin.validation.clock import Clock
 from urdfkin.validation.tally import Inputs, Key, Tally, tally
+from urdfkin.validation.three_sides import ThreeSides, three_sides
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.magnitudes import magnitudes
 from urdfkin.verify.pinocchio import Oracle
-from urdfkin.verify.quantities import SCREWS, walked
+from urdfkin.verify.quantities import SCREWS, Quantity, walked
 from urdfkin.verify.sampling import Samples
+from urdfkin.verify.witnesses import Witness
 
 #: How large an array of a block may be, bytes; some ten arrays of this size are there at a time.
 BLOCK_BYTES = 32 * 2**20
 
 
-def tallies(robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock) -> dict[Key, Tally]:
+@dataclass(frozen=True, slots=True)
+class SecondWitness:
+    """Who is asked besides Pinocchio, and its model of the robot."""
+
+    witness: Witness
+    oracle: Any
+
+    def three_sides(
+        self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
+    ) -> ThreeSides:
+        """Its answers beside urdfkin's and Pinocchio's."""
+        inputs = block.x.q, block.x.v, block.x.a
+        answers = block.clock.witness(row.theirs, self.oracle, inputs, block.frames, reference)
+        bounds = (
+            row.bound(block.plan, size, reference) for size in (block.size, self.witness.size(block.size))
+        )
+        return three_sides(self.witness.name, ours, theirs, answers, *bounds)
+
+
+def tallies(
+    robot: Robot,
+    oracle: Oracle,
+    x: Samples,
+    first_sample: int,
+    clock: Clock,
+    second: SecondWitness | None = None,
+) -> dict[Key, Tally]:
     """Compare all frames, joints and columns of a robot.
 
     Args:
@@ -39,11 +69,12 @@ def tallies(robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: 
         x: What to compare at.
         first_sample: The number of the first sample.
         clock: Told whose work took how long.
+        second: Asked about frames too, if there is one.
     """
     found: dict[Key, Tally] = {}
     work = robot, oracle, x, first_sample, clock
     for frames in blocks(len(robot.all_frames), frame_bytes(len(x.q), robot.nv)):
-        for key, part in _Block(*work, frames).tallies():
+        for key, part in _Block(*work, frames).tallies(second):
             found[key] = found[key].beside(part) if key in found else part
     screws = reduce(Tally.beside, _Screws(*work).tallies())
     return found | {(SCREWS.name, Reference.WORLD.name.lower()): screws}
@@ -99,7 +130,7 @@ class _Block(_Work):
         self.places = [link - frames.start for link in moving[self.joints]]
         self.joint_names = robot.joint_names[self.joints]
 
-    def tallies(self) -> Iterator[tuple[Key, Tally]]:
+    def tallies(self, second: SecondWitness | None) -> Iterator[tuple[Key, Tally]]:
         """Quantity by quantity; a joint's is its child link's, for which Pinocchio has another way."""
         inputs = self.x.q, self.x.v, self.x.a
         for row in walked():
@@ -109,7 +140,10 @@ class _Block(_Work):
                 ours = self.clock.ours(row.ours, self.plan, inputs, reference)
                 theirs = self.clock.theirs(row.theirs, self.oracle, inputs, self.frames, reference)
                 bound = row.bound(self.plan, self.size, reference)
-                yield (row.name, name), self.tally(ours, theirs, bound, self.frames)
+                found = self.tally(ours, theirs, bound, self.frames)
+                if second is not None:
+                    found = replace(found, witness=second.three_sides(self, row, reference, ours, theirs))
+                yield (row.name, name), found
                 for joint in joints:
                     theirs = self.clock.theirs(joint.theirs, self.oracle, inputs, self.joints, reference)
                     part = Bound(bound.scale[:, self.places], bound.k[:, self.places])

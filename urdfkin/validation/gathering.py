@@ -6,6 +6,7 @@ Whatever was asked for is reported on: a robot of which nothing came back, or no
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import reduce
 
 from urdfkin.validation.answer import Answer, Failure
 from urdfkin.validation.chunk import ChunkResult, Subject
@@ -15,6 +16,8 @@ from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
 from urdfkin.validation.results import RobotReport
 from urdfkin.validation.tally import Key, Tally
+from urdfkin.validation.three_sides import plus
+from urdfkin.verify.witnesses import WITNESSES
 
 #: Called after each chunk with (chunks done, chunks in all, the robot's source).
 Progress = Callable[[int, int, str], None]
@@ -112,3 +115,11 @@ def _outside(tallies: dict[Key, Tally]) -> Iterator[str]:
     if failed:
         results = sum(tally.results for tally in tallies.values())
         yield f"{failed:,} of {results:,} results lie outside their bound"
+    found = reduce(plus, (tally.witness for tally in tallies.values()), None)
+    if found is not None and found.urdfkin.failed:
+        ours, theirs, witness = found.alone
+        title = WITNESSES[found.by].title
+        yield (
+            f"{found.urdfkin.failed:,} results disagree with {title}'s: urdfkin stands alone in {ours:,},"
+            f" Pinocchio in {theirs:,}, {title} in {witness:,}"
+        )

@@ -39,7 +39,7 @@ from urdfkin.verify.magnitudes import magnitudes
 from urdfkin.verify.pinocchio_base import BaseNumbers, davenport
 from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, walked
 from urdfkin.verify.sampling import Samples, draw
-from urdfkin.verify.verifier import bound_of, pinocchios, urdfkins
+from urdfkin.verify.verifier import bound_of, theirs_of, urdfkins
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _FIFTY_DIGITS = np.vectorize(mp.mpf, otypes=[object])
@@ -199,7 +199,7 @@ class _Work:
         reference = _ALIGNED if reference is None else reference
         asked = self.part.asked._replace(reference=reference)
         part = self.part._replace(reference=reference, asked=asked)
-        ours, theirs = urdfkins(row, part), pinocchios(row, self.oracle, asked)
+        ours, theirs = urdfkins(row, part), theirs_of(row, self.oracle, asked)
         scale = np.broadcast_to(bound_of(row, part).scale, ours.shape)
         return _Compared(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
 

@@ -9,8 +9,8 @@ import math
 import platform
 import shlex
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,7 @@ from urdfkin.validation.tally import HISTOGRAM_EDGES, Key, Tally, WorstCase
 from urdfkin.verify.pinocchio_module import version as pinocchio_version
 from urdfkin.verify.quantities import QUANTITIES
 from urdfkin.verify.replay import replay_line
+from urdfkin.verify.witnesses import WITNESSES
 
 if TYPE_CHECKING:
     from urdfkin.validation.judgement import Judgement
@@ -141,7 +142,7 @@ class RobotReport:
                 "a": list(case.a),
                 "replay": self.replay(key),
             },
-        }
+        } | ({"witness": tally.witness.as_dict()} if tally.witness else {})
 
 
 def _finite(units: float) -> float | None:
@@ -154,6 +155,7 @@ def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> st
     row = QUANTITIES[quantity]
     # Joints are compared under their plain names, which a link elsewhere may have too.
     frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
+    origin = replace(origin, oracle=None)  # Pinocchio is asked again, as the check was
     return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
 
 
@@ -214,7 +216,7 @@ class ValidationReport:
         """The JSON document."""
         return {
             "schema": SCHEMA,
-            "versions": versions(),
+            "versions": versions(robot.origin.oracle for robot in self.robots),
             "started": self.started,
             "seconds": round(self.seconds, 3),
             "seed": self.seed,
@@ -255,9 +257,10 @@ def _named(origins: Sequence[Origin]) -> str:
     return shlex.join(origin.again for origin in origins)
 
 
-def versions() -> dict[str, str]:
-    """What computed and what checked."""
-    packages: Sequence[str] = ("urdfkin", "numpy", "numba", "yourdfpy", "example-robot-data")
+def versions(witnesses: Iterable[str | None] = ()) -> dict[str, str]:
+    """What computed and what checked, second witnesses included."""
+    packages = ["urdfkin", "numpy", "numba", "yourdfpy", "example-robot-data"]
+    packages += sorted({WITNESSES[name].package for name in witnesses if name in WITNESSES})
     found = {package: _version(package) for package in packages}
     return {"python": platform.python_version(), "pin": pinocchio_version()} | found
 

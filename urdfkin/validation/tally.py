@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urdfkin.model.tree import FloatArray
+from urdfkin.validation.three_sides import ThreeSides, plus
 from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.worst import worst_of_each
 
@@ -51,6 +52,7 @@ class Tally:
         by_frame: The largest disagreement of each frame, in the robot's order.
         case: Where the largest share was.
         bounds: The tightest and the widest bound, in eps * scale: it grows with the joints before a frame.
+        witness: What a second witness says, where one was asked.
     """
 
     results: int
@@ -61,6 +63,7 @@ class Tally:
     by_frame: tuple[float, ...]
     case: WorstCase | None
     bounds: tuple[float, float] = (math.inf, 0.0)
+    witness: ThreeSides | None = None
 
     def __add__(self, other: Tally) -> Tally:
         first, second = self.case, other.case
@@ -75,6 +78,7 @@ class Tally:
             tuple(max(a, b) for a, b in zip(self.by_frame, other.by_frame, strict=True)),
             first,
             (min(self.bounds[0], other.bounds[0]), max(self.bounds[1], other.bounds[1])),
+            plus(self.witness, other.witness),
         )
 
     def beside(self, other: Tally) -> Tally:

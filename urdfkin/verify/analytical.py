@@ -14,10 +14,11 @@ from urdfkin.verify.call import Part
 from urdfkin.verify.line_of_nodes import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.magnitudes import magnitudes
 from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.witnesses import Witness
 
 
 def held_against(
-    bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray
+    bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: Witness
 ) -> tuple[FloatArray, Bound]:
     """(n, frames, 6 or 7, nv) the same results by Pinocchio, and what the two are measured against.
 
@@ -26,11 +27,12 @@ def held_against(
         oracle: Pinocchio.
         x: What was asked.
         ours: What was handed out.
+        by: Whose the oracle is.
     """
     aligned = Reference.LOCAL_WORLD_ALIGNED
     q, frames, base = x.asked.inputs[0], x.asked.frames, x.asked.base
     J_v = oracle.jacobians(q, frames, aligned, base)
-    size = magnitudes(x.plan, x.q, None, None, x.state)
+    size = by.size(magnitudes(x.plan, x.q, None, None, x.state))
     bound = bound_of(x.plan, size, aligned)
     if x.representation == "quaternion":
         quat = oracle.quaternions(q, frames, base)

@@ -29,7 +29,7 @@ import numpy as np
 
 from urdfkin.compiled.plan import Column, Plan
 from urdfkin.kinematics.lengths import chapter as eq
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, of_joints
+from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, MUJOCO, ROUNDINGS, of_joints
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.magnitudes import Magnitudes
@@ -67,6 +67,28 @@ def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Refer
     factors += reference is not _ALIGNED
     k = factors * size.roundings
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
+
+
+@_BEYOND
+def about_the_root(size: Magnitudes) -> Magnitudes:
+    """The magnitudes that hold between urdfkin and MuJoCo.
+
+    MuJoCo keeps velocities, accelerations and Jacobians' columns about a centre of mass, at the root here
+    (`urdfkin.verify.mujoco`), and brings them to the frame at the end. What it adds up are the lengths of
+    another point, which is no farther from a joint, nor from the frame, than the path is long: levers of 2 p.
+    Both steps cross with a lever, which is a factor more: of one it makes two, of three four, never more than
+    twice as many. Each joint rounds by `MUJOCO` instead of `ROUNDINGS`.
+    """
+    p = 2.0 * size.p
+    shared = eq.tangential(size.w, size.vel)
+    return Magnitudes(
+        p=p,
+        w=size.w,
+        vel=eq.point_velocity(size.vel, size.w, p),
+        alpha=size.alpha,
+        acc=eq.point_acceleration(size.acc + shared, size.alpha, size.w, p),
+        roundings=2.0 * (MUJOCO / ROUNDINGS) * size.roundings,
+    )
 
 
 def placement_scale(plan: Plan, size: Magnitudes) -> FloatArray:

@@ -21,7 +21,7 @@ _entering = lock_over_forks()
 
 
 class VerificationError(UrdfkinError):
-    """urdfkin and Pinocchio disagree by more than rounding can explain: one of the two is wrong.
+    """urdfkin and its oracle disagree by more than rounding can explain: one of the two is wrong.
 
     Attributes:
         quantity: What was compared.
@@ -29,7 +29,7 @@ class VerificationError(UrdfkinError):
         reference: In which reference; of an analytical Jacobian, in which representation.
         index: Position of the worst sample in the batch.
         ours: urdfkin's value of that sample.
-        theirs: Pinocchio's.
+        theirs: The oracle's.
         bound: What the two may differ by, number for number.
         units: The disagreement, in eps * scale.
         reproduce: A line that computes the case again.
@@ -49,10 +49,11 @@ class VerificationError(UrdfkinError):
         bound: FloatArray,
         units: float,
         reproduce: str,
+        oracle: str = "Pinocchio",
     ) -> None:
         difference = float(np.abs(ours - theirs).max())
         super().__init__(
-            f"the {quantity} of {frame} ({reference}) disagrees with Pinocchio's",
+            f"the {quantity} of {frame} ({reference}) disagrees with {oracle}'s",
             where=f"sample {list(index)}" if index else None,
             found=f"a difference of {difference:.3g}, {units:.3g} eps*scale",
             remedy=f"reproduce it with: {reproduce}",
@@ -122,7 +123,7 @@ class Line:
 
     Attributes:
         quantity: What was computed.
-        checked: How many results Pinocchio confirmed.
+        checked: How many results the oracle confirmed.
         worst: The largest disagreement among them, in eps * scale.
         share: The same as a share of the bound.
         unchecked: How many results were handed out without a check.
@@ -141,15 +142,17 @@ class Certificate:
 
     Attributes:
         robot: The robot's name.
-        pinocchio: The version that checked.
+        oracle: Who checked, and in which version: "Pinocchio 4.1.0".
         lines: One for each quantity that was computed.
         not_verified: Why results were not checked, in words; empty where all were.
+        reading: Who vouches for the way from another format to the URDF that is checked; empty for a URDF.
     """
 
     robot: str
-    pinocchio: str
+    oracle: str
     lines: tuple[Line, ...]
     not_verified: tuple[str, ...]
+    reading: str = ""
 
     @property
     def verified(self) -> bool:
@@ -159,13 +162,14 @@ class Certificate:
         )
 
     def __str__(self) -> str:
-        head = f"{self.robot}, checked by Pinocchio {self.pinocchio}"
+        head = f"{self.robot}, checked by {self.oracle}"
         rows = [head] + [
             f"  {line.quantity}: {line.checked} checked, worst {line.worst:.2g} eps*scale"
             f" ({line.share:.1%} of the bound)"
             + (f", {line.unchecked} not checked" if line.unchecked else "")
             for line in self.lines
         ]
+        rows += [f"  read: {self.reading}"] if self.reading else []
         return "\n".join(rows + [f"  not verified: {reason}" for reason in self.not_verified])
 
 
@@ -224,7 +228,7 @@ class Ledger:
                 account.unchecked += results
                 self._reasons[reason] = None
 
-    def certificate(self, robot: str, pinocchio: str) -> Certificate:
+    def certificate(self, robot: str, oracle: str) -> Certificate:
         """What stands in the ledger now."""
         with _entering:
             found = [
@@ -234,7 +238,7 @@ class Ledger:
             lines = [account.line(quantity) for quantity, account in found]
             return Certificate(
                 robot,
-                pinocchio,
+                oracle,
                 tuple(line for line in lines if line.checked or line.unchecked),
                 (*reasons, *self._reasons),
             )

@@ -14,7 +14,7 @@ q_full = G q + g_0, v_full = G v, J = J_full G.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 from xml.parsers.expat import ExpatError
 
@@ -38,6 +38,9 @@ _STACK_FOR_A_LINK = 16_384
 _SHALLOW = 100
 #: Pinocchio's workspace takes about 64 bytes times the cube of the rates (4.1.0 measured): at most 2 GB.
 MOST_RATES = 315
+
+#: Coordinates of a joint that moves freely.
+_CARTESIAN = 7
 
 #: What carries a robot whose base moves.
 _BASE = "base"
@@ -336,6 +339,49 @@ class Oracle:
         if self._moving_base and base is not None:
             full[:, :6] = free_flyer_second_rates(base)
         return full
+
+
+def mjcf_placements(
+    path: str, qpos: FloatArray, coordinates: Mapping[str, int], bodies: Sequence[str]
+) -> FloatArray:
+    """(n, bodies, 4, 4) by Pinocchio's own reader of MJCF, which takes joints and bodies by name.
+
+    Args:
+        path: The file.
+        qpos: (n, MuJoCo's nq).
+        coordinates: Where each joint's first number stands in them.
+        bodies: Names of bodies.
+
+    Raises:
+        OracleError: it does not accept the file, or finds other joints or bodies in it.
+    """
+    import pinocchio as pin  # noqa: PLC0415  heavy: only when something is checked
+
+    try:
+        model = pin.buildModelFromMJCF(path)
+    except Exception as error:  # it raises what its parsers do
+        raise OracleError("it does not accept the file", found=str(error).strip()) from error
+    joints = {str(name): model.joints[j] for j, name in enumerate(model.names) if j}
+    if joints.keys() != coordinates.keys():
+        found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:5])
+        raise OracleError("it finds other joints", found=found)
+    if missing := [name for name in bodies if not model.existFrame(name)]:
+        raise OracleError("it finds no such body", found=missing[0])
+    data, out = model.createData(), np.empty((len(qpos), len(bodies), 4, 4))
+    ids = [int(model.getFrameId(name, pin.FrameType.BODY)) for name in bodies]
+    for k, numbers in enumerate(qpos):
+        q = pin.neutral(model)
+        for name, at in coordinates.items():
+            own, x = joints[name], numbers[at]
+            if own.nq == _CARTESIAN:
+                q[own.idx_q : own.idx_q + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
+            elif own.nq == own.nv:
+                q[own.idx_q] = x
+            else:  # a turn without limits
+                q[own.idx_q : own.idx_q + 2] = np.cos(x), np.sin(x)
+        pin.framesForwardKinematics(model, data, q)
+        out[k] = [data.oMf[i].homogeneous for i in ids]
+    return out
 
 
 def _depth(tree: KinematicTree) -> int:

@@ -19,12 +19,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from importlib import import_module
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Literal
 
 from urdfkin.errors import UnknownNameError
-from urdfkin.system.forking import importing
+from urdfkin.system.later import later
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,20 +37,17 @@ if TYPE_CHECKING:
 
 #: The rows of a velocity, an acceleration or a Jacobian.
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
-#: (oracle, part, ours) to Pinocchio's results and what the two are measured against.
+#: (oracle, part, ours, witness) to its results and what the two are measured against.
 Against = Callable[..., "tuple[FloatArray, Bound]"]
 
 
-def later(home: str) -> Callable[..., Any]:
-    """The function `module:name`, imported and looked up when it is called."""
-    module, _, name = home.partition(":")
+def asked(name: str) -> Callable[..., Any]:
+    """The oracle's method of that name, whichever oracle it is."""
 
-    def call(*arguments: Any, **options: Any) -> Any:
-        with importing:
-            found = import_module(module)
-        return attrgetter(name)(found)(*arguments, **options)
+    def ask(oracle: Any, *arguments: Any) -> Any:
+        return getattr(oracle, name)(*arguments)
 
-    return call
+    return ask
 
 
 _bound = later("urdfkin.verify.bounds:bound_of")
@@ -70,11 +65,11 @@ class Quantity:
         equations: The text's.
         compute: The walk, (plan, *inputs, reference, base=, out=, threads=) to (n, frames, ...); where it is
             not `walked`, what a method of the robot's has computed in a way of its own.
-        ask: Asks Pinocchio, (oracle, *inputs, frames, reference, base) to (n, frames, ...); of joints, which
+        ask: Asks an oracle, (oracle, *inputs, frames, reference, base) to (n, frames, ...); of joints, which
             of the moving ones. Where it is not `referred`, neither takes a reference.
         scale: The size of its terms, (plan, magnitudes, reference): see `urdfkin.verify.bounds`.
         factors: How many rotated vectors each term of [linear; angular] multiplies, in LOCAL_WORLD_ALIGNED.
-        against: (oracle, part, ours) to Pinocchio's results and their bound, where `ask` and `scale` cannot
+        against: (oracle, part, ours, witness) to its results and their bound, where `ask` and `scale` cannot
             say it.
         exact: Its true values, (motion, link, reference) to numbers of any kind, for judge and enclosures.
         walked: Whether the walk computes it for any frames: then it is validated, judged and plotted.
@@ -181,7 +176,7 @@ PLACEMENT = Quantity(
     shape=(4, 4),
     equations=("7.77",),
     compute=later("urdfkin.compiled.evaluate:placements"),
-    ask=later("urdfkin.verify.pinocchio:Oracle.placements"),
+    ask=asked("placements"),
     scale=later("urdfkin.verify.bounds:placement_scale"),
     exact=later("urdfkin.verify.exact.recursion:placement_values"),
     factors=1,
@@ -200,7 +195,7 @@ VELOCITY = Quantity(
     shape=(6,),
     equations=("7.127", "7.128"),
     compute=later("urdfkin.compiled.evaluate:velocities"),
-    ask=later("urdfkin.verify.pinocchio:Oracle.velocities"),
+    ask=asked("velocities"),
     scale=later("urdfkin.verify.bounds:velocity_scale"),
     exact=later("urdfkin.verify.exact.recursion:velocity_values"),
     factors=2,
@@ -218,7 +213,7 @@ JACOBIAN = Quantity(
     shape=(6, "nv"),
     equations=("7.85",),
     compute=later("urdfkin.compiled.evaluate:jacobians"),
-    ask=later("urdfkin.verify.pinocchio:Oracle.jacobians"),
+    ask=asked("jacobians"),
     scale=later("urdfkin.verify.bounds:jacobian_scale"),
     exact=later("urdfkin.verify.exact.recursion:jacobian_values"),
     factors=2,
@@ -235,7 +230,7 @@ JACOBIAN_RATE = Quantity(
     shape=(6, "nv"),
     equations=("7.126",),
     compute=later("urdfkin.compiled.evaluate:jacobian_rates"),
-    ask=later("urdfkin.verify.pinocchio:Oracle.jacobian_rates"),
+    ask=asked("jacobian_rates"),
     scale=later("urdfkin.verify.bounds:jacobian_rate_scale"),
     exact=later("urdfkin.verify.exact.recursion:jacobian_rate_values"),
     factors=3,
@@ -254,7 +249,7 @@ ACCELERATION = Quantity(
     shape=(6,),
     equations=("7.129", "7.130"),
     compute=later("urdfkin.compiled.evaluate:accelerations"),
-    ask=later("urdfkin.verify.pinocchio:Oracle.accelerations"),
+    ask=asked("accelerations"),
     scale=later("urdfkin.verify.bounds:acceleration_scale"),
     exact=later("urdfkin.verify.exact.recursion:acceleration_values"),
     factors=3,
@@ -291,14 +286,14 @@ JOINT_JACOBIAN = replace(
     JACOBIAN,
     name="joint jacobian",
     title="joint Jacobian",
-    ask=later("urdfkin.verify.pinocchio:Oracle.joint_jacobians"),
+    ask=asked("joint_jacobians"),
     of="joints",
 )
 JOINT_JACOBIAN_RATE = replace(
     JACOBIAN_RATE,
     name="joint jacobian rate",
     title="joint Jacobian rate",
-    ask=later("urdfkin.verify.pinocchio:Oracle.joint_jacobian_rates"),
+    ask=asked("joint_jacobian_rates"),
     of="joints",
 )
 SCREWS = replace(
@@ -306,7 +301,7 @@ SCREWS = replace(
     name="screws",
     title="data.J",
     shape=(6,),
-    ask=later("urdfkin.verify.pinocchio:Oracle.screws"),
+    ask=asked("screws"),
     of="columns",
     head="data.J",
 )

@@ -1,12 +1,13 @@
-"""What a robot has that checks it: the text that Pinocchio reads, what Pinocchio said, and what nobody asked.
+"""What a robot has that checks it: the text that its oracle reads, what that said, and what nobody asked.
 
-A result is held against Pinocchio's for the user's own arguments, in the shape in which it is handed out.
+A result is held against the oracle's for the user's own arguments, in the shape in which it is handed out.
 """
 
 from __future__ import annotations
 
 import sys
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,13 +33,14 @@ from urdfkin.verify.quantities import Quantity
 from urdfkin.verify.replay import replay_line
 from urdfkin.verify.sampling import draw
 from urdfkin.verify.tables import TableCheck, TableError, check_table
+from urdfkin.verify.witnesses import PINOCCHIO, Witness, WitnessName, witness_of
 
 #: Random configurations that a table is checked on, besides the neutral one and the ends of the limits.
 TABLE_SAMPLES = 40
 
 
 class NotVerifiedWarning(UserWarning):
-    """Results are handed out that Pinocchio could not check; the message says why."""
+    """Results are handed out that the oracle could not check; the message says why."""
 
 
 class Verifier:
@@ -51,9 +53,11 @@ class Verifier:
         policy: Which results are checked unless a call says otherwise.
         mimic: Whether followers follow.
         unverifiable: Why Pinocchio cannot check the robot; None if it can, as far as is known.
+        oracle: Who checks quantities: "pinocchio" or "mujoco". Tables, judge and enclosures ask Pinocchio.
 
     Attributes:
         ledger: What was handed out, checked or not.
+        reading: Who vouches for the way from another format to the text; empty where it was a URDF.
     """
 
     def __init__(
@@ -65,38 +69,46 @@ class Verifier:
         policy: Verify = True,
         mimic: bool = True,
         unverifiable: str | None = None,
+        oracle: WitnessName = "pinocchio",
     ) -> None:
         self.text, self.tree, self.origin = text, tree, origin
         self.policy, self.mimic, self.unverifiable = checked_choice(policy), mimic, unverifiable
-        self.ledger = Ledger()
-        self._oracles: dict[bool, Oracle] = {}
+        self.witness = witness_of(oracle)
+        self.ledger, self.reading = Ledger(), ""
+        self._oracles: dict[tuple[str, bool], Oracle] = {}
+        self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         # Pinocchio's models are rebuilt where they are needed. A copy, in this process or another, has handed
         # out nothing yet: its ledger is empty.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
-    def oracle(self, base: BaseMotion | None = None) -> Oracle:
-        """Pinocchio's model of the robot, made once; on a free-flyer if the base moves.
+    def oracle(self, base: BaseMotion | None = None, by: Witness = PINOCCHIO) -> Oracle:
+        """A witness's model of the robot, made once; on a free-flyer if the base moves.
 
         Raises:
-            OracleError: Pinocchio does not accept the text, or finds other joints in it.
+            OracleError: the witness does not accept the text, or finds other joints in it.
+            InputError: the witness is not installed.
         """
-        moving = base is not None
-        if moving not in self._oracles:
-            self._oracles[moving] = Oracle(
-                self.text, self.tree, mimic=self.mimic, moving_base=moving, root_joint=self.origin.root_joint
+        key = by.name, base is not None
+        if key not in self._oracles:
+            self._oracles[key] = by.oracle(
+                self.text, self.tree, mimic=self.mimic, moving_base=key[1], root_joint=self.origin.root_joint
             )
-        return self._oracles[moving]
+        return self._oracles[key]
 
-    def cannot(self, base: BaseMotion | None = None) -> str | None:
-        """Why Pinocchio cannot check this robot; None if it can."""
-        if self.unverifiable is None:
+    def cannot(self, base: BaseMotion | None = None, by: Witness = PINOCCHIO) -> str | None:
+        """Why a witness cannot check this robot; None if it can."""
+        if by is PINOCCHIO and self.unverifiable is not None:
+            return self.unverifiable
+        if by.name not in self._refusals:
             try:
-                self.oracle(base)
+                self.oracle(base, by)
             except OracleError as error:
-                self.unverifiable = str(error)
-        return self.unverifiable
+                self._refusals[by.name] = str(error)
+                if by is PINOCCHIO:
+                    self.unverifiable = str(error)
+        return self._refusals.get(by.name)
 
     def wanted(self, verify: Verify | None) -> Verify:
         """Which results are to be checked; None leaves it to the policy."""
@@ -112,8 +124,9 @@ class Verifier:
             pinocchio()
 
     def certificate(self) -> Certificate:
-        """What was checked so far, how closely it agreed, by which Pinocchio, and what was not checked."""
-        return self.ledger.certificate(self.tree.name, version())
+        """What was checked so far, how closely it agreed, by whom, and what was not checked."""
+        found = self.ledger.certificate(self.tree.name, self.witness.words)
+        return replace(found, reading=self.reading)
 
     # -- quantities ----------------------------------------------------------------------------------
 
@@ -121,14 +134,14 @@ class Verifier:
         """Have a call's results checked, in the shape in which the user gets them, and enter them.
 
         Raises:
-            VerificationError: Pinocchio computes something else.
+            VerificationError: the oracle computes something else.
             OracleError: they have another shape than what was asked.
         """
         ledger, wanted = self.ledger, self.wanted(verify)
         if wanted is False:
             ledger.unchecked(quantity.name, call.results)
             return
-        if (reason := self.cannot(call.base)) is not None:
+        if (reason := self.cannot(call.base, self.witness)) is not None:
             _warn(reason)
             ledger.unchecked(quantity.name, call.results, reason)
             return
@@ -150,7 +163,7 @@ class Verifier:
     ) -> tuple[Comparison, VerificationError | None]:
         """Hold some of the results against Pinocchio's; the worst of them, if it disagrees."""
         x = call.part(part)
-        theirs, bound = held_against(quantity, self.oracle(call.base), x, ours)
+        theirs, bound = held_against(quantity, self.oracle(call.base, self.witness), x, ours, self.witness)
         comparison = compare(ours, theirs, bound, 2)
         if comparison.agrees:
             return comparison, None
@@ -173,6 +186,7 @@ class Verifier:
             bound=EPS * bound.k * bound.scale,
             units=float(bounds.disagreement(ours[i, f], theirs[i, f], bound).max()),
             reproduce=self._replay(quantity, call, k, call.frames[f]),
+            oracle=self.witness.title,
         )
 
     def _replay(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
@@ -250,17 +264,19 @@ class Verifier:
         return line
 
 
-def held_against(quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray) -> tuple[FloatArray, Bound]:
-    """(n, frames, ...) the same results by Pinocchio, and what the two are measured against."""
+def held_against(
+    quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: Witness = PINOCCHIO
+) -> tuple[FloatArray, Bound]:
+    """(n, frames, ...) the same results by a witness, and what the two are measured against."""
     if quantity.against is not None:
-        return quantity.against(oracle, x, ours)
-    return pinocchios(quantity, oracle, x.asked), bound_of(quantity, x)
+        return quantity.against(oracle, x, ours, by)
+    return theirs_of(quantity, oracle, x.asked), bound_of(quantity, x, by)
 
 
-def bound_of(quantity: Quantity, x: Part) -> Bound:
+def bound_of(quantity: Quantity, x: Part, by: Witness = PINOCCHIO) -> Bound:
     """What the two are measured against."""
     v, a = (*x.rates, None, None)[:2]
-    size = magnitudes(x.plan, x.q, v, a, x.state)
+    size = by.size(magnitudes(x.plan, x.q, v, a, x.state))
     return quantity.bound(x.plan, size, x.reference)
 
 
@@ -270,8 +286,8 @@ def urdfkins(quantity: Quantity, x: Part) -> FloatArray:
 
 
 @np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite disagrees
-def pinocchios(quantity: Quantity, oracle: Oracle, asked: Rows) -> FloatArray:
-    """(n, frames, ...) by Pinocchio, for what the user asked."""
+def theirs_of(quantity: Quantity, oracle: Oracle, asked: Rows) -> FloatArray:
+    """(n, frames, ...) by a witness, for what the user asked."""
     return quantity.theirs(oracle, asked.inputs, asked.frames, asked.reference, asked.base)
 
 

@@ -34,7 +34,7 @@ from urdfkin.verify.quantities import (
     VELOCITY,
     Quantity,
 )
-from urdfkin.verify.verifier import Verifier, pinocchios, urdfkins
+from urdfkin.verify.verifier import Verifier, theirs_of, urdfkins
 
 #: Fewer digits than these a double has; more than those nobody waits for.
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
@@ -173,7 +173,7 @@ def enclose(
         true = row.truth(motion, link, call.reference)
         lower, upper = np.vectorize(ends, otypes=[float, float])(true)
         ours = frozen(urdfkins(row, part)[0, 0])
-        theirs = None if oracle is None else frozen(pinocchios(row, oracle, part.asked)[0, 0])
+        theirs = None if oracle is None else frozen(theirs_of(row, oracle, part.asked)[0, 0])
         return Enclosure(row.name, frozen(lower), frozen(upper), ours, theirs)
 
     return Enclosures(

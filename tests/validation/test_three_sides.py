@@ -1,0 +1,127 @@
+"""A second witness: three answers to each question, and it is found who stands alone."""
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.lint.cases.arm import arm
+from urdfkin.model.tree import FloatArray
+from urdfkin.report.consistency import contradictions
+from urdfkin.report.document import Document
+from urdfkin.report.html import as_html
+from urdfkin.report.junit import as_junit
+from urdfkin.report.markdown import as_markdown
+from urdfkin.report.reading import checked
+from urdfkin.validation.campaign import validate
+from urdfkin.validation.three_sides import ThreeSides, plus, three_sides
+from urdfkin.verify.bounds import Bound
+from urdfkin.verify.mujoco import MujocoOracle
+from urdfkin.verify.pinocchio import Oracle
+
+EPS = np.finfo(float).eps
+FIRST = Bound(np.ones((1, 1, 1)), np.full((1, 1, 1), 4.0))
+SECOND = Bound(np.full((1, 1, 1), 2.0), np.full((1, 1, 1), 8.0))
+
+
+def asked(ours: float, pinocchios: float, witness: float) -> ThreeSides:
+    one: list[FloatArray] = [np.full((1, 1, 1), 1.0 + x * EPS) for x in (ours, pinocchios, witness)]
+    return three_sides("mujoco", one[0], one[1], one[2], FIRST, SECOND)
+
+
+@pytest.mark.parametrize(
+    ("answers", "alone", "undecided"),
+    [
+        ((0, 4, 16), (0, 0, 0), 0),
+        ((100, 0, 0), (1, 0, 0), 0),
+        ((0, 100, 0), (0, 1, 0), 0),
+        ((0, 0, 100), (0, 0, 1), 0),
+        ((0, 100, 300), (0, 0, 0), 1),
+        ((0, 8, 16), (0, 0, 0), 1),
+        ((0, np.nan, 0), (0, 1, 0), 0),
+        ((0, 0, np.inf), (0, 0, 1), 0),
+    ],
+)
+def test_who_disagrees_with_two_that_agree_stands_alone(
+    answers: tuple[float, float, float], alone: tuple[int, int, int], undecided: int
+) -> None:
+    found = asked(*answers)
+    assert (found.alone, found.undecided) == (alone, undecided)
+
+
+def test_sums_add_up_in_any_order() -> None:
+    some = [asked(*answers) for answers in ((0, 4, 16), (100, 0, 0), (0, 100, 300))]
+    sums = set()
+    for order in itertools.permutations(some):
+        total: ThreeSides | None = None
+        for one in order:
+            total = plus(total, one)
+        sums.add(total)
+    (total,) = sums
+    assert total is not None
+    assert total.alone == (1, 0, 0)
+    assert total.undecided == 1
+    assert total.urdfkin.failed == 2
+
+
+def document_of(**changes: Any) -> Document:
+    report = validate(arm(), samples=3, oracle="mujoco", **changes)
+    return checked(report.as_dict(), "the report")
+
+
+def off(method: Any) -> Any:
+    return lambda *given: method(*given) + 1e-6
+
+
+def test_three_that_agree_are_told_side_by_side_in_every_form() -> None:
+    document = document_of()
+    robot = document["robots"][0]
+    assert robot["verdict"] == "verified"
+    assert "mujoco" in document["versions"]
+    assert "--oracle mujoco" in document["command"]
+    witnessed = [check for check in robot["checks"] if "witness" in check]
+    assert {check["subjects"] for check in witnessed} == {"frames"}
+    assert len(witnessed) == 13
+    for text in (as_markdown(document), as_html(document), as_junit(document).decode()):
+        assert "urdfkin, MuJoCo" in text
+        assert "nobody" in text
+
+
+@pytest.mark.parametrize(
+    ("oracle", "who"), [(Oracle, "Pinocchio"), (MujocoOracle, "MuJoCo")], ids=["Pinocchio", "MuJoCo"]
+)
+def test_one_that_errs_stands_alone_in_the_report(
+    oracle: type, who: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(oracle, "velocities", off(oracle.velocities))  # type: ignore[attr-defined]
+    document = document_of()
+    robot = document["robots"][0]
+    assert robot["verdict"] == "disagrees"
+    assert list(contradictions(document)) == []
+    key = "pinocchio" if who == "Pinocchio" else "witness"
+    counts = {
+        check["quantity"]: check["witness"]["alone"][key]  # type: ignore[literal-required]
+        for check in robot["checks"]
+        if "witness" in check
+    }
+    assert counts.pop("velocity") > 0
+    assert set(counts.values()) == {0}
+    assert f"{who} \\(" in as_markdown(document).split("stands alone")[-1]
+    if who == "MuJoCo":
+        assert "urdfkin stands alone in 0, Pinocchio in 0" in (robot["reason"] or "")
+
+
+def test_a_witness_that_cannot_read_the_robot_leaves_it_unverified() -> None:
+    text = arm(robot='name="r" version="1.1"', origin='<origin quat_xyzw="0 0 1 0"/>')
+    report = validate(text, samples=0, oracle="mujoco")
+    assert report.exit_code == 3
+    assert "MuJoCo does not know quat_xyzw" in (report.robots[0].reason or "")
+
+
+def test_without_a_second_witness_nothing_is_said_of_one() -> None:
+    document = validate(arm(), samples=0).as_dict()
+    assert "witness" not in str(document)
+    assert "mujoco" not in document["versions"]
+    assert urdfkin.load(arm()).origin.oracle is None

@@ -1,0 +1,126 @@
+"""MuJoCo as a witness: it computes the same from its own reading, and says so, or why it cannot."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.lint.cases.arm import arm, fixed
+from urdfkin.errors import UnknownNameError
+from urdfkin.model.reference import Reference
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.verify import witnesses
+from urdfkin.verify.mujoco import MujocoOracle
+from urdfkin.verify.verifier import NotVerifiedWarning
+
+SUBJECTS: dict[str, tuple[str, dict[str, Any]]] = {
+    "an arm": (arm(axis='<axis xyz="1 2 -3"/>'), {}),
+    "a slide": (arm(attributes='type="prismatic"'), {}),
+    "a planar joint below a floating one": (
+        arm(attributes='type="floating"', axis="", limit="", second='type="planar"'),
+        {},
+    ),
+    "a follower": (arm(follow='<mimic joint="j1" multiplier="-2" offset="0.3"/>'), {}),
+    "a follower set free": (arm(follow='<mimic joint="j1" multiplier="-2"/>'), {"mimic": False}),
+    "names that MuJoCo takes": (
+        arm(base='<link name="base"/><link name="world"/>', more=fixed("l1", "tool", "world")),
+        {},
+    ),
+    "hung from a floating joint": (arm(), {"root_joint": "floating"}),
+    "hung from a planar joint": (arm(), {"root_joint": "planar"}),
+}
+
+
+def base_motion(rng: np.random.Generator, size: float) -> urdfkin.BaseMotion:
+    R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R * np.linalg.det(R), size * rng.normal(size=3)
+    return urdfkin.BaseMotion(T, *rng.normal(size=(2, 6)))
+
+
+def ask_everything(robot: urdfkin.Robot, n: int, base: urdfkin.BaseMotion | None) -> None:
+    rng = np.random.default_rng(1)
+    q, (v, a), frames = robot.sample(n), rng.normal(size=(2, n, robot.nv)), robot.all_frames
+    robot.placement(q, frames, base=base)
+    for reference in Reference:
+        robot.velocity(q, v, frames, reference, base=base)
+        robot.jacobian(q, frames, reference, base=base)
+        robot.jacobian_rate(q, v, frames, reference, base=base)
+        robot.acceleration(q, v, a, frames, reference, base=base)
+    robot.analytical_jacobian(q, frames[-1], "quaternion", base=base)
+
+
+@pytest.mark.parametrize("name", SUBJECTS)
+@pytest.mark.parametrize("far", [None, 1.0, 1e6], ids=lambda far: f"base {far}")
+def test_mujoco_agrees_in_every_quantity_and_reference(name: str, far: float | None) -> None:
+    text, options = SUBJECTS[name]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        robot = urdfkin.load(text, oracle="mujoco", **options)
+    ask_everything(robot, 5, None if far is None else base_motion(np.random.default_rng(0), far))
+    certificate = robot.certificate()
+    assert certificate.verified, certificate
+    assert certificate.oracle == f"MuJoCo {witnesses.MUJOCO.version()}"
+    assert "checked by MuJoCo" in str(certificate)
+    assert all(line.worst < 40.0 for line in certificate.lines), certificate
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", catalogue())
+def test_mujoco_agrees_about_every_robot_of_the_catalogue(name: str) -> None:
+    robot = urdfkin.load(name, oracle="mujoco")
+    q = robot.sample(1)
+    v, a = np.random.default_rng(0).normal(size=(2, 1, robot.nv))
+    robot.jacobian_rate(q, v, robot.link_frames)
+    robot.acceleration(q, v, a, robot.link_frames)
+    assert robot.certificate().verified
+
+
+def test_what_pinocchio_refuses_mujoco_may_check() -> None:
+    with pytest.warns(urdfkin.UrdfWarning, match="URDF303"):
+        robot = urdfkin.load(arm(origin='<origin xyz="0\t0 1"/>'), oracle="mujoco")
+    robot.placement(robot.neutral(), "tool")
+    assert robot.certificate().verified
+
+
+@pytest.mark.parametrize(
+    ("method", "quantity"),
+    [("placements", "placement"), ("jacobians", "jacobian"), ("velocities", "velocity")],
+)
+def test_a_disagreement_with_mujoco_is_raised_in_its_name(
+    method: str, quantity: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right = getattr(MujocoOracle, method)
+    monkeypatch.setattr(MujocoOracle, method, lambda *given: right(*given) + 1e-9)
+    robot = urdfkin.load(arm(), oracle="mujoco")
+    inputs = (robot.neutral(),) if quantity != "velocity" else (robot.neutral(), [1.0, 1.0])
+    with pytest.raises(urdfkin.VerificationError, match="disagrees with MuJoCo's") as caught:
+        robot.compute(quantity, inputs, "tool")
+    assert "oracle" in str(caught.value), "the line that reproduces it asks MuJoCo again"
+
+
+def test_what_mujoco_does_not_know_is_a_reason() -> None:
+    text = arm(robot='name="r" version="1.1"', origin='<origin quat_xyzw="0 0 1 0"/>')
+    with pytest.warns(urdfkin.UrdfWarning):
+        robot = urdfkin.load(text, oracle="mujoco")
+    with pytest.warns(NotVerifiedWarning, match="MuJoCo does not know quat_xyzw"):
+        robot.placement(robot.neutral(), "tool")
+    assert not robot.certificate().verified
+
+
+def test_an_oracle_that_nobody_knows_is_an_error() -> None:
+    with pytest.raises(UnknownNameError, match=r"unknown oracle 'mujuco'.*did you mean mujoco"):
+        urdfkin.load(arm(), oracle="mujuco")  # type: ignore[arg-type]
+
+
+def test_a_witness_that_is_not_installed_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> str:
+        raise witnesses_metadata.PackageNotFoundError(name)
+
+    from importlib import metadata as witnesses_metadata  # noqa: PLC0415
+
+    monkeypatch.setattr(witnesses_metadata, "version", missing)
+    with pytest.raises(urdfkin.InputError, match=r"MuJoCo is not installed; pip install 'urdfkin\[mujoco\]'"):
+        urdfkin.load(arm(), oracle="mujoco")

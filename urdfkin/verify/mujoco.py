@@ -1,0 +1,528 @@
+"""Everything that asks MuJoCo, the second witness.
+
+MuJoCo reads the links' and joints' places and axes from the URDF's text with its own parser, goes through
+unit quaternions, and keeps six-vectors about a centre of mass: neither urdfkin nor Pinocchio does either.
+What its kinematics does not need, or what it has no words for, is settled before it reads, on the text:
+
+- meshes and inertials are left out. Each link gets a body of its own; the root's is so much heavier that the
+  centre of mass, about which MuJoCo measures, stays at the root.
+- links and joints are called by numbers, so that no name of MuJoCo's is taken.
+- floating and planar joints are added as slides and a ball or a hinge: a free one stands on the world only.
+- followers are coupled by `rules_of_text`: MuJoCo makes constraints of them that kinematics never feels.
+
+q, v and a become MuJoCo's by qpos(q), qvel = S v, qacc = S a + S' v, and Jacobians come back as J S: S holds
+the followers' factors, and the rotation that takes a floating joint's rates, in its own axes, to its slides.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, tostring
+from xml.parsers.expat import ExpatError
+
+import numpy as np
+
+from urdfkin.errors import OracleError
+from urdfkin.model.frame_names import JointFrame, LinkFrame
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
+from urdfkin.urdf.mujoco import library
+from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.verify.followers import rules_of_text
+from urdfkin.verify.pinocchio_base import BaseNumbers, nearest_quaternion
+
+#: What a root joint, or a base that moves, hangs from.
+WORLD = "universe"
+#: Of the root, and of every other link: kg, and kg m^2.
+_HEAVY, _LIGHT = "1", "1e-12"
+#: What each kind of joint is in MuJoCo, in the order of its coordinates: slides along the axes, then turns.
+_PARTS = {
+    "planar": ("slide x", "slide y", "hinge"),
+    "floating": ("slide x", "slide y", "slide z", "ball"),
+}
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+#: A joint's coordinates and rates in urdfkin's layout.
+_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
+
+
+@dataclass(frozen=True, slots=True)
+class _Joint:
+    """A joint as the text has it, and the link that it carries."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    element: Element | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """A moving joint: where its numbers are in MuJoCo's q and v, and in urdfkin's; its rule if it follows."""
+
+    kind: str
+    their_q: int
+    their_v: int
+    q: int
+    v: int
+    multiplier: float
+    offset: float
+
+
+class MujocoOracle:
+    """MuJoCo's answers for one robot, in urdfkin's layout: what `pinocchio.Oracle` is for Pinocchio.
+
+    Args:
+        text: The URDF.
+        tree: urdfkin's reading: it must have the same joints in the same order; nothing is taken from it.
+        mimic: Whether followers follow.
+        moving_base: Hang the root from a floating joint that is given the base's motion.
+        root_joint: `"floating"` or `"planar"` when the tree hangs from such a joint.
+
+    Raises:
+        OracleError: MuJoCo does not accept the text, or it holds what MuJoCo does not know.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        tree: KinematicTree,
+        *,
+        mimic: bool = True,
+        moving_base: bool = False,
+        root_joint: str | None = None,
+    ) -> None:
+        self._mujoco, self._name, self._moving_base = library(), tree.name, moving_base
+        self._stands_on_world = root_joint is not None
+        try:
+            joints, self._links = _ordered(text, root_joint)
+            moving = [joint.name for joint in joints if joint.kind != "fixed"]
+            rules = rules_of_text(text, set(moving)) if mimic else {}
+        except (ValueError, KeyError, ExpatError) as error:
+            raise OracleError("the text reads differently", where=tree.name, found=str(error)) from error
+        self._children = {joint.name: joint.child for joint in joints}
+        carrier = [_Joint("", "floating", "", self._links[0])] if moving_base else []
+        self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if carrier else []), *self._links])}
+        self._model = self._compiled([*carrier, *joints])
+        self._places = list(self._laid_out([*carrier, *joints], rules))
+        self.nq, self.nv = tree.nq, tree.nv
+        self._demand_the_same(tree, moving, rules)
+        self._constant = all(place.kind not in _PARTS for place in self._places)
+        self._local = threading.local()
+
+    # -- the model -----------------------------------------------------------------------------------
+
+    def _compiled(self, joints: Sequence[_Joint]) -> Any:
+        """MuJoCo's model of the links and joints."""
+        mujoco = self._mujoco
+        robot = Element("robot", name="r")
+        options = {"fusestatic": "false", "boundmass": "0", "boundinertia": "0"}
+        SubElement(SubElement(robot, "mujoco"), "compiler", options)
+        for i, name in enumerate(self._bodies.values()):
+            inertial = SubElement(SubElement(robot, "link", name=name), "inertial")
+            weight = _HEAVY if i == self._moving_base else _LIGHT
+            SubElement(inertial, "mass", value=weight)
+            moments = {f"i{a}{b}": weight if a == b else "0" for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")}
+            SubElement(inertial, "inertia", moments)
+        for i, joint in enumerate(joints):
+            robot.append(self._joint(i, joint))
+        try:
+            spec = mujoco.MjSpec.from_string(tostring(robot, encoding="unicode"))
+            spec.option.gravity = (0.0, 0.0, 0.0)
+            for i, joint in enumerate(joints):
+                for part in _PARTS.get(joint.kind, ()):
+                    what, _, axis = part.partition(" ")
+                    kind = getattr(mujoco.mjtJoint, f"mjJNT_{what.upper()}")
+                    body = spec.body(self._bodies[joint.child])
+                    body.add_joint(name=f"j{i} {part}", type=kind, axis=_AXES[axis or "z"])
+            return spec.compile()
+        except (ValueError, RuntimeError, mujoco.FatalError) as error:
+            first = str(error).strip().replace("\n", "; ")
+            raise OracleError("MuJoCo does not accept this robot", where=self._name, found=first) from error
+
+    def _joint(self, i: int, joint: _Joint) -> Element:
+        """A joint for MuJoCo to read: its place and axis in the words of the text, and no more."""
+        kind = "fixed" if joint.kind in _PARTS else joint.kind
+        made = Element("joint", name=f"j{i}", type="continuous" if kind == "revolute" else kind)
+        SubElement(made, "parent", link=self._bodies[joint.parent])
+        SubElement(made, "child", link=self._bodies[joint.child])
+        for tag, names in (("origin", ("xyz", "rpy")), ("axis", ("xyz",))):
+            found = None if joint.element is None else joint.element.find(tag)
+            if found is not None and found.get("quat_xyzw") is not None:
+                raise OracleError("MuJoCo does not know quat_xyzw", where=f"joint {joint.name}")
+            if found is not None and (tag == "origin" or kind != "fixed"):
+                SubElement(made, tag, {name: x for name in names if (x := found.get(name)) is not None})
+        if kind == "prismatic":  # MuJoCo asks for one, and its kinematics does not look at it
+            SubElement(made, "limit", lower="-1", upper="1")
+        return made
+
+    def _laid_out(self, joints: Sequence[_Joint], rules: Mapping[str, Mimic]) -> Iterator[_Place]:
+        """Where each moving joint's numbers are, in urdfkin's layout and in MuJoCo's."""
+        leaders, q, v = dict[str, tuple[int, int]](), 0, 0
+        for joint in joints:
+            sizes = _SIZES.get(joint.kind, (1, 1))
+            if joint.name and joint.name not in rules:
+                leaders[joint.name] = q, v
+                q, v = q + sizes[0], v + sizes[1]
+        for i, joint in enumerate(joints):
+            if joint.kind == "fixed":
+                continue
+            first = _PARTS.get(joint.kind, ("",))[0]
+            own = self._model.joint(f"j{i} {first}" if first else f"j{i}")
+            rule = rules.get(joint.name, Mimic(joint.name, 1.0, 0.0))
+            if joint.name and rule.leader not in leaders:
+                raise OracleError(
+                    "there is no joint to follow", where=f"joint {joint.name}", found=rule.leader
+                )
+            at = leaders.get(rule.leader, (-1, -1))  # the carrier's numbers are the base's
+            yield _Place(
+                joint.kind, int(own.qposadr[0]), int(own.dofadr[0]), *at, rule.multiplier, rule.offset
+            )
+
+    def _demand_the_same(
+        self, tree: KinematicTree, moving: Sequence[str], rules: Mapping[str, Mimic]
+    ) -> None:
+        """Names, order and who has coordinates: where these differ, a q does not mean the same to the two."""
+        for what, other, own in (
+            ("joints", moving, [joint.name for joint in tree.joints if joint.kind.nv]),
+            ("coordinates", [x for x in moving if x not in rules], [j.name for j in tree.joints if j.nv]),
+        ):
+            if list(other) != own:
+                found = ", ".join(sorted(set(other) ^ set(own))[:5]) or "the same in another order"
+                raise OracleError(f"the text has other {what} for MuJoCo", where=tree.name, found=found)
+
+    def _ids(self, frames: Sequence[str]) -> list[int]:
+        """MuJoCo's bodies: a link's own; a joint's frame is that of the link that it carries."""
+        return [self._model.body(self._bodies[self._link(name)]).id for name in frames]
+
+    def _link(self, name: str) -> str:
+        if isinstance(name, LinkFrame | JointFrame):
+            kind, _, own = str(name).partition(":")
+            return own if kind == "link" else self._children[own]
+        if name in self._bodies and name:
+            return name
+        if name in self._children:
+            return self._children[name]
+        kind, _, own = name.partition(":")
+        if kind == "link" and own in self._bodies:
+            return own
+        if kind == "joint" and own in self._children:
+            return self._children[own]
+        raise OracleError("MuJoCo has no such frame", where=self._name, found=repr(name))
+
+    # -- quantities ----------------------------------------------------------------------------------
+
+    def placements(self, q: FloatArray, frames: Sequence[str], base: BaseNumbers | None = None) -> FloatArray:
+        """(n, frames, 4, 4) T_world_frame: `mj_kinematics`, a body's `xpos` and `xmat`."""
+        return self._poses(q, None, None, frames, base, lambda data, body, k: None)
+
+    def quaternions(
+        self, q: FloatArray, frames: Sequence[str], base: BaseNumbers | None = None
+    ) -> FloatArray:
+        """(n, frames, 4) orientations, a body's `xquat`, scalar last, with qw >= 0."""
+        out = np.empty((len(q), len(frames), 4))
+
+        def read(data: Any, body: int, at: tuple[int, int]) -> None:
+            out[at] = np.roll(data.xquat[body], -1)
+
+        self._poses(q, None, None, frames, base, read)
+        return np.where(out[..., 3:] < 0.0, -out, out)
+
+    def velocities(
+        self,
+        q: FloatArray,
+        v: FloatArray,
+        frames: Sequence[str],
+        reference: Reference | str,
+        base: BaseNumbers | None = None,
+    ) -> FloatArray:
+        """(n, frames, 6): `mj_objectVelocity`, which gives [angular; linear]."""
+        poses, velocity = self._moved(q, v, None, frames, base)[:2]
+        return _referred(reference, poses, velocity)
+
+    def accelerations(
+        self,
+        q: FloatArray,
+        v: FloatArray,
+        a: FloatArray,
+        frames: Sequence[str],
+        reference: Reference | str,
+        base: BaseNumbers | None = None,
+    ) -> FloatArray:
+        """(n, frames, 6): `mj_objectAcceleration`, classical; gravity is set to zero."""
+        poses, velocity, acceleration = self._moved(q, v, a, frames, base)
+        if Reference.of(reference) is not Reference.WORLD:
+            return _referred(reference, poses, acceleration)
+        # Of the point of the body at the world's origin: spatial there, then classical again.
+        spatial = acceleration.copy()
+        spatial[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
+        out, there = _referred(reference, poses, spatial), _referred(reference, poses, velocity)
+        out[..., :3] += np.cross(there[..., 3:], there[..., :3])
+        return out
+
+    def jacobians(
+        self,
+        q: FloatArray,
+        frames: Sequence[str],
+        reference: Reference | str,
+        base: BaseNumbers | None = None,
+    ) -> FloatArray:
+        """(n, frames, 6, nv): `mj_jac` at the body's origin."""
+        J = np.empty((len(q), len(frames), 6, self.nv))
+        spread = self._spread(q)
+
+        def read(data: Any, body: int, at: tuple[int, int]) -> None:
+            J[at] = self._columns(self._mujoco.mj_jac, data, body) @ spread[at[0] % len(spread)]
+
+        poses = self._poses(q, None, None, frames, base, read)
+        return _referred(reference, poses, J, columns=True)
+
+    def jacobian_rates(
+        self,
+        q: FloatArray,
+        v: FloatArray,
+        frames: Sequence[str],
+        reference: Reference | str,
+        base: BaseNumbers | None = None,
+    ) -> FloatArray:
+        """(n, frames, 6, nv): `mj_jacDot` at the body's origin, which is the rate of `mj_jac`'s numbers."""
+        J, rate = np.empty((2, len(q), len(frames), 6, self.nv))
+        velocity = np.empty((len(q), len(frames), 6))
+        spread, spread_rate = self._spread(q), self._spread_rate(q, v)
+
+        def read(data: Any, body: int, at: tuple[int, int]) -> None:
+            S, S_rate = spread[at[0] % len(spread)], spread_rate[at[0] % len(spread_rate)]
+            J_full = self._columns(self._mujoco.mj_jac, data, body)
+            J[at] = J_full @ S
+            rate[at] = self._columns(self._mujoco.mj_jacDot, data, body) @ S + J_full @ S_rate
+            velocity[at] = self._six(self._mujoco.mj_objectVelocity, data, body)
+
+        poses = self._poses(q, v, None, frames, base, read)
+        vel, w = velocity[..., None, :3], velocity[..., None, 3:]
+        which = Reference.of(reference)
+        if which is Reference.LOCAL:  # the rate of the numbers in turning axes
+            for rows in (slice(0, 3), slice(3, 6)):
+                rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
+        out = _referred(reference, poses, rate, columns=True)
+        if which is Reference.WORLD:  # p x J_angular changes with p, too
+            out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
+        return out
+
+    def _moved(
+        self,
+        q: FloatArray,
+        v: FloatArray,
+        a: FloatArray | None,
+        frames: Sequence[str],
+        base: BaseNumbers | None,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(n, frames, ...) placements, velocities and classical accelerations, in LOCAL_WORLD_ALIGNED."""
+        velocity, acceleration = np.empty((2, len(q), len(frames), 6))
+
+        def read(data: Any, body: int, at: tuple[int, int]) -> None:
+            velocity[at] = self._six(self._mujoco.mj_objectVelocity, data, body)
+            if a is not None:
+                acceleration[at] = self._six(self._mujoco.mj_objectAcceleration, data, body)
+
+        return self._poses(q, v, a, frames, base, read), velocity, acceleration
+
+    def _poses(
+        self,
+        q: FloatArray,
+        v: FloatArray | None,
+        a: FloatArray | None,
+        frames: Sequence[str],
+        base: BaseNumbers | None,
+        read: Callable[[Any, int, tuple[int, int]], None],
+    ) -> FloatArray:
+        """(n, frames, 4, 4) placements; `read` sees MuJoCo's workspace at each sample and frame."""
+        mujoco, model, data, bodies = self._mujoco, self._model, self._data, self._ids(frames)
+        out = np.zeros((len(q), len(bodies), 4, 4))
+        out[..., 3, 3] = 1.0
+        qpos, rates, second = self._states(q, v, a, base)
+        for k in range(len(q)):
+            data.qpos[:] = qpos[k]
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            if rates is not None:
+                data.qvel[:] = rates[k]
+                mujoco.mj_comVel(model, data)
+            if second is not None:
+                data.qacc[:] = second[k]
+                mujoco.mj_rnePostConstraint(model, data)
+            for f, body in enumerate(bodies):
+                out[k, f, :3, :3], out[k, f, :3, 3] = data.xmat[body].reshape(3, 3), data.xpos[body]
+                read(data, body, (k, f))
+        return out
+
+    def _columns(self, function: Callable[..., None], data: Any, body: int) -> FloatArray:
+        """(6, MuJoCo's nv) of the body's origin, [linear; angular]."""
+        J = np.zeros((6, self._model.nv))
+        linear, angular = np.zeros((3, self._model.nv)), np.zeros((3, self._model.nv))
+        function(self._model, data, linear, angular, data.xpos[body], body)
+        J[:3], J[3:] = linear, angular
+        return J
+
+    def _six(self, function: Callable[..., None], data: Any, body: int) -> FloatArray:
+        """(6,) [linear; angular] of the body's origin in world axes; MuJoCo gives [angular; linear]."""
+        six = np.empty(6)
+        function(self._model, data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
+        return np.roll(six, 3)
+
+    @property
+    def _data(self) -> Any:
+        """MuJoCo's workspace; each thread has its own."""
+        if not hasattr(self._local, "data"):
+            self._local.data = self._mujoco.MjData(self._model)
+        return self._local.data
+
+    # -- layout --------------------------------------------------------------------------------------
+
+    def _states(
+        self, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: BaseNumbers | None
+    ) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
+        """(n, ...) MuJoCo's qpos, qvel and qacc."""
+        n = len(q)
+        qpos = np.zeros((n, self._model.nq))
+        for place in self._places:
+            at, own = place.their_q, q[:, place.q : place.q + 7]
+            if place.q < 0:
+                T = np.eye(4) if base is None else np.asarray(base.placement)
+                qpos[:, at : at + 3], qpos[:, at + 3 : at + 7] = (
+                    T[..., :3, 3],
+                    _scalar_first(nearest_quaternion(T[..., :3, :3])),
+                )
+            elif place.kind == "floating":
+                unit = own[:, 3:] / np.linalg.norm(own[:, 3:], axis=1, keepdims=True)
+                qpos[:, at : at + 3], qpos[:, at + 3 : at + 7] = own[:, :3], _scalar_first(unit)
+            elif place.kind == "planar":
+                qpos[:, at : at + 3] = own[:, :3]
+            else:
+                qpos[:, at] = place.multiplier * own[:, 0] + place.offset
+        if v is None:
+            return qpos, None, None
+        S = self._spread(q)
+        rates = (S @ v[..., None])[..., 0]
+        second = None
+        if a is not None:
+            second = (S @ a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
+        rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
+        if self._moving_base and base is not None:
+            # Slides along the world's axes, and a ball in the base's own.
+            at, back = self._places[0].their_v, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
+            velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
+            rates[:, at : at + 3] = velocity[..., :3]
+            rates[:, at + 3 : at + 6] = (back @ velocity[..., 3:, None])[..., 0]
+            if second is not None:
+                second[:, at : at + 3] = acceleration[..., :3]
+                second[:, at + 3 : at + 6] = (back @ acceleration[..., 3:, None])[..., 0]
+        return qpos, rates, second
+
+    def _spread(self, q: FloatArray) -> FloatArray:
+        """(n or 1, MuJoCo's nv, nv) S: MuJoCo's rates are S v."""
+        S = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
+        for place in self._places:
+            at, own = place.their_v, place.v
+            if own < 0:
+                continue
+            if place.kind in _PARTS:
+                R, slides = self._turn(place, q)
+                S[:, at : at + slides, own : own + slides] = R
+                turns = slice(slides, 2 * slides if slides == 3 else 3)
+                S[:, range(at, at + 6)[turns], range(own, own + 6)[turns]] = 1.0
+            else:
+                S[:, at, own] = place.multiplier
+        return S
+
+    def _spread_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        """(n or 1, MuJoCo's nv, nv) S': a floating or planar joint's slides turn, R' = R [w]x."""
+        S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
+        for place in self._places:
+            at, own = place.their_v, place.v
+            if own >= 0 and place.kind in _PARTS:
+                R, slides = self._turn(place, q)
+                w = np.zeros((len(q), 3))
+                w[:, (0 if slides == 3 else 2) :] = v[:, own + slides : own + (6 if slides == 3 else 3)]
+                crossed = np.cross(w[:, None, :], np.eye(3)[None]).swapaxes(-1, -2)
+                S_rate[:, at : at + slides, own : own + slides] = R @ crossed[:, :slides, :slides]
+        return S_rate
+
+    def _turn(self, place: _Place, q: FloatArray) -> tuple[FloatArray, int]:
+        """(n, slides, slides) from the axes of a planar or floating joint to those that its slides have."""
+        own = q[:, place.q : place.q + 7]
+        if place.kind == "floating":
+            unit = own[:, 3:] / np.linalg.norm(own[:, 3:], axis=1, keepdims=True)
+            return _rotation(_scalar_first(unit)), 3
+        c, s = np.cos(own[:, 2]), np.sin(own[:, 2])
+        return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2), 2
+
+
+def _ordered(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
+    """The text's joints depth first, siblings by name, and the links, root first."""
+    robot = plain_xml(text)
+    links = [element.get("name", "") for element in robot.iterfind("link")]
+    below, carried = dict[str, list[_Joint]](), set[str]()
+    for element in robot.iterfind("joint"):
+        parent, child = (element.find(tag) for tag in ("parent", "child"))
+        if parent is None or child is None:
+            raise ValueError(f"joint {element.get('name')} has no ends")
+        words = (
+            element.get("name", ""),
+            element.get("type", ""),
+            parent.get("link", ""),
+            child.get("link", ""),
+        )
+        joint = _Joint(*words, element)
+        below.setdefault(joint.parent, []).append(joint)
+        carried.add(joint.child)
+    root = next(link for link in links if link not in carried)
+    if root_joint is not None:
+        below[WORLD] = [_Joint("root_joint", root_joint, WORLD, root)]
+        root = WORLD
+    joints, stack = list[_Joint](), sorted(below.get(root, []), key=_name, reverse=True)
+    while stack:
+        joints.append(stack.pop())
+        stack += sorted(below.get(joints[-1].child, []), key=_name, reverse=True)
+    return joints, [root, *(joint.child for joint in joints)]
+
+
+def _name(joint: _Joint) -> bytes:
+    return joint.name.encode()
+
+
+def _scalar_first(quaternion: FloatArray) -> FloatArray:
+    """MuJoCo's quaternions are (w, x, y, z)."""
+    return np.roll(quaternion, 1, axis=-1)
+
+
+def _rotation(quaternion: FloatArray) -> FloatArray:
+    """(..., 3, 3) of unit quaternions (w, x, y, z)."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, -1) for row in rows], -2)
+
+
+def _referred(
+    reference: Reference | str, poses: FloatArray, values: FloatArray, *, columns: bool = False
+) -> FloatArray:
+    """Six-vectors, or Jacobians' columns, of LOCAL_WORLD_ALIGNED in another reference."""
+    which = Reference.of(reference)
+    if which is Reference.LOCAL_WORLD_ALIGNED:
+        return values
+    six = values if columns else values[..., None]
+    linear, angular = six[..., :3, :], six[..., 3:, :]
+    if which is Reference.LOCAL:
+        back = poses[..., :3, :3].swapaxes(-1, -2)
+        out = np.concatenate((back @ linear, back @ angular), axis=-2)
+    else:
+        p = poses[..., None, :3, 3]
+        moved = linear + np.cross(p, angular.swapaxes(-1, -2)).swapaxes(-1, -2)
+        out = np.concatenate((moved, angular), axis=-2)
+    return out if columns else out[..., 0]
