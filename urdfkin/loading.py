@@ -18,11 +18,14 @@ from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home
+from urdfkin.urdf.mjcf import Listed, is_mjcf, read_mjcf
 from urdfkin.urdf.origin import Origin
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.remembering import remembered_tree
 from urdfkin.urdf.sources import Source, Text, as_word, read_source
+from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.choosing import Verify, checked_choice
+from urdfkin.verify.made_of_mjcf import demand_the_mjcfs
 from urdfkin.verify.made_of_table import demand_the_tables
 from urdfkin.verify.witnesses import WitnessName, witness_of
 
@@ -36,11 +39,11 @@ def load(
     xacro_args: Mapping[str, object] | None = None,
     oracle: WitnessName = "pinocchio",
 ) -> Robot:
-    """A robot from a URDF, checked before it is read.
+    """A robot from a URDF, an MJCF file or a table, checked before it is read.
 
     Args:
-        source: A path (.urdf or .xacro), a name of the catalogue
-            (`urdfkin robots` lists them), URDF text, bytes, an open file, or `-` for standard input;
+        source: A path (.urdf, .xacro, or .xml for MJCF, see `docs/mjcf.md`), a name of the catalogue
+            (`urdfkin robots` lists them), URDF or MJCF text, bytes, an open file, or `-` for standard input;
             or a Denavit-Hartenberg table, as it is or as a file (.toml, .json, .csv): its base frame is the
             root, its tip the leaf.
         verify: Whether every result is held against Pinocchio's; "sample" has 100 configurations of each
@@ -73,6 +76,10 @@ def load(
         return _load_table(
             source, xacro_args, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle
         )
+    if is_mjcf(source):
+        return _load_mjcf(
+            source, xacro_args, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle
+        )
     text = read_source(source, xacro_args=xacro_args)
     return _robot(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle)
 
@@ -99,6 +106,39 @@ def _load_table(
         plain = mimic is not False and root_joint is None
         demand_the_tables((robot if plain else _robot(text)).verifier, table)
     return robot
+
+
+def _load_mjcf(
+    source: str | os.PathLike[str],
+    xacro_args: Mapping[str, object] | None,
+    *,
+    verify: Verify,
+    mimic: bool | None,
+    root_joint: str | None,
+    oracle: WitnessName,
+) -> Robot:
+    if xacro_args:
+        raise InputError("xacro_args go with the path of a .xacro file", found="MJCF")
+    read = read_mjcf(source)
+    path = None if read.is_text else at_home(source)
+    name = "<text>" if path is None else as_word(path)
+    text = Text(write_urdf(read.tree).encode(), f"{name} (as a URDF)", name)
+    listed = tuple(_listed(one, name) for one in read.listed)
+    robot = _robot(
+        text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, listed=listed, made=True
+    )
+    if checked_choice(verify):
+        plain = mimic is not False and root_joint is None
+        verifier = (robot if plain else _robot(text, listed=listed, made=True)).verifier
+        robot.verifier.reading = demand_the_mjcfs(verifier, read, None if path is None else str(path))
+    return robot
+
+
+def _listed(one: Listed, file: str) -> Finding:
+    """What an MJCF says that the tree does not hold, as a finding: a warning where motion depends on it."""
+    code, severity = ("MJCF101", Severity.WARNING) if one.moves else ("MJCF102", Severity.NOTE)
+    message = one.what if one.where is None else f"{one.where}: {one.what}"
+    return Finding(code, severity, message, file=file)
 
 
 def _robot(
