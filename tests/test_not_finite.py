@@ -27,6 +27,7 @@ METHODS: dict[str, tuple[int, Compute]] = {
     "acceleration": (3, lambda r, q, v, a, **o: r.acceleration(q, v, a, FRAME, **o)),
     "acceleration, local": (3, lambda r, q, v, a, **o: r.acceleration(q, v, a, FRAME, "local", **o)),
     "jacobian_rate": (2, lambda r, q, v, **o: r.jacobian_rate(q, v, FRAME, **o)),
+    "hessian": (1, lambda r, q, **o: r.hessian(q, FRAME, "local", **o)),
     "placements": (1, lambda r, q, **o: r.placement(q, [FRAME, "panda_link1"], **o)),
     "velocities": (2, lambda r, q, v, **o: r.velocity(q, v, [FRAME], **o)),
     "jacobians": (1, lambda r, q, **o: r.jacobian(q, [FRAME], **o)),

@@ -34,6 +34,9 @@ def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(roundings, "ROUNDINGS", 1e-9)
 
 
+METHODS = ["placement", "velocity", "jacobian", "jacobian_rate", "hessian", "acceleration"]
+
+
 def disagreement(robot: Robot, quantity: str, **base: BaseMotion) -> urdfkin.VerificationError:
     """The error of one call on a batch (2, 3), in the local reference where there is one."""
     q = robot.sample(6, 1).reshape(2, 3, robot.nq)
@@ -66,7 +69,7 @@ def test_a_verification_error_says_what_where_by_how_much_and_what_was_allowed(p
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("quantity", ["placement", "velocity", "jacobian", "jacobian_rate", "acceleration"])
+@pytest.mark.parametrize("quantity", METHODS)
 @pytest.mark.parametrize("root_joint", [None, "floating"])
 @pytest.mark.usefixtures("no_room")
 def test_its_line_computes_the_case_again(
@@ -101,7 +104,7 @@ def test_the_line_of_a_text_takes_it_from_standard_input_and_that_of_a_file_quot
         assert command(*words[1:]).code == 1
 
 
-@pytest.mark.parametrize("quantity", ["placement", "velocity", "jacobian", "jacobian_rate", "acceleration"])
+@pytest.mark.parametrize("quantity", METHODS)
 @pytest.mark.parametrize("batch", [(), (2, 3)])
 @pytest.mark.usefixtures("no_room")
 def test_on_a_moving_base_the_line_is_python(panda: Robot, quantity: str, batch: tuple[int, ...]) -> None:

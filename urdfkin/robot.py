@@ -235,7 +235,7 @@ class Robot:
         """Any quantity of the walk by its name, as the method of that name computes it.
 
         Args:
-            name: "placement", "velocity", "jacobian", "jacobian rate" or "acceleration".
+            name: "placement", "velocity", "jacobian", "jacobian rate", "hessian" or "acceleration".
             inputs: q, v and a, as far as it takes them.
             frame: As in `placement`; so are the others.
             reference: For which point and in which axes; a placement has none.
@@ -357,6 +357,39 @@ class Robot:
         and errors as `placement`.
         """
         return self._computed("jacobian rate", (q, v), frame, reference, base, out, verify, threads)
+
+    def hessian(
+        self,
+        q: ArrayLike,
+        frame: str | Sequence[str],
+        reference: Reference | str = _ALIGNED,
+        *,
+        base: BaseMotion | None = None,
+        out: FloatArray | None = None,
+        verify: Verify | None = None,
+        threads: int | None = None,
+    ) -> FloatArray:
+        """(..., 6, nv, nv) derivatives of `jacobian` by each rate: [..., i, j] is that of column i by rate j.
+
+        J-dot of 7.126 is the sum over j of H[..., j] v[j], and v^T H v what the acceleration has of the rates
+        alone. Where rate j comes before column i, its z_j turns the column, z_j x (z_i x d_i); where it comes
+        behind, it moves the end of its arm, z_i x (z_j x d_j): in LOCAL_WORLD_ALIGNED the linear rows are
+        symmetric in i and j but for the rates of one planar or floating joint, the angular ones never are.
+        WORLD has the first kind alone, LOCAL the second. Arguments and errors as `placement`.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link", verify=False)
+        >>> H = arm.hessian([0.0, 0.0], arm.tip_frame)
+        >>> bool((H[:3] == H[:3].swapaxes(-1, -2)).all())
+        True
+        """
+        if (
+            (base is None and threads is None)
+            and (fast := self._fast(frame, reference, verify))
+            and (one := fast._hessian(q, out)) is not None
+        ):
+            return one
+        return self._computed("hessian", (q,), frame, reference, base, out, verify, threads)
 
     def acceleration(
         self,

@@ -101,12 +101,14 @@ def _together(
         kept["placement"] = robot.placement(q, frames, base=base)
     kept["velocity"] = robot.velocity(q, v, frames, reference, base=base)
     kept["jacobian"] = robot.jacobian(q, frames, reference, base=base)
+    kept["hessian"] = robot.hessian(q, frames, reference, base=base)
     kept["acceleration"] = robot.acceleration(q, v, a, frames, reference, base=base)
     yield from kept.items()
     inputs: dict[str, tuple[FloatArray, ...]] = {
         "placement": (q,),
         "velocity": (q, v),
         "jacobian": (q,),
+        "hessian": (q,),
         "acceleration": (q, v, a),
     }
     for frame in alone:

@@ -118,6 +118,8 @@ def results() -> Iterator[tuple[str, Callable[[Robot], FloatArray]]]:
     yield "jacobian into out", lambda r: r.jacobian(q, "link:b", out=np.empty((2, 1, 6, 12)))
     yield "jacobians", lambda r: r.jacobian(one[0], ["f", "link:b"], "world")
     yield "jacobian rate", lambda r: r.jacobian_rate(q, v, "f", "local", base=moves)
+    yield "hessian", lambda r: r.hessian(q, "second", "local", base=moves)
+    yield "hessians", lambda r: r.hessian(one[0], ["f", "link:b"], "world")
     yield "acceleration", lambda r: r.acceleration(q, v, a, "f", "local", base=moves)
     yield "acceleration, alone", lambda r: r.acceleration(*one, "link:b")
     yield "accelerations", lambda r: r.acceleration(q, v, a, ["f", "g", "link:b"], "world", base=moves)

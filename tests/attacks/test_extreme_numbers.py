@@ -55,6 +55,7 @@ def everything(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: 
             lambda reference: robot.velocity(q, v, "l6", reference, base=base),
             lambda reference: robot.jacobian(q, "l6", reference, base=base),
             lambda reference: robot.jacobian_rate(q, v, "l6", reference, base=base),
+            lambda reference: robot.hessian(q, "l6", reference, base=base),
             lambda reference: robot.acceleration(q, v, a, "l6", reference, base=base),
             lambda reference: robot.acceleration_breakdown(q, v, a, "l6", reference, base=base),
         ):

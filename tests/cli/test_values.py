@@ -22,6 +22,7 @@ QUANTITIES = {
     "velocity": "qv",
     "jacobian": "q",
     "jacobian-rate": "qv",
+    "hessian": "q",
     "acceleration": "qva",
 }
 Q = (0.1, -0.5, 1 / 3, -2.0, 2**-0.5, 1.5, 0.8, 0.02)
@@ -40,6 +41,7 @@ def expected(quantity: str, n: int, reference: str) -> FloatArray:
         "velocity": lambda: robot.velocity(q, v, frame, reference),
         "jacobian": lambda: robot.jacobian(q, frame, reference),
         "jacobian-rate": lambda: robot.jacobian_rate(q, v, frame, reference),
+        "hessian": lambda: robot.hessian(q, frame, reference),
         "acceleration": lambda: robot.acceleration(q, v, a, frame, reference),
     }[quantity]()
 

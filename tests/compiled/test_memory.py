@@ -44,6 +44,7 @@ def outputs(robot: Robot) -> Iterator[tuple[str, tuple[int, ...], tuple[str, ...
     for reference in ("local", "world", "local_world_aligned"):
         yield "velocity", (6,), (reference,)
         yield "jacobian", (6, robot.nv), (reference,)
+        yield "hessian", (6, robot.nv, robot.nv), (reference,)
         yield "acceleration", (6,), (reference,)
 
 

@@ -19,6 +19,7 @@ def by_the_robot(
         name = reference.name
         yield f"velocity {name}", robot.velocity(q, v, frame, reference, verify=False)
         yield f"jacobian {name}", robot.jacobian(q, frame, reference, verify=False)
+        yield f"hessian {name}", robot.hessian(q, frame, reference, verify=False)
         yield f"acceleration {name}", robot.acceleration(q, v, a, frame, reference, verify=False)
         yield f"jacobian rate {name}", robot.jacobian_rate(q, v, frame, reference, verify=False)
 
@@ -33,6 +34,7 @@ def prepared(
         assert isinstance(fast, PreparedFrame)
         yield f"velocity {name}", fast.velocity(q, v)
         yield f"jacobian {name}", fast.jacobian(q)
+        yield f"hessian {name}", fast.hessian(q)
         yield f"acceleration {name}", fast.acceleration(q, v, a)
 
 

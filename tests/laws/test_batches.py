@@ -29,10 +29,12 @@ QUANTITIES: dict[str, Compute] = {
     "velocity": lambda robot, q, v, a: robot.velocity(q, v, robot.tip_frame),
     "jacobian": lambda robot, q, v, a: robot.jacobian(q, robot.tip_frame, "local"),
     "jacobian_rate": lambda robot, q, v, a: robot.jacobian_rate(q, v, robot.tip_frame, "world"),
+    "hessian": lambda robot, q, v, a: robot.hessian(q, robot.tip_frame, "local"),
     "acceleration": lambda robot, q, v, a: robot.acceleration(q, v, a, robot.tip_frame, "world"),
     "placements": lambda robot, q, v, a: robot.placement(q, robot.link_frames),
     "velocities": lambda robot, q, v, a: robot.velocity(q, v, robot.link_frames),
     "jacobians": lambda robot, q, v, a: robot.jacobian(q, robot.link_frames),
+    "hessians": lambda robot, q, v, a: robot.hessian(q, robot.link_frames[-3:], "world"),
     "accelerations": lambda robot, q, v, a: robot.acceleration(q, v, a, robot.link_frames),
 }
 
@@ -141,6 +143,7 @@ def test_out_is_written_and_handed_back(shape: tuple[int, ...]) -> None:
         ((6,), lambda out: robot.velocity(q, v, frame, out=out)),
         ((6, 8), lambda out: robot.jacobian(q, frame, out=out)),
         ((6, 8), lambda out: robot.jacobian_rate(q, v, frame, out=out)),
+        ((6, 8, 8), lambda out: robot.hessian(q, frame, out=out)),
         ((6,), lambda out: robot.acceleration(q, v, a, frame, out=out)),
     ]
     for own, call in calls:

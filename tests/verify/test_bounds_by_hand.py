@@ -11,7 +11,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify import bounds
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.magnitudes import Magnitudes
-from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, JACOBIAN_RATE, PLACEMENT, VELOCITY
+from urdfkin.verify.quantities import ACCELERATION, HESSIAN, JACOBIAN, JACOBIAN_RATE, PLACEMENT, VELOCITY
 
 #: A turning joint, one that slides twice as far as the coordinate before it says.
 ARM = """<robot name="r">
@@ -87,6 +87,23 @@ def test_its_rate_has_three(plan: Plan, reference: Reference, again: int, factor
     linear, angular, k = columns(JACOBIAN_RATE.bound(plan, sizes(), reference))
     assert linear.tolist() == [again * W * P + VEL, 3.0 * again * W]
     assert angular.tolist() == [again * W, 0.0]
+    assert k == 24.0 * JOINTS * factors
+
+
+@pytest.mark.parametrize(
+    ("reference", "terms", "slides", "factors"),
+    [
+        (ALIGNED, 5.0, [[1.0], [2.0]], 3),  # the slides come behind the turn, and the turn before them
+        (WORLD, 2.0, [[0.0], [1.0]], 4),
+        (LOCAL, 0.0, [[1.0], [0.0]], 4),
+    ],
+)
+def test_a_hessian_has_three_for_each_product_that_a_pair_is_summed_from(
+    plan: Plan, reference: Reference, terms: float, slides: list[list[float]], factors: int
+) -> None:
+    linear, angular, k = columns(HESSIAN.bound(plan, sizes(), reference))
+    assert linear.tolist() == [[terms * P, *(3.0 * x for x in slides[0])], [3.0 * slides[1][0], 0.0]]
+    assert angular.tolist() == [[float(reference is not LOCAL), 0.0], [0.0, 0.0]]
     assert k == 24.0 * JOINTS * factors
 
 

@@ -37,6 +37,7 @@ def calls(
         "velocity": lambda: robot.velocity(q, v, FRAMES[0], "local", **asked),  # type: ignore[arg-type]
         "jacobian": lambda: robot.jacobian(q, FRAMES[0], "world", **asked),  # type: ignore[arg-type]
         "jacobian rate": lambda: robot.jacobian_rate(q, v, FRAMES[0], **asked),  # type: ignore[arg-type]
+        "hessian": lambda: robot.hessian(q, FRAMES[0], "local", **asked),  # type: ignore[arg-type]
         "acceleration": lambda: robot.acceleration(q, v, a, FRAMES, "world", **asked),  # type: ignore[arg-type]
     }
 
@@ -141,7 +142,7 @@ def test_the_certificate_does_not_depend_on_the_parts(
     several = ("placement", "acceleration")
     counts = {line.quantity: line.checked for line in found[0].lines}
     assert counts == {quantity: n * (3 if quantity in several else 1) for quantity in counts}
-    assert len(counts) == 5
+    assert len(counts) == 6
     assert found[0].verified
 
 
@@ -163,7 +164,7 @@ def test_of_a_large_batch_a_sample_is_checked_and_the_rest_stated(
         assert (line.checked, line.unchecked) == (SAMPLE * of, (250 - SAMPLE) * of)
         assert line.worst > 0.0
         assert 0.0 < line.share < 1.0
-    assert len(certificate.lines) == 5
+    assert len(certificate.lines) == 6
     assert not certificate.verified
     assert certificate.not_verified == ('verify="sample" checks 100 configurations of a call',)
 

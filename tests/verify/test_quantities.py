@@ -176,7 +176,9 @@ def test_a_robot_has_a_method_for_each_row_that_takes_its_inputs(row: Quantity) 
 
 
 def test_every_command_of_the_table_is_its_rows() -> None:
-    assert list(by_command()) == ["placement", "velocity", "jacobian", "jacobian-rate", "acceleration"]
+    assert list(by_command()) == [
+        *("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration"),
+    ]
 
 
 def test_what_is_no_row_or_takes_other_inputs_is_refused() -> None:

@@ -8,7 +8,7 @@ import io
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -184,11 +184,14 @@ def _as_csv(
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     if quantity.columns:
-        writer.writerow(["sample", "row", *map(csv_cell, inputs.robot.rate_names)])
-        for k, J in enumerate(result):
-            writer.writerows(
-                [k, row, *map(repr, values)] for row, values in zip(quantity.labels, J.tolist(), strict=True)
-            )
+        rates = [csv_cell(name) for name in inputs.robot.rate_names]
+        # A Hessian's lines say which column of the Jacobian they are of, and its columns by which rate.
+        keys = [[row] for row in quantity.labels]
+        for _ in range(2, quantity.axes):
+            keys = [[*key, rate] for key in keys for rate in rates]
+        writer.writerow(["sample", "row", *["column"] * (quantity.axes - 2), *rates])
+        for k, J in enumerate(result.reshape(len(result), len(keys), len(rates)).tolist()):
+            writer.writerows([k, *key, *map(repr, row)] for key, row in zip(keys, J, strict=True))
     else:
         names = quantity.labels or [f"T{i}{j}" for i in range(4) for j in range(4)]
         writer.writerow(["sample", *names])
@@ -221,13 +224,24 @@ def _print_table(
         if len(result) > 1:
             out.print(f"sample {k}")
         if quantity.columns:
-            rows = zip(inputs.robot.rate_names, *value.tolist(), strict=True)
-            print_named(out, ["joint", *quantity.labels], rows)
+            _print_columns(out, quantity, inputs.robot.rate_names, value)
         else:
             out.print(_table(quantity, value))
     if len(result) > _SHOWN:
         out.print(f"... and {len(result) - _SHOWN} more samples: --format csv, json or npy has them all")
     out.print(check_line(certificate), style="green" if certificate.verified else "bold yellow")
+
+
+def _print_columns(out: Console, quantity: Quantity, rates: Sequence[str], value: FloatArray) -> None:
+    """A line for each rate; of a Hessian, for each column of the Jacobian and each rate that changes it."""
+    import numpy as np  # noqa: PLC0415
+
+    if quantity.axes == len(("row", "rate")):
+        print_named(out, ["joint", *quantity.labels], zip(rates, *value.tolist(), strict=True))
+        return
+    numbers = [(rates[i], rates[j], *value[:, i, j].tolist()) for i, j in np.ndindex(*value.shape[1:])]
+    rows = [row for row in numbers if any(row[2:])]
+    print_named(out, ["column", "changed by", *quantity.labels], rows, left=2)
 
 
 def _table(quantity: Quantity, value: FloatArray) -> Table:

@@ -13,7 +13,9 @@ from urdfkin.compiled.outputs import (
     column_none,
     column_rate,
     emit_acceleration,
+    emit_imu,
     emit_matrix,
+    emit_pairs,
     emit_place,
     emit_velocity,
     follow_acceleration,
@@ -66,3 +68,15 @@ def jacobians(task):
 def jacobian_rates(task):
     """The J-dot of 7.126."""
     return walk(task, world_axes, 2, follow_velocity, keep_moving_axis, column_rate, emit_matrix)
+
+
+@core
+def hessians(task):
+    """The derivatives of 7.85 by each rate: a kernel that only those wait for who ask for it."""
+    return walk(task, world_axes, 1, follow_place, keep_axis, column_jacobian, emit_pairs)
+
+
+@core
+def imus(task):
+    """7.127, 7.129, 7.130 in each frame's own axes: acceleration and angular velocity."""
+    return walk(task, link_axes, 3, follow_acceleration, keep_none, column_none, emit_imu)

@@ -20,7 +20,7 @@ from urdfkin.compiled.program import Program, program_of
 from urdfkin.compiled.registers import LANES
 from urdfkin.compiled.task import Task, lines, scratch
 from urdfkin.errors import NotFiniteError, RangeError
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.base_motion import STILL_STATE, against_gravity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.forking import importing
@@ -145,6 +145,45 @@ def jacobian_rates(
     out = np.empty((len(q), len(plan.frames), 6, plan.nv)) if out is None else out
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
     _run(core, plan, program, [q, v], reference, base, out, threads)
+    return out
+
+
+def hessians(
+    plan: Plan,
+    q: FloatArray,
+    reference: Reference = _ALIGNED,
+    *,
+    base: FloatArray = STILL_STATE,
+    out: FloatArray | None = None,
+    threads: int | None = None,
+) -> FloatArray:
+    """(n, frames, 6, nv, nv) derivatives of the velocity Jacobians: [..., i, j] of column i by rate j."""
+    core = _cores().hessians
+    out = np.empty((len(q), len(plan.frames), 6, plan.nv, plan.nv)) if out is None else out
+    program = program_of(plan, turned=reference is Reference.LOCAL, columns=True, pairs=True)
+    _run(core, plan, program, [q], reference, base, out, threads)
+    return out
+
+
+def imus(
+    plan: Plan,
+    q: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+    *,
+    gravity: FloatArray,
+    base: FloatArray = STILL_STATE,
+    out: FloatArray | None = None,
+    threads: int | None = None,
+) -> FloatArray:
+    """(n, frames, 6) [proper acceleration; angular velocity] in each frame's own axes.
+
+    An accelerometer cannot tell gravity from a world that is accelerated against it, and so the base is.
+    """
+    out = np.empty((len(q), len(plan.frames), 6)) if out is None else out
+    program = program_of(plan, turned=True)
+    base = against_gravity(base, gravity)
+    _run(_cores().imus, plan, program, [q, v, a], Reference.LOCAL, base, out, threads)
     return out
 
 

@@ -1,4 +1,4 @@
-"""What a walk hands out: places, velocities, accelerations, Jacobians and their rates, in three references.
+"""What a walk hands out: places, velocities, accelerations, Jacobians and what they change by, by reference.
 
 Each output says what it follows of a state, and what it makes of the state of a frame. Velocities and
 accelerations come in the axes that their reference asks for (`axes`); columns are made in the world's, and
@@ -13,11 +13,11 @@ from urdfkin.compiled import compiled_equations as eq
 from urdfkin.compiled.compiling import compiled
 from urdfkin.compiled.memory import write_rows
 from urdfkin.compiled.numbers import nothing, zero
-from urdfkin.compiled.program import ONE_ROW, OUT_ROW, ZERO_ROW, Head
+from urdfkin.compiled.program import ONE_ROW, OUT_ROW, PAIR_WIDTH, ZERO_ROW, Head
 from urdfkin.compiled.registers import constant, numbers_of, put, same
 from urdfkin.compiled.walk import put_vector, vector
 
-_LOCAL, _WORLD = 0, 1
+_LOCAL, _WORLD, _ALIGNED = 0, 1, 2
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
 
 #: The rows of a 4 by 4 pose, row by row, and those of [linear; angular].
@@ -93,6 +93,12 @@ def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
     if reference == _WORLD:
         acc = eq.point_acceleration(acc, alpha, w, eq.minus(_no_vector(), p))
     _emit_six(m, s, program, place, b, acc, alpha, to)
+
+
+@compiled
+def emit_imu(m, s, program, place, sources, b, reference, state, to):
+    """What an accelerometer and a gyroscope read, on a base that is accelerated against gravity."""
+    _emit_six(m, s, program, place, b, state[5], state[2], to)
 
 
 @compiled
@@ -202,8 +208,60 @@ def _put_column(s, to, how, g, c, reference, R, linear, angular):
 @compiled
 def _add_column(s, to, how, linear, angular):
     if how & 2:
-        put_vector(s, to, eq.plus(vector(s, to), linear))
-        put_vector(s, to + 3, eq.plus(vector(s, to + 3), angular))
+        _add_six(s, to, linear, angular)
     else:
         put_vector(s, to, linear)
         put_vector(s, to + 3, angular)
+
+
+@compiled
+def _add_six(s, to, linear, angular):
+    put_vector(s, to, eq.plus(vector(s, to), linear))
+    put_vector(s, to + 3, eq.plus(vector(s, to + 3), angular))
+
+
+# -- pairs of columns ------------------------------------------------------------------------------------
+
+
+@compiled
+def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
+    """How each column changes with each rate, (6, nv, nv), from the columns themselves."""
+    count, nv = program[pairs], program[_NV]
+    first, end = pairs + 1, pairs + 1 + PAIR_WIDTH * count
+    frames, size = program[_FRAMES], nv * nv
+    begin = (b * frames + place) * 6 * size
+    for rate in range(nv):
+        for j in range(first, end, PAIR_WIDTH):
+            put_vector(s, program[j + 3], _no_vector())
+            put_vector(s, program[j + 3] + 3, _no_vector())
+        for i in range(first, end, PAIR_WIDTH):
+            if program[i + 2] == rate:  # a leader's own column, and those of its followers
+                _add_changes(s, program, i, first, end, reference)
+        for row in range(6):
+            at = begin + row * size + rate * nv
+            write_rows(m, s, program, end + row * nv, nv, to, at, frames * 6 * size)
+
+
+@compiled
+def _add_changes(s, program, i, first, end, reference):
+    """What each rate does to column i.
+
+    A rate before the column turns all of it; one behind it moves the end of its arm. From the world's origin
+    there is no end that moves; the frame's own axes move as all that is before them does.
+    """
+    v_i, w_i = vector(s, program[i]), vector(s, program[i] + 3)
+    for j in range(first, end, PAIR_WIDTH):
+        v_j, w_j, sum_j = vector(s, program[j]), vector(s, program[j] + 3), program[j + 3]
+        before = program[j + 1] <= program[i + 1]
+        if reference == _ALIGNED:
+            if before:
+                linear, angular = eq.turned_along(w_j, v_i, w_i)
+                _add_six(s, sum_j, linear, angular)
+            else:
+                _add_six(s, sum_j, eq.end_moved(w_i, v_j), _no_vector())
+        elif reference == _WORLD and before:
+            linear, angular = eq.motion_product(v_j, w_j, v_i, w_i)
+            _add_six(s, sum_j, linear, angular)
+        elif reference == _LOCAL and not before:
+            linear, angular = eq.motion_product(v_i, w_i, v_j, w_j)
+            _add_six(s, sum_j, linear, angular)

@@ -40,6 +40,8 @@ class _Robot(Protocol):
     @property
     def jacobian(self) -> Callable[..., FloatArray]: ...
     @property
+    def hessian(self) -> Callable[..., FloatArray]: ...
+    @property
     def acceleration(self) -> Callable[..., FloatArray]: ...
 
 
@@ -52,7 +54,7 @@ class PreparedFrame:
 
     Attributes:
         frame: The frame's name.
-        reference: For velocities, Jacobians and accelerations.
+        reference: For velocities, Jacobians, Hessians and accelerations.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("panda")
@@ -65,7 +67,8 @@ class PreparedFrame:
     """
 
     __slots__ = (
-        "_acceleration", "_jacobian", "_placement", "_plan", "_robot", "_velocity", "frame", "reference",
+        "_acceleration", "_hessian", "_jacobian", "_placement", "_plan", "_robot", "_velocity", "frame",
+        "reference",
     )  # fmt: skip
 
     def __init__(self, robot: _Robot, frame: str, reference: Reference, plan: Plan) -> None:
@@ -75,6 +78,7 @@ class PreparedFrame:
         self._placement: Fast = partial(self._first, "placement")
         self._velocity: Fast = partial(self._first, "velocity")
         self._jacobian: Fast = partial(self._first, "jacobian")
+        self._hessian: Fast = partial(self._first, "hessian")
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
@@ -100,6 +104,12 @@ class PreparedFrame:
         if (J := self._jacobian(q, out)) is not None:
             return J
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=False, threads=1)
+
+    def hessian(self, q: ArrayLike, out: FloatArray | None = None) -> FloatArray:
+        """(6, nv, nv): the derivatives of `jacobian` by each rate."""
+        if (H := self._hessian(q, out)) is not None:
+            return H
+        return self._robot.hessian(q, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def acceleration(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: FloatArray | None = None

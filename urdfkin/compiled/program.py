@@ -66,6 +66,8 @@ ANGLE_WIDTH = 4
 #: Rows of scratch with a place of their own: 0, 1, a result on its way out, an angle.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
+#: Numbers of a column that is paired with others: its row, its step, its rate, the row of the rate's sums.
+PAIR_WIDTH = 4
 
 _JOINTS = {
     Motion.TURN: Op.REVOLUTE,
@@ -95,23 +97,25 @@ class Program:
         return self.words.ctypes.data, self.constants.ctypes.data
 
 
-def program_of(plan: Plan, *, turned: bool, columns: bool = False) -> Program:
+def program_of(plan: Plan, *, turned: bool, columns: bool = False, pairs: bool = False) -> Program:
     """The program that meets a plan's frames, made once.
 
     Args:
         plan: The walk.
         turned: Whether frames are turned to their own axes: for places, and for what is seen in these axes.
         columns: Whether Jacobians are wanted.
+        pairs: Whether their columns are wanted one by one, followers' too, to be paired with each other.
     """
-    made: Program | None = plan.programs.get((turned, columns))
+    key = turned, columns, pairs
+    made: Program | None = plan.programs.get(key)
     if made is None:
-        made = plan.programs[turned, columns] = _Writer(plan, turned, columns).program()
+        made = plan.programs[key] = _Writer(plan, *key).program()
     return made
 
 
 class _Writer:
-    def __init__(self, plan: Plan, turned: bool, columns: bool) -> None:
-        self.plan, self.turned, self.columns = plan, turned, columns
+    def __init__(self, plan: Plan, turned: bool, columns: bool, pairs: bool) -> None:
+        self.plan, self.turned, self.columns, self.pairs = plan, turned, columns, pairs
         self.code: list[tuple[int, int, int, int, int]] = []
         self.constants: list[float] = [0.0]
         self.slots: dict[int, int] = {}
@@ -122,7 +126,8 @@ class _Writer:
         self.sines = self.base + STATE_ROWS
         self.kept = self.sines + 2 * len(plan.steps)
         self.results = self.kept + KEPT_ROWS * len(plan.columns) * columns
-        self.saved = self.results + COLUMN_ROWS * len(plan.columns) * columns
+        self.sums = self.results + COLUMN_ROWS * len(plan.columns) * columns
+        self.saved = self.sums + COLUMN_ROWS * len(plan.columns) * pairs
         self.rules = [self._rule(i) for i in range(len(plan.steps))]
         parts = _blocks(plan.places_q), _blocks(plan.columns[:, Column.V].tolist()), self._angles()
         self.lists = [number for part in parts for number in part]
@@ -232,7 +237,7 @@ class _Writer:
         if self.columns:
             self._columns(f)
             sources = len(self.head) + len(self.lists)
-            self.lists += self._sources(f)
+            self.lists += self._paired(f) if self.pairs else self._sources(f, self.results)
         self._put(Op.EMIT, int(plan.frames[f, 1]), sources)
         return moved
 
@@ -241,18 +246,27 @@ class _Writer:
             if leader >= 0:
                 multiplier = float(self.plan.multipliers[c])
                 follows = 0 if multiplier == 1.0 else self._constants(multiplier)
-                how = int(self.plan.columns[c, Column.TURNS]) + 2 * (leader != c)
-                rows = self.kept + KEPT_ROWS * c, self.results + COLUMN_ROWS * leader
+                to = c if self.pairs else leader
+                how = int(self.plan.columns[c, Column.TURNS]) + 2 * (to != c)
+                rows = self.kept + KEPT_ROWS * c, self.results + COLUMN_ROWS * to
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
-    def _sources(self, f: int) -> list[int]:
-        """For each number of the frame's Jacobian, the row of scratch that holds it."""
+    def _sources(self, f: int, row: int) -> list[int]:
+        """For each number of the frame's (6, nv), the row of scratch that holds it; `row` is the first."""
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.leaders[f] == np.arange(len(plan.columns))):
-            sources[:, plan.columns[c, Column.V]] = self.results + COLUMN_ROWS * c + np.arange(6)
+            sources[:, plan.columns[c, Column.V]] = row + COLUMN_ROWS * c + np.arange(6)
         found: list[int] = sources.ravel().tolist()
         return found
+
+    def _paired(self, f: int) -> list[int]:
+        """How many columns the frame has, each of them (`PAIR_WIDTH`), and where its sums stand."""
+        columns, leaders = self.plan.columns, self.plan.leaders[f]
+        own = np.flatnonzero(leaders >= 0)
+        rows = self.results + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]
+        pairs = np.column_stack((rows[0], columns[own, Column.STEP], columns[own, Column.V], rows[1]))
+        return [len(own), *pairs.ravel().tolist(), *self._sources(f, self.sums)]
 
 
 def _leaves_alone(R: FloatArray, axis: int) -> bool:

@@ -93,7 +93,10 @@ def _doubles(given, ndarray, flags, axes, rows, columns):
     kind, shape = whole_numbers_at(x[_KIND])[_KIND_AND_ORDER], whole_numbers_at(x[_SHAPE])
     if kind >> 32 != _DOUBLE or kind >> 16 & _BYTE != _NATIVE:
         return 0
-    return x[_DATA] if shape[0] == rows and (axes == 1 or shape[1] == columns) else 0
+    alike = shape[0] == rows
+    for axis in range(1, axes):
+        alike = alike and shape[axis] == columns
+    return x[_DATA] if alike else 0
 
 
 @core
@@ -129,9 +132,12 @@ def _done(address, given, to, ndarray):
     orders, rows, columns, width = task[_ORDERS], task[_ROWS], task[_COLUMNS], task[_NQ]
     out = _doubles(to, ndarray, _WRITABLE, task[_AXES], rows, columns)
     good = out != 0
+    size = 8 * rows
+    for _ in range(1, task[_AXES]):
+        size *= columns
     for i in range(orders):
         x = _doubles(given[i], ndarray, _READABLE, 1, width, 1) if good else 0
-        apart = x + 8 * width <= out or out + 8 * rows * columns <= x
+        apart = x + 8 * width <= out or out + size <= x
         good, width = x != 0 and apart, task[_NV]
     if not good or _taken(task, _BUSY):
         return False
@@ -183,12 +189,14 @@ def arrays_are_known() -> bool:
     )
 
 
-#: For each quantity: its core, that for LOCAL, how many of q, v and a they take, and whether it has columns.
-_HOW: dict[str, tuple[Core, Core, int, bool]] = {
-    "placement": (cores.placements, cores.placements, 1, False),
-    "velocity": (cores.velocities, cores.local_velocities, 2, False),
-    "jacobian": (cores.jacobians, cores.jacobians, 1, True),
-    "acceleration": (cores.accelerations, cores.local_accelerations, 3, False),
+#: For each quantity: its core, that for LOCAL, how many of q, v and a they take, and how many axes of a
+#: result are the rates'.
+_HOW: dict[str, tuple[Core, Core, int, int]] = {
+    "placement": (cores.placements, cores.placements, 1, 0),
+    "velocity": (cores.velocities, cores.local_velocities, 2, 0),
+    "jacobian": (cores.jacobians, cores.jacobians, 1, 1),
+    "hessian": (cores.hessians, cores.hessians, 1, 2),
+    "acceleration": (cores.accelerations, cores.local_accelerations, 3, 0),
 }
 
 
@@ -204,13 +212,13 @@ def single(
     core, local_core, orders, columns = _HOW[quantity]
     local = reference is Reference.LOCAL
     turned = quantity == "placement" or local
-    program = program_of(plan, turned=turned, columns=columns)
+    program = program_of(plan, turned=turned, columns=columns > 0, pairs=columns > 1)
     memory, task = scratch(program), np.zeros(len(Task), dtype=np.int64)
     task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
     task[Task.SCRATCH], task[Task.REFERENCE], task[Task.N] = memory.ctypes.data, reference, 1
     task[Task.CORE], task[Task.ORDERS] = (local_core if local else core).address, orders
     task[Task.NQ], task[Task.NV] = plan.nq, plan.nv  # strides are 0: there is no next configuration
-    shape = {"placement": (4, 4), "jacobian": (6, plan.nv)}.get(quantity, (6,))
+    shape = (4, 4) if quantity == "placement" else (6, *[plan.nv] * columns)
     task[Task.AXES], task[Task.ROWS], task[Task.COLUMNS] = len(shape), *(*shape, 1)[:2]
     bound = task, np.ndarray, None, np.empty, shape, program, memory
     return _built_in(quantity, one_configuration.address, *bound), task

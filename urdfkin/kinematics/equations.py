@@ -197,3 +197,21 @@ def turning_column_rate(z, z_rate, d, d_rate):
 def rate_in_turning_axes(rate, w, x):
     """The rate of the numbers of x in axes that turn with w."""
     return minus(rate, cross(w, x))
+
+
+# -- second derivatives: how a column of the Jacobian changes with a rate, which 7.126 sums over the rates ---
+
+
+def turned_along(w, linear, angular):
+    """A column of 7.85 as a rate w before it turns it, axis and arm together."""
+    return cross(w, linear), cross(w, angular)
+
+
+def end_moved(z, linear):
+    """The linear rows z x d of a turning column, as a rate behind it moves the end of d by its own."""
+    return cross(z, linear)
+
+
+def motion_product(linear_1, angular_1, linear_2, angular_2):
+    """Of two columns for one point of the body: how the first moves what the second is the motion of."""
+    return plus(cross(angular_1, linear_2), cross(linear_1, angular_2)), cross(angular_1, angular_2)

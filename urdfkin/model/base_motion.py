@@ -81,3 +81,13 @@ class BaseMotion:
 #: A base that stands still at the world's origin.
 STILL = BaseMotion()
 STILL_STATE = frozen(STILL.state(()))
+
+
+def against_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
+    """The state (1 or n, 24) of the same base in a world that is accelerated by -gravity (3,).
+
+    No accelerometer can tell it from one that stands still where there is gravity.
+    """
+    lifted = state.copy()
+    lifted[:, -3:] -= gravity
+    return lifted

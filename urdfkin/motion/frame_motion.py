@@ -16,7 +16,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.bounds import result_k
 from urdfkin.verify.call import Call
-from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, PLACEMENT, VELOCITY, Quantity, walked
+from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, PLACEMENT, VELOCITY, Quantity, validated
 from urdfkin.verify.verifier import held_against
 from urdfkin.verify.worst import worst_of_each
 
@@ -107,7 +107,7 @@ def frame_motion(
     """
     call = Call(robot.tree, robot.plan, word(frame, "frame"), reference, None, (q, v, a))
     inputs, reference = (call.q, *call.rates), call.reference
-    ours = {row: call.compute(row.ours, call.plan, inputs, reference) for row in walked()}
+    ours = {row: call.compute(row.ours, call.plan, inputs, reference) for row in validated()}
     reason = robot.verifier.cannot()
     placement, velocity, acceleration, jacobian = (
         ours[row][:, 0] for row in (PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN)

@@ -26,7 +26,7 @@ from urdfkin.validation.three_sides import ThreeSides, three_sides
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.magnitudes import magnitudes
 from urdfkin.verify.pinocchio import Oracle
-from urdfkin.verify.quantities import SCREWS, Quantity, walked
+from urdfkin.verify.quantities import SCREWS, Quantity, validated
 from urdfkin.verify.sampling import Samples
 from urdfkin.verify.witnesses import Witness
 
@@ -133,8 +133,8 @@ class _Block(_Work):
     def tallies(self, second: SecondWitness | None) -> Iterator[tuple[Key, Tally]]:
         """Quantity by quantity; a joint's is its child link's, for which Pinocchio has another way."""
         inputs = self.x.q, self.x.v, self.x.a
-        for row in walked():
-            joints = [joint for joint in walked("joints") if joint.compute is row.compute]
+        for row in validated():
+            joints = [joint for joint in validated("joints") if joint.compute is row.compute]
             for reference in row.references:
                 name = reference.name.lower() if reference is not None else ""
                 ours = self.clock.ours(row.ours, self.plan, inputs, reference)

@@ -37,7 +37,7 @@ from urdfkin.verify.exact.vectors import exact, mp
 from urdfkin.verify.line_of_nodes import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.magnitudes import magnitudes
 from urdfkin.verify.pinocchio_base import BaseNumbers, davenport
-from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, walked
+from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated
 from urdfkin.verify.sampling import Samples, draw
 from urdfkin.verify.verifier import bound_of, theirs_of, urdfkins
 
@@ -188,7 +188,7 @@ class _Work:
     def lines(self) -> Iterator[Line]:
         """Quantity by quantity, reference by reference."""
         for reference in (None, *Reference):
-            for row in walked():
+            for row in validated():
                 if row.exact is not None and reference in row.references:
                     name = "" if reference is None else reference.name.lower()
                     yield _line(row.name, name, [self._compared(row, reference)])

@@ -13,8 +13,8 @@ grows with the number of joints and no faster.
 
 A quantity is multilinear in rotated vectors, each a *factor* that may be off by as much: a position has one
 in each term (R d), a velocity two (w and d), an acceleration three (w, w, d, or v z, w, d), a Jacobian's
-linear rows two (z and d), its rate's three (w, z and d); seeing it in the frame's own axes is one factor
-more, seeing it from the world's origin crosses it with p and is one more.
+linear rows two (z and d), its rate's three (w, z and d), its Hessian's three (z, z and d); seeing it in the
+frame's own axes is one factor more, seeing it from the world's origin crosses it with p and is one more.
 
 Rounding seldom conspires as it would have to. What is measured is a fraction of an eps for each
 joint, and reports give the disagreement itself, in multiples of eps * scale, so that it can be compared
@@ -29,6 +29,7 @@ import numpy as np
 
 from urdfkin.compiled.plan import Column, Plan
 from urdfkin.kinematics.lengths import chapter as eq
+from urdfkin.kinematics.lengths import product
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, MUJOCO, ROUNDINGS, of_joints
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -165,6 +166,52 @@ def jacobian_rate_scale(plan: Plan, size: Magnitudes, reference: Reference) -> F
         linear = eq.rate_in_turning_axes(linear, w, column + sliding)
         angular = eq.rate_in_turning_axes(angular, w, axis)
     return _six_rows(linear, angular)
+
+
+#: Of a pair of columns whose second comes before the first, or with it, and of one whose second comes behind:
+#: how many products z x (z x d) Pinocchio's linear rows are summed from, and how many z x z where one slides.
+_PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
+    Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
+    Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
+    Reference.LOCAL: ((0.0, 0.0), (3.0, 1.0)),
+}
+
+
+@_BEYOND
+def hessian_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
+    """For (n, frames, 6, nv, nv): of pairs of columns, a follower's with its leader's.
+
+    No d is longer than the path. Pinocchio takes all from two columns c = [z x d; z] for the world's origin,
+    and is counted by the products that it adds: c_1 x c_2 has two in its linear rows, w_1 x v_2 + v_1 x w_2;
+    to go to a frame's origin p is p x (w_1 x w_2), one more; to have the other column there, (v - p x w) x w,
+    two. So the five, two and three of `_PAIR_TERMS`. urdfkin needs one, z x (z x d), or the two of c_1 x c_2.
+
+    In LOCAL urdfkin pairs columns that were turned back, each by R: two products of five factors, R, z, R, z
+    and d, less than the three of four that are allowed for.
+    """
+    shape = len(plan.frames), plan.nv, plan.nv
+    turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    (near, near_mixed), (far, far_mixed) = _PAIR_TERMS[reference]
+    step, rate = plan.columns[:, Column.STEP], plan.columns[:, Column.V]
+    turns = plan.columns[:, Column.TURNS] == 1
+    for f, (_, place) in enumerate(plan.frames):
+        own = np.flatnonzero(plan.leaders[f] >= 0)
+        i, j = own[:, np.newaxis], own[np.newaxis, :]
+        before = step[j] <= step[i]
+        both, one, size_2 = (
+            turns[i] & turns[j],
+            turns[i] ^ turns[j],
+            np.abs(plan.multipliers[i] * plan.multipliers[j]),
+        )
+        pair = place, rate[i], rate[j]
+        np.add.at(turning, pair, size_2 * both * np.where(before, near, far))
+        np.add.at(mixed, pair, size_2 * one * np.where(before, near_mixed, far_mixed))
+        np.add.at(angular, pair, size_2 * both * (before != (reference is Reference.LOCAL)))
+    linear = product(turning, size.p[..., np.newaxis, np.newaxis]) + mixed
+    scale = np.empty((*linear.shape[:2], 6, *shape[1:]))
+    scale[..., :3, :, :] = linear[..., np.newaxis, :, :]
+    scale[..., 3:, :, :] = angular[..., np.newaxis, :, :]
+    return scale
 
 
 @_BEYOND

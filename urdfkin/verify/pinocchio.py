@@ -262,6 +262,36 @@ class Oracle:
         compute, get = pin.computeJointJacobiansTimeVariation, pin.getFrameJacobianTimeVariation
         return self._layout.couple(self._collected(inputs, compute, get, self._ids(frames), reference))
 
+    def hessians(
+        self,
+        q: FloatArray,
+        frames: Sequence[str],
+        reference: Reference | str,
+        base: BaseNumbers | None = None,
+    ) -> FloatArray:
+        """(n, frames, 6, nv, nv): `computeJointKinematicHessians`, then `getFrameKinematicHessian`.
+
+        Two things in Pinocchio 4.1 are put right. Python is handed the numbers in Eigen's order, first index
+        fastest, in an array that calls them NumPy's. And in LOCAL, columns of one joint are said to change
+        each other where another joint comes before it; they do not: what a joint moves moves the frame too.
+        """
+        pin, model, data = self._pin, self._model, self._data
+        ids, wanted, nv = self._ids(frames), self._reference(reference), model.nv
+        out = np.zeros((len(q), len(ids), 6, nv, nv))
+        carried = [(f, i) for f, i in enumerate(ids) if nv and model.frames[i].parentJoint]
+        for to, q_k in zip(out, self.configurations(q, base), strict=True):
+            pin.computeJointJacobians(model, data, q_k)
+            pin.computeJointKinematicHessians(model, data)
+            for f, frame in carried:
+                numbers = pin.getFrameKinematicHessian(model, data, frame, wanted).ravel("K")
+                to[f] = numbers.reshape(nv, nv, 6).T
+        if wanted == pin.LOCAL:
+            for joint in model.joints[1:]:
+                own = slice(joint.idx_v, joint.idx_v + joint.nv)
+                out[..., own, own] = 0.0
+        by_leaders = self._layout.couple(out)
+        return self._layout.couple(by_leaders.swapaxes(-1, -2)).swapaxes(-1, -2)
+
     def joint_jacobians(self, q: FloatArray, among: slice, reference: Reference | str) -> FloatArray:
         """(n, joints, 6, nv): `getJointJacobian` of a run of the moving joints, in the tree's order."""
         pin, inputs, joints = self._pin, (self.configurations(q),), self._layout.joint_ids[among]

@@ -11,6 +11,7 @@ placement q (4, 4)
 velocity qv (6,)
 jacobian q (6, 'nv')
 jacobian rate qv (6, 'nv')
+hessian q (6, 'nv', 'nv')
 acceleration qva (6,)
 """
 
@@ -72,7 +73,9 @@ class Quantity:
         against: (oracle, part, ours, witness) to its results and their bound, where `ask` and `scale` cannot
             say it.
         exact: Its true values, (motion, link, reference) to numbers of any kind, for judge and enclosures.
-        walked: Whether the walk computes it for any frames: then it is validated, judged and plotted.
+        walked: Whether the walk computes it for any frames.
+        validated: Whether what is walked is validated, judged and plotted too. A Hessian has as many numbers
+            as all other quantities together, times the rates, and is made of the Jacobian's columns.
         referred: Whether it is given in a reference; a placement is not.
         of: What a validation compares it of: "frames", "joints" or "columns".
         head: The column of a report; rows of one head share it.
@@ -96,6 +99,7 @@ class Quantity:
     against: Against | None = None
     exact: Callable[..., Any] | None = None
     walked: bool = True
+    validated: bool = True
     referred: bool = True
     of: Literal["frames", "joints", "columns"] = "frames"
     head: str = ""
@@ -113,7 +117,7 @@ class Quantity:
 
     @property
     def axes(self) -> int:
-        """How many axes one result has: two for a matrix, one for [linear; angular]."""
+        """How many axes one result has: one for [linear; angular], two for a matrix, three for a Hessian."""
         return len(self.shape)
 
     @property
@@ -242,6 +246,25 @@ JACOBIAN_RATE = Quantity(
     " acceleration.",
     example="urdfkin jacobian-rate panda --q random --v random --frame panda_hand",
 )
+HESSIAN = Quantity(
+    name="hessian",
+    title="Hessian",
+    inputs="q",
+    shape=(6, "nv", "nv"),
+    equations=("7.85", "7.126"),
+    compute=later("urdfkin.compiled.evaluate:hessians"),
+    ask=later("urdfkin.verify.pinocchio:Oracle.hessians"),
+    scale=later("urdfkin.verify.bounds:hessian_scale"),
+    exact=later("urdfkin.verify.exact.recursion:hessian_values"),
+    factors=3,
+    validated=False,
+    head="H",
+    command="hessian",
+    summary="derivatives of a frame's velocity Jacobian by each rate",
+    page="For each column of the Jacobian, a row of the table for each rate: how fast that rate changes the"
+    " column. Summed over the rates, each times its --v, that is `urdfkin jacobian-rate`.",
+    example="urdfkin hessian panda --q random --seed 1 --frame panda_hand",
+)
 ACCELERATION = Quantity(
     name="acceleration",
     title="acceleration",
@@ -314,6 +337,7 @@ QUANTITIES = {
         VELOCITY,
         JACOBIAN,
         JACOBIAN_RATE,
+        HESSIAN,
         ACCELERATION,
         ANALYTICAL_JACOBIAN,
         ACCELERATION_BREAKDOWN,
@@ -327,6 +351,11 @@ QUANTITIES = {
 def walked(of: str = "frames") -> list[Quantity]:
     """Those that the walk computes for any frames, or for any joints."""
     return [row for row in QUANTITIES.values() if row.walked and row.of == of]
+
+
+def validated(of: str = "frames") -> list[Quantity]:
+    """Those of them that are compared wherever everything is."""
+    return [row for row in walked(of) if row.validated]
 
 
 def by_command() -> dict[str, Quantity]:

@@ -220,6 +220,44 @@ def jacobian_rate_values(motion: Motion, link: int, reference: Reference) -> NDA
     return _array(jacobian_rate(motion, link, reference)).reshape(motion.nv, 6).T
 
 
+def hessian_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+    """(6, nv, nv), likewise."""
+    out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
+    columns, s = motion.columns[link], motion.states[link]
+    # Columns of one joint ride on one link.
+    order = {id(column.carrier): place for place, column in enumerate(columns)}
+    ends = [_column(column, s, reference) for column in columns]
+    for i, column in enumerate(columns):
+        for j, by in enumerate(columns):
+            before = order[id(by.carrier)] <= order[id(column.carrier)]
+            change = _seen(s, reference, *_change(ends[i], ends[j], reference, before=before))
+            out[column.place, by.place] += column.factor * by.factor * _array(change)
+    return out.transpose(2, 0, 1)
+
+
+def _column(column: Column, s: State, reference: Reference) -> tuple[Vector, Vector]:
+    """[linear; angular] of a rate, in the world's axes."""
+    if not column.turns:
+        return column.z, ZERO
+    end = ZERO if reference is Reference.WORLD else s.p
+    six: tuple[Vector, Vector] = eq.turning_column(column.z, eq.minus(end, column.carrier.p))
+    return six
+
+
+def _change(
+    column: tuple[Vector, Vector], by: tuple[Vector, Vector], reference: Reference, *, before: bool
+) -> tuple[Vector, Vector]:
+    """How a column changes with a rate that comes before it, or with it, or behind it."""
+    change: tuple[Vector, Vector] = ZERO, ZERO
+    if reference is Reference.WORLD:
+        change = eq.motion_product(*by, *column) if before else change
+    elif reference is Reference.LOCAL:
+        change = change if before else eq.motion_product(*column, *by)
+    else:
+        change = eq.turned_along(by[1], *column) if before else (eq.end_moved(column[1], by[0]), ZERO)
+    return change
+
+
 def _array(numbers: Sequence[Any]) -> NDArray[np.object_]:
     return np.array(numbers, dtype=object)
 
@@ -243,12 +281,8 @@ def acceleration(s: State, reference: Reference) -> Six:
 def jacobian(motion: Motion, link: int, reference: Reference) -> list[Six]:
     """The columns of the velocity Jacobian (7.85), one for each rate."""
     s, out = motion.states[link], _no_columns(motion.nv)
-    end = ZERO if reference is Reference.WORLD else s.p
     for column in motion.columns[link]:
-        linear, angular = column.z, ZERO
-        if column.turns:
-            linear, angular = eq.turning_column(column.z, eq.minus(end, column.carrier.p))
-        _add(out, column, _seen(s, reference, linear, angular))
+        _add(out, column, _seen(s, reference, *_column(column, s, reference)))
     return out
 
 

@@ -1,0 +1,191 @@
+"""The Hessian is the derivative of the Jacobian by each rate: at fifty digits, summed, by its symmetries."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+import urdfkin
+from tests.laws.subjects import EPS, NAMES, robot_of, state
+from urdfkin.compiled import evaluate
+from urdfkin.kinematics import equations as eq
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.robot import Robot
+from urdfkin.verify.exact import recursion
+from urdfkin.verify.exact.decimals import read_exact
+from urdfkin.verify.exact.vectors import about, exact, from_quaternion, mp
+from urdfkin.verify.quantities import HESSIAN, JACOBIAN
+
+_STEP = mp.mpf(10) ** -18
+#: Of the quotients: their truncation goes with the square of the step, fifty digits lose eighteen.
+_ROOM = 1e-30
+_Z = (0, 0, 1)
+
+
+def stepped(robot: Robot, q: FloatArray, rate: int, step: Any) -> list[Any]:
+    """Coordinates as they go on with one rate, to first order in the step."""
+    out: list[Any] = [exact(x) for x in q]
+    tree = robot.tree
+    for joint, at, rate_at in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
+        if joint.mimic is not None or not rate_at <= rate < rate_at + joint.kind.nv:
+            continue
+        unit = [step if c == rate - rate_at else mp.mpf(0) for c in range(joint.kind.nv)]
+        if joint.kind is JointKind.PLANAR:
+            R = about(_Z, out[at + 2], mp)
+            x, y, _ = eq.rotate(R, (unit[0], unit[1], 0))
+            out[at : at + 3] = [out[at] + x, out[at + 1] + y, out[at + 2] + unit[2]]
+        elif joint.kind is JointKind.FLOATING:
+            quaternion = tuple(out[at + 3 : at + 7])
+            x, y, z, w = quaternion
+            slide = eq.rotate(from_quaternion(quaternion, mp), tuple(unit[:3]))
+            half = tuple(part / 2 for part in unit[3:])
+            turn = eq.plus(eq.times(w, half), eq.cross((x, y, z), half))
+            moved = [*eq.plus(tuple(out[at : at + 3]), slide), *eq.plus((x, y, z), turn)]
+            out[at : at + 7] = [*moved, w - eq.dot((x, y, z), half)]
+        else:
+            out[at] += step
+    return out
+
+
+def truths(robot: Robot, q: FloatArray, link: int, reference: Reference) -> tuple[NDArray[Any], NDArray[Any]]:
+    """(6, nv, nv) of the equations, and by difference quotients of the Jacobian, both at fifty digits."""
+    joints, still = read_exact(robot.urdf, robot.tree, mp, robot.tree.path(link)), [mp.mpf(0)] * robot.nv
+
+    def at(x: list[Any]) -> recursion.Motion:
+        return recursion.move(robot.tree, joints, x, still, still)
+
+    found = HESSIAN.truth(at([exact(x) for x in q]), link, reference)
+    quotients = np.empty_like(found)
+    for j in range(robot.nv):
+        ahead, behind = (
+            JACOBIAN.truth(at(stepped(robot, q, j, step)), link, reference) for step in (_STEP, -_STEP)
+        )
+        quotients[..., j] = (ahead - behind) / (2 * _STEP)
+    return found, quotients
+
+
+@pytest.mark.parametrize("reference", Reference)
+@pytest.mark.parametrize("name", ["panda", "floating_root", "planar_and_floating_in_the_middle", "tree_3"])
+def test_it_is_the_difference_quotient_of_the_jacobian_at_fifty_digits(
+    name: str, reference: Reference
+) -> None:
+    robot = robot_of(name)
+    q, link = state(robot, 1, 3)[0][0], robot.tree.frame_link(robot.tip_frame)
+    found, quotients = truths(robot, q, link, reference)
+    assert max(abs(x - y) for x, y in zip(found.ravel(), quotients.ravel(), strict=True)) < _ROOM
+    ours = robot.hessian(q, robot.tip_frame, reference)
+    size = max(1.0, float(np.abs(ours).max()))
+    assert np.abs(ours - found.astype(float)).max() < 100.0 * EPS * size
+
+
+@pytest.mark.parametrize("reference", Reference)
+@pytest.mark.parametrize("name", NAMES)
+def test_summed_over_the_rates_it_is_the_jacobians_rate(name: str, reference: Reference) -> None:
+    robot = robot_of(name)
+    q, v, _ = state(robot, 9, 4)
+    frames = robot.link_frames[-3:]
+    H = robot.hessian(q, frames, reference)
+    J_rate = robot.jacobian_rate(q, v, frames, reference)
+    summed = np.einsum("nfrij,nj->nfri", H, v)
+    size = np.einsum("nfrij,nj->nfri", np.abs(H), np.abs(v)).max() + 1.0
+    assert np.abs(summed - J_rate).max() < 200.0 * EPS * size
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5", "mimic_hand_40_sliding"])
+def test_how_two_joints_move_a_point_does_not_depend_on_their_order(name: str) -> None:
+    robot = urdfkin.load(name, verify=False) if name == "ur5" else robot_of(name)
+    H = robot.hessian(state(robot, 5, 5)[0], robot.tip_frame)
+    np.testing.assert_allclose(H[:, :3], H[:, :3].swapaxes(-1, -2), rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5"])
+def test_which_of_two_joints_turns_first_does_matter_by_the_product_of_their_axes(name: str) -> None:
+    robot = urdfkin.load(name, verify=False)
+    q = state(robot, 5, 5)[0]
+    H = robot.hessian(q, robot.tip_frame)
+    J = robot.jacobian(q, robot.tip_frame)[:, 3:]
+    curl = np.cross(J[:, :, np.newaxis, :], J[:, :, :, np.newaxis], axis=1)
+    np.testing.assert_allclose(H[:, 3:] - H[:, 3:].swapaxes(-1, -2), curl, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_from_one_reference_to_the_other_the_axes_and_the_point_move_too(name: str) -> None:
+    robot = robot_of(name)
+    q, _, _ = state(robot, 5, 6)
+    frame = robot.tip_frame
+    R, J = robot.placement(q, frame)[:, :3, :3], robot.jacobian(q, frame)
+    H, local = robot.hessian(q, frame), robot.hessian(q, frame, "local")
+    w = J[:, 3:, np.newaxis, :]
+    for rows in (slice(0, 3), slice(3, 6)):
+        own = H[:, rows] - np.cross(w, J[:, rows, :, np.newaxis], axis=1)
+        turned = np.einsum("nsr,nsij->nrij", R, own)
+        np.testing.assert_allclose(local[:, rows], turned, rtol=0, atol=1e-12 * max(1.0, np.abs(J).max()))
+
+
+def test_a_base_moves_the_hessian_as_it_moves_the_jacobian() -> None:
+    robot = urdfkin.load("panda")
+    q = robot.sample(4)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), (1.0, 2.0, 3.0)
+    on_base = robot.hessian(q, "panda_hand", base=BaseMotion(T, np.ones(6), np.ones(6)))
+    here = robot.hessian(q, "panda_hand").reshape(4, 2, 3, robot.nv, robot.nv)
+    np.testing.assert_allclose(
+        on_base.reshape(here.shape), np.einsum("rs,nbsij->nbrij", T[:3, :3], here), rtol=0, atol=1e-14
+    )
+
+
+def test_an_error_of_a_millionth_of_a_millionth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, original = urdfkin.load("panda"), evaluate.hessians
+    monkeypatch.setattr(evaluate, "hessians", lambda *x, **how: original(*x, **how) * (1.0 + 1e-11))
+    with pytest.raises(urdfkin.VerificationError, match="the hessian of panda_hand"):
+        robot.hessian(robot.sample(20), "panda_hand")
+
+
+# -- what Pinocchio 4.1 does, which the oracle puts right: when one of these fails, that can go ------------
+
+
+def pinocchios(model: Any, q: FloatArray, reference: Any) -> tuple[FloatArray, FloatArray]:
+    """Of the last frame: what it is said to be, and the difference quotient of Pinocchio's own Jacobian."""
+    frame, step = model.nframes - 1, 1e-6
+
+    def jacobian(rate: int, by: float) -> FloatArray:
+        data, v = model.createData(), np.zeros(model.nv)
+        v[rate] = by
+        pin.computeJointJacobians(model, data, pin.integrate(model, q, v))
+        J: FloatArray = pin.getFrameJacobian(model, data, frame, reference)
+        return J.copy()
+
+    data = model.createData()
+    pin.computeJointJacobians(model, data, q)
+    pin.computeJointKinematicHessians(model, data)
+    slopes = [(jacobian(j, step) - jacobian(j, -step)) / (2.0 * step) for j in range(model.nv)]
+    return pin.getFrameKinematicHessian(model, data, frame, reference), np.stack(slopes, axis=-1)
+
+
+@pytest.mark.parametrize("reference", [pin.LOCAL, pin.WORLD, pin.LOCAL_WORLD_ALIGNED])
+def test_pinocchios_array_has_eigens_order_and_says_numpys(reference: Any) -> None:
+    model = pin.buildModelFromXML(urdfkin.load("ur5", verify=False).urdf)
+    said, is_so = pinocchios(model, np.linspace(0.1, 1.3, 6), reference)
+    assert np.abs(said - is_so).max() > 0.1
+    nv = model.nv
+    assert np.abs(said.ravel("K").reshape(nv, nv, 6).T - is_so).max() < 1e-8
+
+
+def test_pinocchio_has_columns_of_one_joint_change_each_other_in_local_behind_another() -> None:
+    model = pin.Model()
+    arm = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "arm")
+    ball = model.addJoint(arm, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
+    model.addFrame(pin.Frame("tip", ball, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    said, is_so = pinocchios(model, pin.neutral(model), pin.LOCAL)
+    said = said.ravel("K").reshape(7, 7, 6).T
+    own = slice(1, 7)
+    assert np.abs(is_so[:, own, own]).max() < 1e-9
+    assert np.abs(said[:, own, own]).max() == 1.0
+    said[:, own, own] = 0.0
+    assert np.abs(said - is_so).max() < 1e-8
