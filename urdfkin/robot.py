@@ -22,8 +22,9 @@ from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
 from urdfkin.errors.demands import choice, real_number, shown, switch, whole_number, word, words
 from urdfkin.kinematics.bodies.representation import QUATERNION
-from urdfkin.kinematics.inputs import scalars
+from urdfkin.kinematics.inputs import scalars, vectors
 from urdfkin.kinematics.rotation.euler_rates import NEAREST
+from urdfkin.kinematics.roundings import EPS
 from urdfkin.lint import Finding
 from urdfkin.model import configuration
 from urdfkin.model.base_motion import BaseMotion
@@ -36,6 +37,7 @@ from urdfkin.verify.bounds import nearest_singularity
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.choosing import Verify
+from urdfkin.verify.magnitudes import magnitudes
 from urdfkin.verify.quantities import (
     ACCELERATION_BREAKDOWN,
     ANALYTICAL_JACOBIAN,
@@ -46,6 +48,7 @@ from urdfkin.verify.quantities import (
     walked,
 )
 from urdfkin.verify.sampling import sample
+from urdfkin.verify.singular_values import SingularValues, singular_values
 from urdfkin.verify.verifier import Verifier
 from urdfkin.verify.witnesses import WitnessName
 
@@ -53,6 +56,9 @@ if TYPE_CHECKING:
     from urdfkin.verify.exact.enclosure import Enclosures
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+#: m/s^2, as Pinocchio and MuJoCo have it.
+GRAVITY = (0.0, 0.0, -9.81)
+_ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 #: More than these no array can hold, on any machine.
 _MOST_NUMBERS = (2**63 - 1) // 8
 
@@ -416,6 +422,100 @@ class Robot:
             return one
         return self._computed("acceleration", (q, v, a), frame, reference, base, out, verify, threads)
 
+    def imu(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        frame: str | Sequence[str],
+        *,
+        gravity: ArrayLike = GRAVITY,
+        base: BaseMotion | None = None,
+        out: FloatArray | None = None,
+        verify: Verify | None = None,
+        threads: int | None = None,
+    ) -> FloatArray:
+        """(..., 6) what an accelerometer and a gyroscope in a frame read, in the frame's own axes.
+
+        The first three numbers are the *proper* acceleration R^T (p'' - g), m/s^2: what the frame is
+        accelerated by relative to free fall, upwards 9.81 where it stands still. p'' is the classical
+        acceleration of `acceleration` (7.130), not the spatial one. The other three are R^T w (7.127), rad/s.
+
+        Args:
+            q: (..., nq) rad, m.
+            v: (..., nv) rad/s, m/s.
+            a: (..., nv) rad/s^2, m/s^2.
+            frame: As in `placement`; so are the others.
+            gravity: (3,) m/s^2 in the world's axes.
+            base: As in `placement`.
+            out: As in `placement`.
+            verify: As in `placement`.
+            threads: As in `placement`.
+
+        Raises:
+            InputError: as `placement`; gravity that is not three finite numbers.
+            UnknownNameError: no such frame.
+            VerificationError: Pinocchio computes something else.
+
+        >>> import urdfkin
+        >>> robot = urdfkin.load("ur5")
+        >>> rest = robot.neutral(), [0.0] * 6, [0.0] * 6
+        >>> robot.imu(*rest, "base_link").tolist()
+        [0.0, 0.0, 9.81, 0.0, 0.0, 0.0]
+        """
+        g = vectors(gravity, "gravity")
+        if g.shape != (3,):
+            raise InputError("gravity is one vector (3,)", found=f"shape {g.shape}")
+        return self._computed(
+            "imu", (q, v, a), frame, Reference.LOCAL, base, out, verify, threads, gravity=g.tolist()
+        )
+
+    def singular_values(
+        self,
+        q: ArrayLike,
+        frame: str,
+        rows: str = "all",
+        *,
+        base: BaseMotion | None = None,
+        verify: Verify | None = None,
+        threads: int | None = None,
+    ) -> SingularValues:
+        """The singular values of `jacobian` with guaranteed bounds, their condition and manipulability.
+
+        They are the same in LOCAL and LOCAL_WORLD_ALIGNED. Of "all" rows, metres and radians are mixed as SI
+        units mix them. How far J can be off, and what the decomposition rounds, is in the bounds. Their
+        product's gradient is `found.manipulability_gradient(robot.hessian(q, frame))`.
+
+        Args:
+            q: (..., nq) rad, m.
+            frame: A link's or joint's name.
+            rows: "all", "linear" or "angular".
+            base: As in `placement`.
+            verify: As in `placement`.
+            threads: As in `placement`.
+
+        Raises:
+            InputError: as `placement`, or other rows.
+            UnknownNameError: no such frame.
+            VerificationError: Pinocchio computes another Jacobian.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> found = arm.singular_values([0.3, 0.0], arm.tip_frame, "linear")
+        >>> found.values.lower[-1] == 0.0, found.condition.upper  # stretched out: one is, or may be, 0
+        (np.True_, np.float64(inf))
+        """
+        which = _ROWS.get(word(rows, "rows"))
+        if which is None:
+            raise InputError("rows are all, linear or angular", found=shown(rows))
+        J = self.jacobian(q, word(frame, "frame"), base=base, verify=verify, threads=threads)
+        call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,))
+        size = magnitudes(call.plan, call.q, None, None, call.state)
+        bound = JACOBIAN.bound(call.plan, size, _ALIGNED)
+        error = (EPS * bound.k * bound.scale)[:, 0].reshape(*call.shape, 6, self.nv)
+        moving = np.asarray((bound.scale[:, 0, which] > 0.0).any(axis=(0, 1)))
+        return singular_values(J, error, moving, which)
+
     def analytical_jacobian(
         self,
         q: ArrayLike,
@@ -702,13 +802,14 @@ class Robot:
         out: FloatArray | None,
         verify: Verify | None,
         threads: int | None,
+        **options: object,
     ) -> FloatArray:
         row = QUANTITIES[name]
-        call = Call(self.tree, self.plan, frame, reference, base, inputs)
+        call = Call(self.tree, self.plan, frame, reference, base, inputs, **options)
         to = call.flat(out, row.own_shape(self.nv))
         self.verifier.ready(verify)
         flat = (call.plan, (call.q, *call.rates), call.reference)
-        found = call.compute(row.ours, *flat, base=call.state, out=to, threads=threads)
+        found = call.compute(row.ours, *flat, base=call.state, out=to, threads=threads, **options)
         result = call.in_shape(found) if out is None else out
         self.verifier.check(row, call, result, verify)
         return result

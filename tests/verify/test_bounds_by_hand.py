@@ -107,6 +107,11 @@ def test_a_hessian_has_three_for_each_product_that_a_pair_is_summed_from(
     assert k == 24.0 * JOINTS * factors
 
 
+def test_an_imus_reading_has_gravity_as_one_term_more(plan: Plan) -> None:
+    scale = bounds.imu_scale(sizes(), np.array([3.0, 0.0, 4.0]))[0, 0]
+    assert scale.tolist() == [*[ACC + W * VEL + 5.0] * 3, *[W] * 3]
+
+
 def test_rates_of_angles_grow_as_the_square_of_the_distance_from_the_singularity(plan: Plan) -> None:
     def euler(apart: float) -> Bound:
         jacobian = JACOBIAN.bound(plan, sizes(), ALIGNED)

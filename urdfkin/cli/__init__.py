@@ -25,6 +25,11 @@ _BEFORE: dict[str, tuple[str, str]] = {
     "info": ("urdfkin.cli.info", "joints, limits, frames and coordinates of a robot"),
 }
 _AFTER: dict[str, tuple[str, str]] = {
+    "imu": ("urdfkin.cli.imu", "what an accelerometer and a gyroscope in a frame read"),
+    "manipulability": (
+        "urdfkin.cli.manipulability",
+        "singular values of a Jacobian between bounds; their product",
+    ),
     "dh": ("urdfkin.cli.dh", "Denavit-Hartenberg tables, checked, compared, in many forms"),
     "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
     "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),

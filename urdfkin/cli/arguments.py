@@ -109,16 +109,19 @@ q_option = click.option("--q", metavar="VALUES", default="neutral", show_default
 v_option = click.option("--v", metavar="VALUES", default="neutral", help="Rates, likewise; neutral is zero.")
 a_option = click.option("--a", metavar="VALUES", default="neutral", help="Rates of the rates, likewise.")
 
+TRAJECTORY_HELP = "CSV: t, coordinates, v:NAME, a:NAME; or .npz: t, q, v, a."
+
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """A robot and what to compute with."""
+    """A robot and what to compute with; along a trajectory, at what times."""
 
     robot: Robot
     frame: str
     q: FloatArray
     v: FloatArray
     a: FloatArray
+    t: FloatArray | None = None
 
 
 def load_robot(

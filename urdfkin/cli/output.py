@@ -20,7 +20,7 @@ from urdfkin.cli.door import say
 from urdfkin.errors import SourceError
 from urdfkin.errors.numerals import whole
 from urdfkin.errors.printable import csv_cell, json_text
-from urdfkin.report.listing import make_table, print_named
+from urdfkin.report.listing import NOISE, make_table, print_named
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -171,6 +171,8 @@ def _as_json(
         "coordinates": list(inputs.robot.coordinate_names),
         "rates": list(inputs.robot.rate_names),
     }
+    if inputs.t is not None:
+        document["t"] = inputs.t.tolist()
     document |= {letter: getattr(inputs, letter).tolist() for letter in quantity.inputs}
     document["result"] = result.tolist()
     document["verified"] = certificate.verified
@@ -194,10 +196,10 @@ def _as_csv(
             writer.writerows([k, *key, *map(repr, row)] for key, row in zip(keys, J, strict=True))
     else:
         names = quantity.labels or [f"T{i}{j}" for i in range(4) for j in range(4)]
-        writer.writerow(["sample", *names])
-        writer.writerows(
-            [k, *map(repr, row)] for k, row in enumerate(result.reshape(len(result), -1).tolist())
-        )
+        times = range(len(result)) if inputs.t is None else map(repr, inputs.t.tolist())
+        writer.writerow(["sample" if inputs.t is None else "t", *names])
+        rows = zip(times, result.reshape(len(result), -1).tolist(), strict=True)
+        writer.writerows([t, *map(repr, row)] for t, row in rows)
     return stream.getvalue().encode()
 
 
@@ -222,7 +224,7 @@ def _print_table(
     out.print(f"{inputs.robot.name}: {quantity.name} of {inputs.frame}{where}", style="bold")
     for k, value in enumerate(result[:_SHOWN]):
         if len(result) > 1:
-            out.print(f"sample {k}")
+            out.print(f"sample {k}" if inputs.t is None else f"t = {inputs.t[k]:.6g} s")
         if quantity.columns:
             _print_columns(out, quantity, inputs.robot.rate_names, value)
         else:
@@ -239,9 +241,9 @@ def _print_columns(out: Console, quantity: Quantity, rates: Sequence[str], value
     if quantity.axes == len(("row", "rate")):
         print_named(out, ["joint", *quantity.labels], zip(rates, *value.tolist(), strict=True))
         return
-    numbers = [(rates[i], rates[j], *value[:, i, j].tolist()) for i, j in np.ndindex(*value.shape[1:])]
-    rows = [row for row in numbers if any(row[2:])]
-    print_named(out, ["column", "changed by", *quantity.labels], rows, left=2)
+    seen = np.abs(value).max(axis=0, initial=0.0) > NOISE * np.abs(value).max(initial=0.0)
+    rows = [(rates[i], rates[j], *value[:, i, j].tolist()) for i, j in zip(*np.nonzero(seen), strict=True)]
+    print_named(out, ["column", "changed by", *quantity.labels], rows, left=(0, 1))
 
 
 def _table(quantity: Quantity, value: FloatArray) -> Table:

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from urdfkin.cli.arguments import frame_option, load_robot, reference_option, robot_argument, seed_option
+from urdfkin.cli.arguments import (
+    TRAJECTORY_HELP,
+    frame_option,
+    load_robot,
+    reference_option,
+    robot_argument,
+    seed_option,
+)
 from urdfkin.cli.door import say
 from urdfkin.cli.numbers import Number, Whole
 from urdfkin.cli.output import compiling, write_file
@@ -31,7 +38,7 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
 @robot_argument
 @frame_option
 @reference_option
-@click.option("--trajectory", type=click.Path(path_type=Path), help="CSV: t, coordinates, v:NAME, a:NAME.")
+@click.option("--trajectory", type=click.Path(path_type=Path), help=TRAJECTORY_HELP)
 @click.option("--from", "start", default="neutral", show_default=True, help="Where a line begins, as --q.")
 @click.option("--to", "end", help="Where a line ends: numbers, 'neutral' or 'random'.")
 @click.option("--duration", type=Number(), default=1.0, show_default=True, help="Of a line, seconds.")
@@ -70,8 +77,8 @@ def command(
 ) -> None:
     """Draw a frame's position, velocity, acceleration and its parts, singular values and the check over time.
 
-    Along a CSV file, or along a line in joint space from rest to rest. Exit 0: verified. 1: a disagreement.
-    3: Pinocchio could not check it.
+    Along a CSV or .npz file, or along a line in joint space from rest to rest. Exit 0: verified. 1: a
+    disagreement. 3: Pinocchio could not check it.
     """
     if (trajectory is None) == (end is None):
         raise click.UsageError("say --trajectory FILE.csv, or --to VALUES for a line")

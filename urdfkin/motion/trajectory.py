@@ -17,8 +17,10 @@ from urdfkin.errors import InputError
 from urdfkin.errors.demands import real_number, whole_number
 from urdfkin.kinematics.rotation.quaternion import rotation_of
 from urdfkin.kinematics.rotation.quaternion_rates import angular_velocity_from_quaternion_rates
+from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import checked
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
+from urdfkin.motion.archive import read_arrays
 from urdfkin.motion.columns import read_columns
 from urdfkin.motion.unwrapping import unwrapped
 from urdfkin.system.files import read_text
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
 
 #: Fewer samples than this have no second difference.
 _FEWEST = 3
+#: Of an .npz file: the fields of `BaseMotion`.
+_BASE = "base_placement", "base_velocity", "base_acceleration"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +48,7 @@ class Trajectory:
         rates: Where v and a come from, in words.
         exact: Whether v and a are the derivatives of q to rounding; else nobody knows how close they are.
         notes: What a person must know about how the samples were read, a line each.
+        base: How the root link moves, a batch of n; None if it stands still at the world's origin.
     """
 
     t: FloatArray
@@ -53,6 +58,7 @@ class Trajectory:
     rates: str
     exact: bool = False
     notes: tuple[str, ...] = ()
+    base: BaseMotion | None = None
 
 
 def line(robot: Robot, start: FloatArray, end: FloatArray, duration: float, samples: int) -> Trajectory:
@@ -93,44 +99,77 @@ def line(robot: Robot, start: FloatArray, end: FloatArray, duration: float, samp
     )
 
 
-def read_trajectory(robot: Robot, path: Path) -> Trajectory:
-    """Samples from a CSV file whose first line names the columns.
+def read_trajectory(robot: Robot, path: Path, *, with_base: bool = False) -> Trajectory:
+    """Samples from a CSV file whose first line names the columns, or from the arrays of an .npz file.
 
-    `t` holds seconds (without it, samples are a second apart); a coordinate's name holds q; `v:NAME` and
-    `a:NAME` hold rates and their rates, all of them or none. Where there are none, the wraps are taken out
-    of the angles of continuous, planar and floating joints, and the rates are central differences.
+    In a CSV file `t` holds seconds, a coordinate's name holds q, `v:NAME` and `a:NAME` hold rates and their
+    rates. In an .npz file these are t (n,), q (n, nq), v and a (n, nv). Without t, samples are a second
+    apart. v and a are there both or neither: where there are none, the wraps are taken out of the angles of
+    continuous, planar and floating joints, and the rates are central differences.
+
+    Args:
+        robot: The robot.
+        path: The file; its ending says which of the two.
+        with_base: Whether an .npz file may also say how the root link moves, by base_placement (n, 4, 4),
+            base_velocity and base_acceleration (n, 6), all three of them (`BaseMotion`).
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: a column that is unknown, missing or twice there, a number that is none, time that does
-            not increase, or too few samples.
+        InputError: a column or array that is unknown, missing or twice there, a number that is none, time
+            that does not increase, or too few samples.
     """
-    rates = [f"{letter}:{name}" for letter in "va" for name in robot.rate_names]
-    data = read_columns(
-        read_text(path), str(path), "a trajectory", robot.coordinate_names, ["t", *rates], named=True
-    )
-    q = _columns(path, data, robot.coordinate_names)
+    archive = path.suffix.lower() == ".npz"
+    data = _arrays(robot, path, with_base=with_base) if archive else _table(robot, path)
+    q = data["q"]
     if len(q) < _FEWEST:
-        raise InputError(
-            f"{_FEWEST} samples are the least, below a line of names", where=str(path), found=str(len(q))
-        )
+        raise InputError(f"{_FEWEST} samples are the least", where=str(path), found=str(len(q)))
     t = data.get("t", np.arange(len(q), dtype=np.float64))
     if (np.diff(t) <= 0.0).any():
         raise InputError(
             "time must increase", where=str(path), found=f"sample {int(np.argmax(np.diff(t) <= 0.0)) + 1}"
         )
     q = checked(robot.tree, q, "q")
-    if any(name in data for name in rates):
-        v, a = (_columns(path, data, [f"{x}:{name}" for name in robot.rate_names]) for x in "va")
-        return Trajectory(frozen(t), frozen(q), frozen(v), frozen(a), "as given")
+    base = BaseMotion(*(data[name] for name in _BASE)) if _BASE[0] in data else None
+    if "v" in data:
+        v, a = data["v"], data["a"]
+        return Trajectory(frozen(t), frozen(q), frozen(v), frozen(a), "as given", base=base)
     found = unwrapped(robot.tree, q)
     v = _rates(robot.tree, found.q, t)
     words = "by central differences"
     if found.joints:
         words += f", after wraps were taken out of {', '.join(found.joints)}"
-    return Trajectory(
-        frozen(t), frozen(found.q), frozen(v), frozen(_gradient(v, t)), words, notes=found.notes
-    )
+    rows = frozen(t), frozen(found.q), frozen(v), frozen(_gradient(v, t))
+    return Trajectory(*rows, words, notes=found.notes, base=base)
+
+
+def _table(robot: Robot, path: Path) -> dict[str, FloatArray]:
+    """What a CSV file has of t, q, v and a."""
+    columns = {x: [f"{x}:{name}" for name in robot.rate_names] for x in "va"}
+    optional = ["t", *columns["v"], *columns["a"]]
+    text = read_text(path)
+    data = read_columns(text, str(path), "a trajectory", robot.coordinate_names, optional, named=True)
+    found = {"q": _columns(path, data, robot.coordinate_names)}
+    if "t" in data:
+        found["t"] = data["t"]
+    if any(name in data for name in optional[1:]):
+        found |= {x: _columns(path, data, names) for x, names in columns.items()}
+    return found
+
+
+def _arrays(robot: Robot, path: Path, *, with_base: bool) -> dict[str, FloatArray]:
+    """What an .npz file has of them, and of the base."""
+    shapes = {"t": (), "q": (robot.nq,), "v": (robot.nv,), "a": (robot.nv,)}
+    base = dict(zip(_BASE, ((4, 4), (6,), (6,)), strict=True)) if with_base else {}
+    data = read_arrays(path, shapes | base, ["q"])
+    for together in (("v", "a"), tuple(base)):
+        missing = [name for name in together if name not in data]
+        if 0 < len(missing) < len(together):
+            raise InputError(
+                f"{', '.join(together)} are there together or not at all",
+                where=str(path),
+                found=f"no {', '.join(missing)}",
+            )
+    return data
 
 
 def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:

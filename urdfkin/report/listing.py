@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+#: What is less than this share of a table's largest number is rounding, and shown as 0.
+NOISE = 1e-15
+
 
 def make_table(
     columns: Sequence[str], rows: Iterable[Sequence[str | float]], *, left: Collection[int] = (0,)
@@ -86,7 +89,7 @@ def _texts(rows: Iterable[Sequence[str | float]]) -> list[list[str]]:
     cells = [list(row) for row in rows]
     largest = max((abs(cell) for row in cells for cell in row if not isinstance(cell, str)), default=0.0)
     return [
-        [printable(cell) if isinstance(cell, str) else _number(cell, 1e-15 * largest) for cell in row]
+        [printable(cell) if isinstance(cell, str) else _number(cell, NOISE * largest) for cell in row]
         for row in cells
     ]
 

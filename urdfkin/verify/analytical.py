@@ -34,7 +34,8 @@ def held_against(
     J_v = oracle.jacobians(q, frames, aligned, base)
     size = by.size(magnitudes(x.plan, x.q, None, None, x.state))
     bound = bound_of(x.plan, size, aligned)
-    if x.representation == "quaternion":
+    representation = str(x.options["representation"])
+    if representation == "quaternion":
         quat = oracle.quaternions(q, frames, base)
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs, hidden = quaternion_jacobian(quat, J_v), bounds.hidden_scalar(bound, quat.shape[:-1])
@@ -44,5 +45,5 @@ def held_against(
         theirs[..., 3:, :] *= np.where(turned, -1.0, 1.0)[..., np.newaxis, np.newaxis]
         return theirs, bound
     R = oracle.placements(q, frames, base)[..., :3, :3]
-    theirs, apart = euler_jacobian(x.representation, R, J_v)
+    theirs, apart = euler_jacobian(representation, R, J_v)
     return theirs, bounds.euler_jacobian_bound(bound, size, apart)

@@ -29,7 +29,7 @@ import numpy as np
 
 from urdfkin.compiled.plan import Column, Plan
 from urdfkin.kinematics.lengths import chapter as eq
-from urdfkin.kinematics.lengths import product
+from urdfkin.kinematics.lengths import norm, product
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, MUJOCO, ROUNDINGS, of_joints
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -124,6 +124,12 @@ def acceleration_scale(plan: Plan, size: Magnitudes, reference: Reference) -> Fl
     if reference is Reference.WORLD:
         linear = eq.point_acceleration(linear + shared, size.alpha, size.w, size.p)
     return _six(linear, size.alpha)
+
+
+@_BEYOND
+def imu_scale(size: Magnitudes, gravity: FloatArray) -> FloatArray:
+    """For (n, frames, 6): gravity (3,) is one term more, which may cancel the others."""
+    return _six(size.acc + eq.tangential(size.w, size.vel) + norm(gravity), size.w)
 
 
 def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:

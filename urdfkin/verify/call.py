@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -31,7 +32,7 @@ class Part(NamedTuple):
         rates: (n, nv) v, and a, as far as the call was given them.
         state: (n or 1, 24) how the base moves.
         asked: The same configurations in the user's own numbers and names.
-        representation: Of an analytical Jacobian's orientation.
+        options: What else the call was given, by the method's names for it.
     """
 
     plan: Plan
@@ -40,7 +41,7 @@ class Part(NamedTuple):
     rates: tuple[FloatArray, ...]
     state: FloatArray
     asked: Rows
-    representation: str = ""
+    options: Mapping[str, object] = MappingProxyType({})
 
 
 class Call:
@@ -143,9 +144,8 @@ class Call:
         """Some of its configurations, for the check."""
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
-        representation = str(self.options.get("representation", ""))
         asked = self.question.rows(part)
-        return Part(self.plan, self.reference, self.q[part], rates, state, asked, representation)
+        return Part(self.plan, self.reference, self.q[part], rates, state, asked, self.options)
 
     def index(self, k: int) -> tuple[int, ...]:
         """Flat sample `k` as an index into the caller's batch."""

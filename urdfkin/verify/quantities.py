@@ -305,6 +305,19 @@ ACCELERATION_BREAKDOWN = replace(
     walked=False,
     command="acceleration --explain",
 )
+IMU = replace(
+    ACCELERATION,
+    name="imu",
+    title="IMU reading",
+    equations=("7.127", "7.129", "7.130"),
+    compute=later("urdfkin.compiled.evaluate:imus"),
+    against=later("urdfkin.verify.imu:held_against"),
+    walked=False,
+    referred=False,
+    labels=("ax", "ay", "az", "wx", "wy", "wz"),
+    units={"proper acceleration": "m/s^2", "angular velocity": "rad/s"},
+    command="",
+)
 JOINT_JACOBIAN = replace(
     JACOBIAN,
     name="joint jacobian",
@@ -341,6 +354,7 @@ QUANTITIES = {
         ACCELERATION,
         ANALYTICAL_JACOBIAN,
         ACCELERATION_BREAKDOWN,
+        IMU,
         JOINT_JACOBIAN,
         JOINT_JACOBIAN_RATE,
         SCREWS,

@@ -179,7 +179,7 @@ class Verifier:
         return comparison, VerificationError(
             quantity.name,
             call.frames[f],
-            x.representation or call.reference.name,
+            str(call.options.get("representation", call.reference.name)),
             index=call.index(k),
             ours=ours[i, f],
             theirs=theirs[i, f],

@@ -1,0 +1,155 @@
+"""`urdfkin imu` and `urdfkin manipulability`: the library's numbers, along trajectories and in every form."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin as library
+from tests.cli.running import urdfkin
+from tests.laws.test_imu import moving_base
+from urdfkin.model.tree import FloatArray
+
+
+def save(path: Path, **arrays: Any) -> None:
+    np.savez(path, **arrays)
+
+
+@pytest.fixture
+def motion() -> dict[str, FloatArray]:
+    robot = library.load("ur5")
+    v, a = np.random.default_rng(4).standard_normal((2, 4, 6))
+    return {"t": np.array([0.0, 0.1, 0.25, 0.5]), "q": robot.sample(4, 2), "v": v, "a": a}
+
+
+def test_a_csv_file_and_an_archive_of_the_same_motion_give_the_librarys_numbers(
+    motion: dict[str, FloatArray], tmp_path: Path
+) -> None:
+    robot = library.load("ur5")
+    q, v, a = (motion[x] for x in "qva")
+    expected = robot.imu(q, v, a, "tool0", gravity=[0.0, 1.0, -9.8])
+    save(tmp_path / "log.npz", **motion)
+    names = ["t", *robot.coordinate_names, *(f"{x}:{name}" for x in "va" for name in robot.rate_names)]
+    table = np.column_stack([motion[x] for x in "tqva"])
+    lines = [",".join(names), *(",".join(map(repr, row)) for row in table.tolist())]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    for log in ("log.csv", "log.npz"):
+        words = [
+            "imu",
+            "ur5",
+            "--frame",
+            "tool0",
+            "--gravity",
+            "0,1,-9.8",
+            "--trajectory",
+            str(tmp_path / log),
+        ]
+        document = json.loads(urdfkin(*words, "--format", "json").out)
+        assert (document["result"], document["t"]) == (expected.tolist(), motion["t"].tolist())
+        assert (document["quantity"], document["verified"]) == ("imu", True)
+        rows = list(csv.reader(io.StringIO(urdfkin(*words, "--format", "csv").text)))
+        assert rows[0] == ["t", "ax", "ay", "az", "wx", "wy", "wz"]
+        np.testing.assert_array_equal(np.array(rows[1:], dtype=float)[:, 1:], expected)
+        text = urdfkin(*words).text
+        assert "t = 0.25 s" in text
+        assert "proper acceleration [m/s^2]" in text
+
+
+def test_a_base_in_the_archive_moves_the_robot_and_rates_are_made_where_there_are_none(
+    motion: dict[str, FloatArray], tmp_path: Path
+) -> None:
+    base = moving_base(4, 3)
+    fields = {f"base_{name}": getattr(base, name) for name in ("placement", "velocity", "acceleration")}
+    path = tmp_path / "log.npz"
+    save(path, **motion, **fields)
+    words = ["imu", "ur5", "--frame", "tool0", "--trajectory", str(path), "--format", "json"]
+    q, v, a = (motion[x] for x in "qva")
+    expected = library.load("ur5").imu(q, v, a, "tool0", base=base)
+    assert json.loads(urdfkin(*words).out)["result"] == expected.tolist()
+    save(path, q=motion["q"])
+    done = urdfkin(*words)
+    assert done.code == 0
+    assert "rates by central differences" in done.err
+
+
+@pytest.mark.parametrize(
+    ("arrays", "words"),
+    [
+        ({"q": np.zeros((4, 5))}, "q has the shape (n, 6)"),
+        ({"q": np.zeros((4, 6)), "v": np.zeros((4, 6))}, "v, a are there together or not at all"),
+        ({"q": np.zeros((4, 6)), "t": np.zeros(3)}, "t has the shape (n)"),
+        ({"q": np.zeros((4, 6)), "t": np.zeros(4)}, "time must increase"),
+        ({"q": np.zeros((2, 6))}, "3 samples are the least"),
+        ({"q": np.full((4, 6), np.nan)}, "q must be finite"),
+        ({"q": np.array([["x"] * 6] * 4)}, "q must be real numbers"),
+        ({"q": np.array(0.0)}, "q has the shape (n, 6)"),
+        ({"Q": np.zeros((4, 6))}, "unknown: Q; missing: q"),
+        ({"q": np.zeros((4, 6)), "base_velocity": np.zeros((4, 6))}, "are there together or not at all"),
+        ({"q": np.array([print], dtype=object)}, "no .npz file of numbers"),
+    ],
+)
+def test_an_archive_of_anything_else_is_refused_in_one_line(
+    arrays: dict[str, FloatArray], words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.npz"
+    save(path, **arrays)
+    done = urdfkin("imu", "ur5", "--trajectory", str(path))
+    assert done.code == 2
+    assert words in done.err
+    assert str(path) in done.err
+    assert len(done.err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("data", [b"", b"PK\x03\x04 broken", b"t,q\n1,2\n"])
+def test_what_is_no_archive_is_refused_too(data: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "log.npz"
+    path.write_bytes(data)
+    done = urdfkin("imu", "ur5", "--trajectory", str(path))
+    assert done.code == 2
+    assert "no .npz file of numbers" in done.err
+
+
+def test_options_without_effect_and_half_a_vector_are_refused(
+    motion: dict[str, FloatArray], tmp_path: Path
+) -> None:
+    save(tmp_path / "log.npz", **motion)
+    done = urdfkin("imu", "ur5", "--trajectory", str(tmp_path / "log.npz"), "--v", "random")
+    assert (done.code, "--v does nothing along a --trajectory" in done.err) == (2, True)
+    assert "none for z" in urdfkin("imu", "ur5", "--gravity", "0,9.81").err
+    assert urdfkin("imu", "ur5", "--no-verify").code == 3
+
+
+def test_manipulability_has_the_librarys_numbers_in_every_form(tmp_path: Path) -> None:
+    robot = library.load("panda")
+    words = ["manipulability", "panda", "--frame", "panda_hand", "--rows", "linear", "--q", "random:3"]
+    q = robot.sample(3, 0)
+    found = robot.singular_values(q, "panda_hand", "linear")
+    gradient = found.manipulability_gradient(robot.hessian(q, "panda_hand"))
+    document = json.loads(urdfkin(*words, "--format", "json").out)
+    assert document["q"] == q.tolist()
+    assert document["singular_values"]["lower"] == found.values.lower.tolist()
+    assert document["condition"]["upper"] == found.condition.upper.tolist()
+    assert document["manipulability"]["value"] == found.manipulability.value.tolist()
+    assert document["manipulability_gradient"] == gradient.tolist()
+    target = tmp_path / "w.csv"
+    done = urdfkin(*words, "--format", "csv", "--output", str(target))
+    assert (done.code, "verified by" in done.err) == (0, True)
+    rows = list(csv.DictReader(io.StringIO(target.read_text(encoding="utf-8"))))
+    assert [float(row["manipulability lower"]) for row in rows] == found.manipulability.lower.tolist()
+    assert [float(row["by panda_joint4"]) for row in rows] == gradient[:, 3].tolist()
+    text = urdfkin(*words).text
+    assert "no less than" in text
+    assert "sample 2" in text
+
+
+def test_what_is_no_number_is_null_in_json() -> None:
+    words = ["manipulability", "planar_two_link", "--rows", "linear", "--q", "0.3,0", "--format", "json"]
+    document = json.loads(urdfkin(*words).out)
+    assert document["condition"]["upper"] == [None]
+    assert document["manipulability_gradient"] == [[None, None]]

@@ -1,0 +1,157 @@
+"""An accelerometer feels all but gravity, a gyroscope turns with what it sits on: by laws, and by MuJoCo."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.laws.subjects import EPS, NAMES, moved, robot_of, rotation_vector, state
+from urdfkin.compiled import evaluate
+from urdfkin.errors import InputError
+from urdfkin.kinematics.rotation.quaternion import rotation_of
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.tree import FloatArray
+from urdfkin.verify.pinocchio_base import free_flyer, free_flyer_rates, free_flyer_second_rates
+
+G = np.array([0.3, -0.2, -9.81])
+_INERTIA = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+#: Axes askew, a slide between turns; MuJoCo wants masses.
+SHAKEN = f"""<robot name="shaken">
+<link name="base">{_INERTIA}</link><link name="arm">{_INERTIA}</link>
+<link name="slide">{_INERTIA}</link><link name="head">{_INERTIA}</link>
+<joint name="a" type="continuous"><parent link="base"/><child link="arm"/>
+<origin xyz="0.1 0.2 0.3" rpy="0.3 -0.4 0.5"/><axis xyz="0.6 0 0.8"/></joint>
+<joint name="b" type="prismatic"><parent link="arm"/><child link="slide"/>
+<origin xyz="0.3 0 -0.1" rpy="1 0.2 0"/><axis xyz="0 1 0"/>
+<limit lower="-9" upper="9" effort="1" velocity="1"/></joint>
+<joint name="c" type="continuous"><parent link="slide"/><child link="head"/>
+<origin xyz="0 0.2 0.1" rpy="0 0.7 0.1"/><axis xyz="0 0.28 0.96"/></joint></robot>"""
+
+
+def moving_base(n: int, seed: int) -> BaseMotion:
+    generator = np.random.default_rng(seed)
+    quaternion = generator.standard_normal((n, 4))
+    T = np.tile(np.eye(4), (n, 1, 1))
+    T[:, :3, :3] = rotation_of(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True))
+    T[:, :3, 3] = generator.standard_normal((n, 3))
+    return BaseMotion(T, *generator.standard_normal((2, n, 6)))
+
+
+@pytest.mark.parametrize("base", [None, moving_base(7, 1)])
+@pytest.mark.parametrize("name", NAMES)
+def test_it_reads_acceleration_less_gravity_and_angular_velocity_in_its_own_axes(
+    name: str, base: BaseMotion | None
+) -> None:
+    robot = robot_of(name)
+    q, v, a = state(robot, 7, 2)
+    frames = robot.link_frames[-2:]
+    found = robot.imu(q, v, a, frames, gravity=G, base=base)
+    R = robot.placement(q, frames, base=base)[..., :3, :3]
+    acc = robot.acceleration(q, v, a, frames, base=base)[..., :3]
+    w = robot.velocity(q, v, frames, base=base)[..., 3:]
+    in_world = np.concatenate([(R @ x[..., None])[..., 0] for x in (found[..., :3], found[..., 3:])], axis=-1)
+    expected = np.concatenate((acc - G, w), axis=-1)
+    assert np.abs(in_world - expected).max() < 2000.0 * EPS * max(1.0, np.abs(expected).max())
+
+
+def test_at_rest_it_reads_gravity_upwards_and_in_free_fall_nothing() -> None:
+    robot = urdfkin.load("panda")
+    q, still = robot.sample(5), np.zeros(robot.nv)
+    at_rest = robot.imu(q, still, still, "panda_hand")
+    up = robot.placement(q, "panda_hand")[:, 2, :3]
+    np.testing.assert_allclose(at_rest, np.concatenate((9.81 * up, np.zeros((5, 3))), axis=1), atol=1e-14)
+    falling = BaseMotion(acceleration=np.array([0.0, 0.0, -9.81, 0.0, 0.0, 0.0]))
+    assert np.abs(robot.imu(q, still, still, "panda_hand", base=falling)).max() < 1e-14
+    assert np.abs(robot.imu(q, still, still, "panda_hand", gravity=[0, 0, 0])).max() == 0.0
+
+
+@pytest.mark.parametrize("name", ["panda", "floating_root", "tree_3"])
+def test_the_gyroscope_reads_the_difference_quotient_of_the_orientation(name: str) -> None:
+    robot = robot_of(name)
+    q, v, a = (x[0] for x in state(robot, 1, 3))
+    h = 2.0**-14
+    Rs = robot.placement(moved(robot, q, v, np.array([-h, h])), robot.tip_frame)[:, :3, :3]
+    turned = rotation_vector((Rs[0].T @ Rs[1])[None])[0] / (2.0 * h)
+    size = max(1.0, np.abs(turned).max())
+    assert np.abs(turned - robot.imu(q, v, a, robot.tip_frame)[3:]).max() < 1e-5 * size**3
+
+
+@pytest.mark.parametrize("name", ["panda", "a1"])
+def test_a_moving_base_is_a_floating_joint(name: str) -> None:
+    base = moving_base(4, 5)
+    robot, free = urdfkin.load(name), urdfkin.load(name, root_joint="floating")
+    q, v, a = state(robot, 4, 6)
+    on_base = robot.imu(q, v, a, robot.tip_frame, base=base)
+    floating = (free_flyer(base), free_flyer_rates(base), free_flyer_second_rates(base))
+    wide = [np.concatenate(pair, axis=-1) for pair in zip(floating, (q, v, a), strict=True)]
+    afloat = free.imu(wide[0], wide[1], wide[2], robot.tip_frame)
+    np.testing.assert_allclose(afloat, on_base, atol=1e-13)
+
+
+@pytest.mark.parametrize("slip", ["sign", "spatial", "none"])
+def test_gravity_the_wrong_way_or_the_spatial_acceleration_is_found(
+    slip: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, original = urdfkin.load("ur5"), evaluate.imus
+    x = robot.sample(3)
+
+    def wrong(plan: Any, q: FloatArray, v: FloatArray, a: FloatArray, **how: Any) -> FloatArray:
+        if slip == "sign":
+            how["gravity"] = -np.asarray(how["gravity"])
+        found = original(plan, q, v, a, **how)
+        if slip == "spatial":
+            local = robot.velocity(q, v, "tool0", "local", verify=False)
+            found[:, 0, :3] -= np.cross(local[:, 3:], local[:, :3])
+        return found
+
+    monkeypatch.setattr(evaluate, "imus", wrong)
+    if slip == "none":
+        robot.imu(x, x, x, "tool0")
+        return
+    with pytest.raises(urdfkin.VerificationError, match="the imu of tool0") as caught:
+        robot.imu(x, x, x, "tool0")
+    assert "gravity=[0.0, 0.0, -9.81]" in caught.value.reproduce
+    monkeypatch.undo()
+    line = caught.value.reproduce.splitlines()[-1]
+    scope = {"urdfkin": urdfkin}
+    assert np.abs(eval(line[line.index("urdfkin.load") :], scope)).max() > 0.0
+
+
+def test_gravity_is_one_vector_of_finite_numbers() -> None:
+    robot = urdfkin.load("ur5")
+    x = robot.sample(2)
+    for gravity in (9.81, [0, 0], np.zeros((2, 3)), [0, 0, np.nan], "down"):
+        with pytest.raises(InputError, match="gravity"):
+            robot.imu(x, x, x, "tool0", gravity=gravity)
+    out = np.empty((2, 6))
+    assert robot.imu(x, x, x, "tool0", out=out, threads=2) is out
+
+
+@pytest.mark.parametrize("afloat", [False, True])
+def test_mujocos_sensors_read_the_same(afloat: bool) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    spec = mujoco.MjSpec.from_string(SHAKEN)
+    spec.option.gravity = G
+    if afloat:
+        spec.body("base").add_freejoint()
+    spec.body("head").add_site(name="imu")
+    for name, kind in (("accelerometer", "ACCELEROMETER"), ("gyroscope", "GYRO")):
+        sensor = getattr(mujoco.mjtSensor, f"mjSENS_{kind}")
+        spec.add_sensor(name=name, type=sensor, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="imu")
+    model = spec.compile()
+    data, base = mujoco.MjData(model), moving_base(20, 8)
+    q, v, a = np.random.default_rng(9).standard_normal((3, 20, 3))
+    ours = urdfkin.load(SHAKEN).imu(q, v, a, "head", gravity=G, base=base if afloat else None)
+    for k in range(20):
+        data.qpos[-3:], data.qvel[-3:], data.qacc[-3:] = q[k], v[k], a[k]
+        if afloat:  # linear in the world's axes, angular in the body's, the quaternion's scalar first
+            R = base.placement[k, :3, :3]
+            data.qpos[:3] = base.placement[k, :3, 3]
+            data.qpos[3:7] = np.roll(free_flyer(base)[k, 3:], 1)
+            for rates, six in ((data.qvel, base.velocity[k]), (data.qacc, base.acceleration[k])):
+                rates[:3], rates[3:6] = six[:3], R.T @ six[3:]
+        mujoco.mj_inverse(model, data)
+        np.testing.assert_allclose(ours[k], data.sensordata, rtol=0, atol=1e-12 * np.abs(ours[k]).max())

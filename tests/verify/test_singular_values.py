@@ -1,0 +1,159 @@
+"""Singular values at fifty digits lie between the doubles that are said to bound them."""
+
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import urdfkin
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+from urdfkin.verify.exact.decimals import read_exact
+from urdfkin.verify.exact.recursion import move
+from urdfkin.verify.exact.vectors import exact, mp
+from urdfkin.verify.quantities import JACOBIAN
+from urdfkin.verify.singular_values import Between, SingularValues, singular_values
+
+ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
+
+
+def true_values(A: np.ndarray) -> list[mpmath.mpf]:
+    """Largest first, of a matrix of numbers of fifty digits."""
+    return sorted(mp.svd_r(mp.matrix(A.tolist()), compute_uv=False), reverse=True)
+
+
+def true_jacobian(robot: Robot, q: FloatArray, frame: str) -> np.ndarray:
+    link, still = robot.tree.frame_link(frame), [mp.mpf(0)] * robot.nv
+    joints = read_exact(robot.urdf, robot.tree, mp, robot.tree.path(link))
+    motion = move(robot.tree, joints, [exact(x) for x in q], still, still)
+    return JACOBIAN.truth(motion, link, Reference.LOCAL_WORLD_ALIGNED)
+
+
+def holds(found: Between, true: list[mpmath.mpf]) -> bool:
+    ends = zip(found.lower.tolist(), true, found.upper.tolist(), strict=True)
+    return all(mp.mpf(low) <= x <= mp.mpf(high) for low, x, high in ends)
+
+
+@pytest.mark.parametrize("rows", ROWS)
+@pytest.mark.parametrize(("name", "frame"), [("ur5", "tool0"), ("panda", "panda_hand"), ("polar", "slider")])
+def test_what_the_equations_have_at_fifty_digits_lies_between(name: str, frame: str, rows: str) -> None:
+    robot = urdfkin.load(name)
+    for q in (*robot.sample(2, 3), robot.neutral()):
+        found = robot.singular_values(q, frame, rows)
+        J = true_jacobian(robot, q, frame)[ROWS[rows]]
+        moving = [i for i in range(robot.nv) if found.V[i].any() or any(J[:, i])]
+        true = true_values(J[:, moving])
+        assert holds(found.values, true)
+        count = found.values.value.size
+        assert (found.values.upper - found.values.lower).max() < 1e-11 * found.values.value.max()
+        product, ratio = mp.fprod(true), true[0] / true[-1] if true[-1] else mp.inf
+        assert holds(Between(*(np.array([x]) for x in found.manipulability)), [product])
+        assert holds(Between(*(np.array([x]) for x in found.condition)), [ratio])
+        assert count == min(len(J), len(moving))
+
+
+def test_a_jacobian_that_is_wrong_by_a_billionth_is_not_excused() -> None:
+    robot, q = urdfkin.load("ur5"), np.linspace(0.2, 1.7, 6)
+    J, still = robot.jacobian(q, "tool0"), np.zeros((6, 6))
+    right = true_values(true_jacobian(robot, q, "tool0"))
+    moving = np.ones(6, dtype=bool)
+    assert holds(singular_values(J, still + 1e-14, moving).values, right)
+    assert not holds(singular_values(J * (1.0 + 1e-9), still + 1e-14, moving).values, right)
+
+
+@settings(max_examples=12)
+@given(
+    st.tuples(st.integers(1, 6), st.integers(1, 8)),
+    st.integers(-12, 12),
+    st.booleans(),
+    st.integers(0, 2**32 - 1),
+)
+def test_any_matrixs_lie_between_whatever_their_size_and_rank(
+    shape: tuple[int, int], exponent: int, deficient: bool, seed: int
+) -> None:
+    generator = np.random.default_rng(seed)
+    A = generator.standard_normal(shape) * 10.0 ** generator.uniform(
+        min(0, exponent), max(0, exponent), shape
+    )
+    if deficient:
+        A[-1] = A[0]
+    found = singular_values(A, np.zeros(shape), np.ones(shape[1], dtype=bool))
+    true = true_values(np.vectorize(exact, otypes=[object])(A))
+    assert holds(found.values, true)
+    assert (found.values.upper - found.values.lower <= 1e-12 * found.values.value[0]).all()
+
+
+def test_what_is_beyond_all_numbers_bounds_nothing() -> None:
+    huge = singular_values(np.full((2, 2), 1e200), np.full((2, 2), np.inf), np.ones(2, dtype=bool))
+    assert (huge.values.lower == 0.0).all()
+    assert np.isinf(huge.values.upper).all()
+    assert np.isinf(huge.condition.upper)
+
+
+def test_a_frame_that_no_rate_moves_has_none() -> None:
+    robot = urdfkin.load("panda")
+    found = robot.singular_values(robot.sample(3), "panda_link0")
+    assert found.values.value.shape == (3, 0)
+    assert found.manipulability.upper.tolist() == [0.0] * 3
+    assert np.isnan(found.condition.value).all()
+    assert not found.manipulability_gradient(robot.hessian(robot.sample(3), "panda_link0")).any()
+
+
+def product(found: SingularValues) -> FloatArray:
+    return found.manipulability.value
+
+
+@pytest.mark.parametrize("rows", ROWS)
+@pytest.mark.parametrize(
+    ("name", "frame"), [("panda", "panda_hand"), ("ur5", "forearm_link"), ("polar", "slider")]
+)
+def test_the_gradient_is_the_difference_quotient_of_the_product(name: str, frame: str, rows: str) -> None:
+    robot, h = urdfkin.load(name, verify=False), 1e-5
+    if (name, rows) == ("polar", "angular"):
+        return  # one column, of length 1: below
+    q = robot.sample(8, 5)
+    found = robot.singular_values(q, frame, rows)
+    gradient = found.manipulability_gradient(robot.hessian(q, frame))
+    sure = found.values.lower[:, -1] > 1e-3
+    for j, step in enumerate(h * np.eye(robot.nv)):
+        ahead, behind = (product(robot.singular_values(q + x, frame, rows)) for x in (step, -step))
+        slope = (ahead - behind) / (2.0 * h)
+        np.testing.assert_allclose(gradient[sure, j], slope[sure], rtol=0, atol=1e-7)
+
+
+def test_at_a_kink_there_is_no_gradient_and_beside_it_there_is() -> None:
+    arm = urdfkin.load("planar_two_link")
+    q = np.array([[0.3, 0.0], [0.3, 0.1]])
+    found = arm.singular_values(q, arm.tip_frame, "linear")
+    gradient = found.manipulability_gradient(arm.hessian(q, arm.tip_frame))
+    assert np.isnan(gradient[0]).all()
+    assert np.isfinite(gradient[1]).all()
+    assert np.isinf(found.condition.upper[0])
+    # |l1 l2 sin q2|, by hand
+    lengths = found.manipulability.value[1] / np.sin(0.1)
+    assert gradient[1, 1] == pytest.approx(lengths * np.cos(0.1), rel=1e-12)
+
+
+def test_a_base_and_a_batch_shape_are_taken_and_bad_words_refused() -> None:
+    robot = urdfkin.load("ur5")
+    q = robot.sample(6).reshape(2, 3, 6)
+    T = np.eye(4)
+    T[:3, 3] = 1.0, 2.0, 3.0
+    found = robot.singular_values(q, "tool0", base=BaseMotion(T))
+    assert found.values.lower.shape == (2, 3, 6)
+    assert found.condition.value.shape == (2, 3)
+    alone = robot.singular_values(q[1, 2], "tool0", base=BaseMotion(T))
+    np.testing.assert_allclose(found.values.value[1, 2], alone.values.value, rtol=1e-14)
+    assert {line.quantity for line in robot.certificate().lines} == {"jacobian"}
+    with pytest.raises(InputError, match="rows are all, linear or angular: found 'both'"):
+        robot.singular_values(q, "tool0", "both")
+    with pytest.raises(UnknownNameError, match="tool1"):
+        robot.singular_values(q, "tool1")
+    with pytest.raises(InputError, match="frame is a name"):
+        robot.singular_values(q, ["tool0"])  # type: ignore[arg-type]

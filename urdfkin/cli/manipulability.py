@@ -1,0 +1,161 @@
+"""`urdfkin manipulability`: singular values between guaranteed bounds, their condition and product."""
+
+from __future__ import annotations
+
+import csv
+import io
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from urdfkin.cli.arguments import (
+    Inputs,
+    frame_option,
+    load_robot,
+    q_option,
+    read_inputs,
+    robot_argument,
+    seed_option,
+    verify_option,
+)
+from urdfkin.cli.door import say
+from urdfkin.cli.output import check_line, compiling, console, exit_code, output_option, write_file
+from urdfkin.errors.printable import csv_cell, json_text
+from urdfkin.report.listing import print_named
+
+if TYPE_CHECKING:
+    from urdfkin.model.tree import FloatArray
+    from urdfkin.verify.singular_values import SingularValues
+
+#: How many samples of a batch a table shows.
+_SHOWN = 5
+
+
+@click.command(epilog="Example: urdfkin manipulability panda --q random --frame panda_hand --rows linear")
+@robot_argument
+@frame_option
+@click.option(
+    "--rows",
+    type=click.Choice(["all", "linear", "angular"]),
+    default="all",
+    show_default=True,
+    help="Of the Jacobian; all mix metres and radians.",
+)
+@q_option
+@seed_option
+@verify_option
+@click.option(
+    "--format", "format_", type=click.Choice(["table", "json", "csv"]), default="table", show_default=True
+)
+@output_option
+@click.pass_context
+def command(
+    context: click.Context,
+    robot: str,
+    mimic: bool | None,
+    root_joint: str | None,
+    frame: str | None,
+    rows: str,
+    q: str,
+    seed: int,
+    verify: bool,
+    format_: str,
+    output: Path | None,
+) -> None:
+    """Singular values of a frame's Jacobian, their condition and product, and the product's gradient.
+
+    Each value with two numbers that the true one is guaranteed to lie between: how far the Jacobian can be
+    off and what the decomposition rounds are in them. The product is Yoshikawa's manipulability
+    sqrt(det J J^T); its derivatives by the rates come from the Hessian, and are nan where the smallest
+    singular value cannot be told from 0.
+    """
+    loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    x = read_inputs(loaded, frame, seed, q)
+    with compiling():
+        found = loaded.singular_values(x.q, x.frame, rows)
+        gradient = found.manipulability_gradient(loaded.hessian(x.q, x.frame))
+    check = check_line(certificate := loaded.certificate())
+    if format_ == "table" and output in (None, Path("-")):
+        _print(x, rows, found, gradient)
+        console().print(check, style="green" if certificate.verified else "bold yellow")
+    else:
+        form = _as_json if format_ == "json" else _as_csv
+        _write(form(x, rows, found, gradient, check), output)
+        if format_ != "json":
+            say(check, err=True)
+    context.exit(exit_code(certificate))
+
+
+def _write(text: str, output: Path | None) -> None:
+    if output in (None, Path("-")):
+        sys.stdout.write(text)
+    else:
+        write_file(output, text.encode())
+
+
+def _names(found: SingularValues) -> list[str]:
+    return [f"sigma_{k + 1}" for k in range(found.values.value.shape[-1])]
+
+
+def _print(x: Inputs, rows: str, found: SingularValues, gradient: FloatArray) -> None:
+    out = console()
+    out.print(f"{x.robot.name}: singular values of {x.frame}, {rows} rows", style="bold")
+    for k in range(min(len(gradient), _SHOWN)):
+        if len(gradient) > 1:
+            out.print(f"sample {k}")
+        lines: list[Sequence[str]] = [
+            (name, *(f"{side[k, i]:.15g}" for side in found.values)) for i, name in enumerate(_names(found))
+        ]
+        for name, between in (("condition", found.condition), ("manipulability", found.manipulability)):
+            lines.append((name, *(f"{side[k]:.15g}" for side in between)))
+        print_named(out, ["", "value", "no less than", "no more than"], lines)
+        slopes = zip(x.robot.rate_names, gradient[k].tolist(), strict=True)
+        print_named(out, ["joint", "manipulability changes by"], slopes)
+    if len(gradient) > _SHOWN:
+        out.print(f"... and {len(gradient) - _SHOWN} more samples: --format csv or json has them all")
+
+
+def _as_json(x: Inputs, rows: str, found: SingularValues, gradient: FloatArray, check: str) -> str:
+    document = {
+        "robot": x.robot.name,
+        "source": x.robot.source,
+        "frame": x.frame,
+        "rows": rows,
+        "coordinates": list(x.robot.coordinate_names),
+        "rates": list(x.robot.rate_names),
+        "q": x.q.tolist(),
+    }
+    for name in ("values", "condition", "manipulability"):
+        sides = getattr(found, name)._asdict()
+        # JSON has no word for infinity or for what is no number.
+        document["singular_values" if name == "values" else name] = {
+            side: _finite(numbers.tolist()) for side, numbers in sides.items()
+        }
+    document["manipulability_gradient"] = _finite(gradient.tolist())
+    document["verified"] = x.robot.certificate().verified
+    document["check"] = check
+    return json_text(document) + "\n"
+
+
+def _finite(value: object) -> object:
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return value if isinstance(value, float) and abs(value) < float("inf") else None
+
+
+def _as_csv(x: Inputs, rows: str, found: SingularValues, gradient: FloatArray, check: str) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    sides = ("", " lower", " upper")
+    names = [name + side for name in (*_names(found), "condition", "manipulability") for side in sides]
+    writer.writerow(["sample", *names, *(csv_cell(f"by {rate}") for rate in x.robot.rate_names)])
+    for k, slopes in enumerate(gradient.tolist()):
+        between = [tuple(side[k].tolist() for side in found.values)]
+        numbers = [number for of_one in zip(*between[0], strict=True) for number in of_one]
+        for summary in (found.condition, found.manipulability):
+            numbers += [float(side[k]) for side in summary]
+        writer.writerow([k, *map(repr, numbers), *map(repr, slopes)])
+    return stream.getvalue()
