@@ -6,6 +6,7 @@ import os
 import warnings
 from collections.abc import Mapping
 
+from urdfkin.dh.doubts import doubts
 from urdfkin.dh.read import is_table_file, read_table
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.to_tree import to_urdf
@@ -100,6 +101,8 @@ def _load_table(
     else:
         path = at_home(source)
         table, name = read_table(path), as_word(path)
+    for doubt in doubts(table):
+        warnings.warn(f"{name}: {doubt}", UrdfWarning, stacklevel=3)
     text = Text(to_urdf(table).encode(), name, name)
     robot = _robot(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, made=True)
     if checked_choice(verify):

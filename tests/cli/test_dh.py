@@ -18,7 +18,12 @@ UR5 = ("ur5", "--base", "base", "--tip", "tool0")
 
 def run(*arguments: str) -> Result:
     """The command's result; urdfkin's own errors are raised, as `main` would print them."""
-    result = CliRunner().invoke(cli, ["dh", *arguments])
+    return run_any("dh", *arguments)
+
+
+def run_any(*arguments: str) -> Result:
+    """The same for any command."""
+    result = CliRunner().invoke(cli, list(arguments))
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result

@@ -13,7 +13,7 @@ import numpy as np
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.output import write_file
 from urdfkin.dh import DHTable, Units, export, units_of
-from urdfkin.dh.compare import CellDifference, Comparison, compare, comparison_text
+from urdfkin.dh.compare import CellDifference, Comparison, Slip, compare, comparison_text, diagnose
 from urdfkin.dh.digits import last_digits
 from urdfkin.dh.export.mapping import to_mapping
 from urdfkin.dh.export.tree import as_mapping, write_tree
@@ -193,26 +193,35 @@ def _tree(work: Work) -> int:
 
 
 def _compare(work: Work, name: str) -> int:
+    if work.format_ not in ("terminal", "json"):
+        raise InputError(f"--compare has no form {work.format_!r}", remedy="say terminal or json")
     path = reference_path(name)
     data = read_mapping(path)
-    reference = table_of(data, str(path))
-    robot = work.robot
-    known = robot.frame_names
-    base = work.base or (reference.base_frame if reference.base_frame in known else None)
-    tip = work.tip or (reference.tip_frame if reference.tip_frame in known else None)
-    chain = robot.chain(tip, base)
-    found = compare(chain, reference, work.tolerance / 1e3, fit=work.fit, digits=last_digits(data))
+    tip = work.tip or _known(work, data.get("tip_frame"))
+    base = work.base or _known(work, data.get("base_frame"))
+    chain, tolerance = work.robot.chain(tip, base), work.tolerance / 1e3
+    try:
+        reference = table_of(data, str(path))
+    except InputError as error:
+        if slip := diagnose(chain, data, tolerance):
+            error.remedy = f"{error.remedy}; {slip}" if error.remedy else str(slip)
+        raise
+    found = compare(chain, reference, tolerance, fit=work.fit, digits=last_digits(data))
+    slip = None if found.agrees else diagnose(chain, data, tolerance, found.metres)
     if work.format_ == "json":
-        text = json.dumps(_comparison(found), indent=2, allow_nan=False) + "\n"
-    elif work.format_ == "terminal":
-        text = comparison_text(found, work.units)
+        text = json.dumps(_comparison(found, slip), indent=2, allow_nan=False) + "\n"
     else:
-        raise InputError(f"--compare has no form {work.format_!r}", remedy="say terminal or json")
+        text = comparison_text(found, work.units) + (f"\nhint: {slip}\n" if slip else "")
     _put(work, text)
     return 0 if found.agrees else 1
 
 
-def _comparison(found: Comparison) -> dict[str, Any]:
+def _known(work: Work, name: object) -> str | None:
+    """What a table calls one of its ends, if the robot has such a frame."""
+    return name if isinstance(name, str) and name in work.robot.frame_names else None
+
+
+def _comparison(found: Comparison, slip: Slip | None) -> dict[str, Any]:
     return {
         "agrees": found.agrees,
         "exact": found.exact,
@@ -228,6 +237,7 @@ def _comparison(found: Comparison) -> dict[str, Any]:
         "offsets": list(found.offsets),
         "not_compared": [{"row": row + 1, "cell": cell} for row, cell in found.hidden],
         "differences": [_difference(one) for one in found.differences],
+        "would_fit_read_as": slip and slip.as_mapping(),
         "without_fitting": [_difference(one) for one in found.instead],
         "fitted": to_mapping(found.reference),
     }

@@ -2,6 +2,7 @@
 
 from urdfkin.dh.compare.agreement import TOLERANCE, compare
 from urdfkin.dh.compare.result import CellDifference, Comparison
+from urdfkin.dh.compare.slips import Slip, diagnose
 from urdfkin.dh.compare.text import comparison_text
 
-__all__ = ["TOLERANCE", "CellDifference", "Comparison", "compare", "comparison_text"]
+__all__ = ["TOLERANCE", "CellDifference", "Comparison", "Slip", "compare", "comparison_text", "diagnose"]

@@ -81,6 +81,24 @@ def compare(
     return found
 
 
+def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
+    """Metres and radians that a table's tip is off at most, with base, tool and offsets fitted.
+
+    Args:
+        chain: The path.
+        reference: The table.
+        enough: Metres; a fit that is better is not improved.
+
+    Raises:
+        InputError: the table has another number or other kinds of joints than the path.
+    """
+    _check_joints(chain, reference)
+    standard = to_standard(reference) if reference.convention is Convention.MODIFIED else reference
+    tried, wanted = _samples(chain, FIT_SAMPLES, 1)
+    model = _best_fit(chain, standard, _written(standard), tried, wanted, _reach(chain, wanted), enough)
+    return _apart(model, *_samples(chain, CHECK_SAMPLES, 2))
+
+
 def _off(fitted: Model, written: Model, values: FloatArray, there: FloatArray) -> dict[str, float]:
     """How far the tip is off, as fitted and as written."""
     names = ("metres", "radians", "written_metres", "written_radians")
@@ -129,6 +147,7 @@ def _best_fit(
     values: FloatArray,
     wanted: FloatArray,
     scale: float,
+    enough: float = 0.0,
 ) -> Model:
     """Of the table as written and the likely sign patterns, the one whose freedoms fit best.
 
@@ -148,7 +167,7 @@ def _best_fit(
         needed = 1.0 if start is written else 0.5
         if (its_size := size(model)) < needed * best_size:
             best, best_size = model, its_size
-        if best_size <= 1e-12 * scale:
+        if best_size <= max(enough, 1e-12 * scale):
             break
     return best
 

@@ -1,0 +1,132 @@
+"""A table that was misread is told how it would fit; one that is another robot's is not."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.test_dh import run
+from tests.dh.test_compare import elbow
+from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows
+from urdfkin.dh.compare import TOLERANCE, diagnose
+from urdfkin.dh.doubts import doubts
+from urdfkin.dh.reading import as_said, other_readings
+from urdfkin.dh.references import reference_path
+from urdfkin.dh.written_row import ORDER
+from urdfkin.errors import InputError
+from urdfkin.lint.finding import UrdfWarning
+from urdfkin.loading import load
+from urdfkin.model.chain import chain
+
+SWAPPED_A_D = ("d", "alpha", "a", "theta")
+SWAPPED_ANGLES = ("a", "theta", "d", "alpha")
+TOOLBOX = ("theta", "d", "a", "alpha")
+CRAIG = ("alpha", "a", "d", "theta")
+
+
+def written(
+    table: DHTable, convention: str, columns: tuple[str, ...] = ORDER, mm: bool = False, deg: bool = False
+) -> dict[str, Any]:
+    """The table's cells as somebody writes them who says nothing but a convention, perhaps the wrong one."""
+    rows = []
+    for row in table.rows:
+        cells: dict[str, Any] = {name: getattr(row, name) for name in ORDER}
+        if mm:
+            cells |= {name: cells[name] * 1e3 for name in ("a", "d")}
+        if deg:
+            cells |= {name: math.degrees(cells[name]) for name in ("alpha", "theta")}
+        rows.append([*(cells[name] for name in columns), "R" if row.kind.turns else "P"])
+    return {"convention": convention, "rows": rows}
+
+
+SLIPS: dict[str, tuple[dict[str, Any], str]] = {
+    "other convention": ({}, "{}"),
+    "millimetres": ({"mm": True}, "{}, millimetres"),
+    "degrees": ({"deg": True}, "{}, degrees"),
+    "both units": ({"mm": True, "deg": True}, "{}, millimetres, degrees"),
+    "a and d": ({"columns": SWAPPED_A_D}, "{}, its columns a, alpha, d, theta as d, alpha, a, theta"),
+    "alpha, theta": ({"columns": SWAPPED_ANGLES}, "{}, its columns a, alpha, d, theta as a, theta, d, alpha"),
+    "toolbox": ({"columns": TOOLBOX}, "{}, its columns a, alpha, d, theta as theta, d, a, alpha"),
+    "Craig": ({"columns": CRAIG, "mm": True}, "{}, millimetres, its columns a, alpha, d, theta as alpha"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slip", SLIPS)
+@pytest.mark.parametrize("name", ["kinova", "panda", "ur5"])
+def test_each_slip_is_named_beside_the_wrong_convention(name: str, slip: str) -> None:
+    reference = read_table(reference_path(name))
+    path = load(reference.robot).chain(reference.tip_frame, reference.base_frame)
+    options, words = SLIPS[slip]
+    wrong = "modified" if str(reference.convention) == "standard" else "standard"
+    found = diagnose(path, written(reference, wrong, **options), TOLERANCE)
+    assert found is not None
+    assert found.reading.words(found.said).startswith(words.format(reference.convention))
+    assert found.metres <= 5.01e-5
+    assert found.reading.slips(found.said) <= 4
+
+
+@pytest.mark.parametrize("kinds", ["RRPRRR", "PRRRRR"])
+def test_a_slip_is_named_where_a_joint_slides(kinds: str) -> None:
+    tree = elbow(kinds)
+    found = diagnose(chain(tree, "tip"), written(dh_table(tree, "tip"), "standard", mm=True), 1e-6)
+    assert found is not None
+    assert found.reading.words(found.said) == "millimetres"
+
+
+def test_another_robots_table_fits_in_no_reading() -> None:
+    reference = read_table(reference_path("ur3"))
+    path = load("ur5").chain("tool0", "base")
+    assert diagnose(path, written(reference, "standard"), TOLERANCE, 0.3) is None
+    assert diagnose(path, written(table_from_rows([[0.1, 0, 0, 0]], "standard"), "standard"), 1e-4) is None
+
+
+@pytest.mark.parametrize("rows", [None, 3, ["abc"], [3.0]])
+def test_what_is_no_table_has_no_reading(rows: Any) -> None:
+    assert list(other_readings({"convention": "standard", "rows": rows})) == []
+
+
+def test_the_fewest_slips_are_tried_first() -> None:
+    data = written(dh_table(elbow(), "tip"), "standard")
+    counts = [reading.slips(as_said(data)) for reading, _ in other_readings(data)]
+    assert counts == sorted(counts)
+    assert counts[0] == 1
+
+
+def test_the_command_says_what_would_fit_and_still_exits_1(tmp_path: Path) -> None:
+    file = tmp_path / "ur5.toml"
+    rows = [[0, 90, 89.159], [-425, 0, 0], [-392.25, 0, 0], [0, 90, 109.15], [0, -90, 94.65], [0, 0, 82.3]]
+    text = "rows = [" + ", ".join(f"{[*row, 0]}" for row in rows) + "]\n"
+    arguments = ("ur5", "--base", "base", "--tip", "tool0", "--compare", str(file))
+    file.write_text('convention = "modified"\nangles = "degrees"\n' + text)
+    result = run(*arguments)
+    assert result.exit_code == 1
+    assert "rad when read as standard, millimetres\n" in result.stdout
+    file.write_text('convention = "standard"\n' + text)
+    with pytest.raises(InputError, match=r"more than a turn.*this fits to .* read as millimetres, degrees"):
+        run(*arguments)
+
+
+def test_a_table_alone_is_doubted_only_where_it_cannot_be_meant() -> None:
+    deg = {"angles": "degrees"}
+    assert "look like radians" in doubts(table_from_rows([[0.4, 1.5708, 0, 0]], "standard", **deg))[0]
+    assert "look like metres" in doubts(table_from_rows([[0.4, 0, 0, 0]], "standard", lengths="mm"))[0]
+    exchanged = [{"a": 1.5708, "alpha": 0.4}, {"a": -1.5708, "alpha": 0.3}]
+    assert "a and alpha look exchanged" in doubts(table_from_rows(exchanged, "standard"))[0]
+    for name in ("kinova", "panda", "ur3", "ur5", "ur10", "xarm7_modified", "xarm7_standard"):
+        assert doubts(read_table(reference_path(name))) == []
+
+
+def test_load_warns_of_a_table_in_millimetres() -> None:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        load(table_from_rows([[425, 0, 0, 0], [392.25, 0, 0, 0]], "standard"), verify=False)
+    assert "lengths up to 425 m look like millimetres" in str(caught[0].message)
+    assert caught[0].category is UrdfWarning
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load(table_from_rows([[0.425, 0, 0, 0], [0.39225, 0, 0, 0]], "standard"), verify=False)

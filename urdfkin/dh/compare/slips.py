@@ -1,0 +1,127 @@
+"""What a table that does not fit would have to be read as to fit: the slip is named, not only its size.
+
+Of all readings (`urdfkin.dh.reading`) those are tried whose shape is the URDF's: how far consecutive axes
+are apart, at which angle, and the offsets between the feet of their common normals. These do not change with
+signs, zeros, base and tool, and cost nothing to compute; a few readings that come close are then fitted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from urdfkin.dh.compare.agreement import best_fit
+from urdfkin.dh.convert import to_standard
+from urdfkin.dh.derive import Choices, Last, derive
+from urdfkin.dh.reading import Reading, as_said, other_readings
+from urdfkin.dh.row import Convention
+from urdfkin.dh.table import DHTable
+from urdfkin.errors import InputError
+from urdfkin.model.chain import FrameChain
+from urdfkin.model.tree import FloatArray
+
+#: Readings that are fitted; radians of tilt below which axes are parallel; what one slip more must be worth.
+_TRIED, _PARALLEL, _WORTH = 3, 2e-2, 0.1
+#: A reading explains a table if it leaves no more than this of what the table is off as it is read.
+_EXPLAINS = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """A reading in which a table fits.
+
+    Attributes:
+        reading: How to read it.
+        said: How it says that it is to be read.
+        metres: How far the tip is then off at the worst of the samples, base, tool and offsets fitted.
+        radians: Likewise its orientation.
+    """
+
+    reading: Reading
+    said: Reading
+    metres: float
+    radians: float
+
+    def __str__(self) -> str:
+        return (
+            f"this fits to {self.metres * 1e3:.3g} mm and {self.radians:.3g} rad when read as"
+            f" {self.reading.words(self.said)}"
+        )
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "convention": str(self.reading.convention),
+            "lengths": str(self.reading.lengths),
+            "angles": str(self.reading.angles),
+            "columns": list(self.reading.columns),
+            "tip_off_at_most_m": self.metres,
+            "tip_turned_at_most_rad": self.radians,
+        }
+
+
+def diagnose(
+    chain: FrameChain, data: Mapping[str, Any], tolerance: float, off: float = math.inf
+) -> Slip | None:
+    """The slip that explains why a table does not fit, or None.
+
+    Args:
+        chain: The path of the URDF.
+        data: The table's plain data, as `urdfkin.dh.read.mapping_from_text` reads them.
+        tolerance: Metres at the tip up to which a table agrees.
+        off: Metres that the tip is off as the table is read; what leaves most of that explains nothing.
+    """
+    kinds = [joint.kind.turns for joint in chain.joints]
+    own = shape(derive(chain, Choices(last=Last.FLANGE)), chain.reach)
+    try:
+        said = as_said(data)
+    except (InputError, KeyError, ValueError):  # what it says is no convention or no unit: that is the slip
+        return None
+    close = list[tuple[float, int, Reading, DHTable]]()
+    for reading, table in other_readings(data):
+        if [row.kind.turns for row in table.rows] != kinds or not kinds:
+            return None
+        apart = float(np.abs(shape(table, chain.reach) - own).sum())
+        close.append((apart, reading.slips(said), reading, table))
+    if not close:
+        return None
+    worth = _WORTH * min(apart for apart, *_ in close) + tolerance
+    close.sort(key=lambda one: one[0] + worth * one[1])
+    found = list[tuple[float, Slip]]()
+    for _, slips, reading, table in close[:_TRIED]:
+        metres, radians = best_fit(chain, table, tolerance)
+        off_here = metres + radians * chain.reach
+        if off_here <= max(tolerance, min(_EXPLAINS * off, _EXPLAINS * chain.reach)):
+            found.append((off_here + tolerance * slips, Slip(reading, said, metres, radians)))
+            if off_here <= tolerance:
+                break
+    return min(found, key=lambda one: one[0])[1] if found else None
+
+
+def shape(table: DHTable, scale: float) -> FloatArray:
+    """What signs, zeros, base and tool leave of a table: metres, and radians times `scale`.
+
+    For each pair of axes their distance and the angle between their lines; for each joint between pairs that
+    are not parallel the offset along it, gathered along parallel axes. A sliding axis has no place: distances
+    from it and offsets beside it say nothing, nor do offsets along the first axis, which the base takes up.
+    """
+    rows = (to_standard(table) if table.convention is Convention.MODIFIED else table).rows
+    numbers, offset, known = list[float](), 0.0, False
+    for row, following in pairwise(rows):
+        placed = row.kind.turns and following.kind.turns
+        tilt = math.atan2(math.hypot(math.sin(row.alpha), math.sin(row.beta)), abs(math.cos(row.alpha)))
+        parallel = tilt < _PARALLEL
+        offset, known = offset + row.d, known and placed
+        numbers += [
+            abs(offset) if known and not parallel else 0.0,
+            abs(row.a) if placed else 0.0,
+            scale * tilt,
+        ]
+        offset = math.copysign(1.0, math.cos(row.alpha)) * offset if parallel else 0.0
+        known = placed if not parallel else known
+    return np.array(numbers)
