@@ -35,13 +35,14 @@ def test_every_example_prints_what_the_page_shows(tmp_path: Path, monkeypatch: p
                 command, _, shown = example.partition("\n")
                 words, _, file = command.partition(" > ")
                 try:
-                    result = run_any(*shlex.split(words)[1:]).output
+                    result = run_any(*shlex.split(words)[1:])
+                    output = result.output
                 except UrdfkinError as error:
-                    result = f"urdfkin: error: {error}"
+                    output = f"urdfkin: error: {error}"
                 if file:
-                    Path(file).write_text(result, "utf-8")
+                    Path(file).write_text(result.stdout, "utf-8")
                 else:
-                    assert pattern(shown).search(result), f"{command}\n{result}"
+                    assert pattern(shown).search(output), f"{command}\n{output}"
                 commands += 1
         elif name := NAMED.match(text):
             Path(name[1]).write_text(text, "utf-8")

@@ -9,7 +9,7 @@ import click
 
 from urdfkin.cli.arguments import load_robot, robot_argument, together, verify_option
 from urdfkin.cli.endings import form_of
-from urdfkin.cli.idle import refuse_idle
+from urdfkin.cli.idle import refuse_idle, typed
 from urdfkin.cli.numbers import Number, Whole
 from urdfkin.cli.output import compiling, output_option
 
@@ -56,7 +56,7 @@ compare_options = together(
     click.option(
         "--compare",
         metavar="TABLE",
-        help="Hold the URDF against a table: a .toml, .json or .csv file, or the name of a shipped one.",
+        help="Hold the URDF against a table: a file (as for ROBOT), or the name of a shipped one.",
     ),
     click.option(
         "--tolerance",
@@ -86,6 +86,8 @@ form_options = together(
 
 
 _CHOICES = ("convention", "near_parallel", "snap", "last", "parallel_offset", "flip")
+#: What a table that is a robot has to be derived for; without, it is written as it stands.
+_DERIVED = ("base", "tip", "all_", "near_parallel", "snap", "last", "parallel_offset", "flip")
 _UNITS = ("degrees", "millimetres", "digits")
 
 
@@ -132,8 +134,9 @@ def command(
 
     The path may run down the tree, up, or through the common ancestor. Angles and lengths stay as the file
     has them unless --snap makes angles round; the table then says by how much the tip moves at most.
-    ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json,
-    .csv), which is made a robot first: to convert it, or to write it as a URDF.
+    ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
+    .tsv, .md, .tex, .txt), which is written as it stands, in the convention asked for; options that choose
+    rows have it derived anew, from the robot that it describes.
 
     Exit 0: verified, or the compared table agrees. 1: a disagreement. 2: bad input. 3: not checked, or a
     strict table that loses more to rounding than the robot itself.
@@ -141,9 +144,13 @@ def command(
     from urdfkin.cli.dh_work import Work, run  # noqa: PLC0415  keeps --help fast
     from urdfkin.dh.read import is_table_file  # noqa: PLC0415
 
+    is_table = is_table_file(robot)
     options["format_"] = form_of(context, output, ENDINGS, "terminal")
-    _refuse_idle(context, is_table_file(robot), options)
+    _refuse_idle(context, is_table, options)
     loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    written = robot if is_table and not any(typed(context, name) for name in _DERIVED) else None
+    if written and not typed(context, "convention"):
+        options["convention"] = None
     with compiling():
-        code = run(Work(robot=loaded, output=output, **options))
+        code = run(Work(robot=loaded, written=written, output=output, **options))
     context.exit(code)

@@ -12,7 +12,7 @@ import numpy as np
 
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.output import write_file
-from urdfkin.dh import DHTable, Units, export, units_of
+from urdfkin.dh import DHTable, Units, export, read_table, to_convention, units_of
 from urdfkin.dh.compare import CellDifference, Comparison, Slip, compare, comparison_text, diagnose
 from urdfkin.dh.digits import last_digits
 from urdfkin.dh.export.mapping import to_mapping
@@ -25,6 +25,7 @@ from urdfkin.dh.to_tree import to_urdf
 from urdfkin.dh.tree_parameters import tree_parameters
 from urdfkin.errors import InputError
 from urdfkin.robot import Robot
+from urdfkin.system.files import at_home
 from urdfkin.verify.pinocchio_module import version
 from urdfkin.verify.sampling import draw
 from urdfkin.verify.tables import TableCheck
@@ -40,15 +41,20 @@ _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """The command's options."""
+    """The command's options.
+
+    Attributes:
+        written: The table's file that is the robot, if it is to be written as it stands.
+    """
 
     robot: Robot
+    written: str | None
     output: Path | None
     base: str | None
     tip: str | None
     all_: bool
     tree: bool
-    convention: str
+    convention: str | None
     near_parallel: str
     snap: float
     last: str
@@ -120,12 +126,15 @@ def _table(work: Work, tip: str | None) -> tuple[DHTable, TableCheck | None]:
 
 def _made(work: Work, tip: str | None, snap: float) -> DHTable:
     robot, base = work.robot, work.base
+    if work.written is not None:
+        table = read_table(at_home(work.written))
+        return to_convention(table, work.convention or table.convention)
     if base is None and work.all_:
         base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
     return robot.dh(
         tip,
         base,
-        work.convention,
+        work.convention or "standard",
         near_parallel=work.near_parallel,
         snap=snap,
         last=work.last,
@@ -151,7 +160,7 @@ def _said(work: Work, table: DHTable, check: TableCheck | None) -> str:
     lines = [check_line(check)]
     if work.format_ in _ROUNDED:
         lines.append(str(printed(table, work.units, _ROUNDED[work.format_])))
-    if hint := snap_hint(table, lambda snap: _made(work, table.tip_frame, snap)):
+    if work.written is None and (hint := snap_hint(table, lambda snap: _made(work, table.tip_frame, snap))):
         lines.append(f"hint: {hint}")
     return "\n".join(lines)
 

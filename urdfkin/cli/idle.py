@@ -9,6 +9,11 @@ import click
 from urdfkin.errors import InputError
 
 
+def typed(context: click.Context, name: str) -> bool:
+    """Whether a parameter of the running command was given on the command line."""
+    return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+
+
 def refuse_idle(context: click.Context, idle: Collection[str], because: str) -> None:
     """Refuse options of the running command that were typed and have no effect.
 
@@ -21,7 +26,6 @@ def refuse_idle(context: click.Context, idle: Collection[str], because: str) -> 
         InputError: one of them was given on the command line.
     """
     for parameter in context.command.params:
-        source = context.get_parameter_source(parameter.name or "")
-        if parameter.name in idle and source is click.core.ParameterSource.COMMANDLINE:
+        if parameter.name in idle and typed(context, parameter.name):
             name = "/".join([*parameter.opts[:1], *parameter.secondary_opts[:1]])
             raise InputError(f"{name} does nothing {because}", remedy="leave it out")

@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
+from urdfkin.dh.expression import cell_of
 from urdfkin.dh.units import Units, cell_in_si, units_of
-from urdfkin.dh.written_row import ORDER
+from urdfkin.dh.written_row import ORDER, units_in
 
 
 class Literal(float):
@@ -39,11 +40,15 @@ def last_digits(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
 
 def _of_row(row: Mapping[str, Any] | Sequence[Any], units: Units) -> dict[str, float]:
     cells = row if isinstance(row, Mapping) else dict(zip(ORDER, row, strict=False))
-    return {
-        name: cell_in_si(name, half_a_digit(cells[name], name in "ad" and units.counts_millimetres), units)
-        for name in (*ORDER, "beta")
-        if name in cells
-    }
+    found = {}
+    for name in (*ORDER, "beta"):
+        if name in cells:
+            value, said = cells[name], units
+            if isinstance(value, str):
+                said = units_in(cell_of(value), units)
+            half = half_a_digit(value, name in "ad" and said.counts_millimetres)
+            found[name] = cell_in_si(name, half, said)
+    return found
 
 
 def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
@@ -54,6 +59,7 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
         (5e-05, 0.0, 0.5, 0.0)
     """
     text = value.text if isinstance(value, Literal) else str(value)
+    text = (cell_of(value).text or "0") if isinstance(value, str) else text
     try:
         number = Decimal(text)
     except InvalidOperation:

@@ -6,12 +6,12 @@ The table itself is always in metres and radians; units exist at the border only
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
 from numbers import Real
 
+from urdfkin.dh.expression import cell_of
 from urdfkin.errors import InputError
 
 
@@ -125,9 +125,6 @@ def fraction_text(fraction: Fraction, pi: str = "pi") -> str:
     return f"{count}{pi}" + (f"/{fraction.denominator}" if fraction.denominator != 1 else "")
 
 
-_PI = re.compile(r"\s*([+-]?)\s*(?:(\d+(?:\.\d*)?)\s*\*?\s*)?pi\s*(?:/\s*(\d+(?:\.\d*)?))?\s*")
-
-
 def read_number(value: object, where: str) -> float:
     """A number, or text that is one, or a multiple of pi such as "-pi/2" or "3*pi/4".
 
@@ -152,13 +149,12 @@ def read_number(value: object, where: str) -> float:
 def _number(value: object) -> float:
     if isinstance(value, Real) and not isinstance(value, bool):
         return float(value)
-    if not isinstance(value, str) or not value.isascii() or "_" in value:
+    if not isinstance(value, str):
         raise TypeError(value)
-    if match := _PI.fullmatch(value):
-        sign, count, divisor = match.groups()
-        size = float(count or 1.0) * math.pi / float(divisor or 1.0)
-        return -size if sign == "-" else size
-    return float(value)
+    cell = cell_of(value)
+    if cell.times is not None or cell.unit not in (None, "rad"):
+        raise ValueError(value)
+    return cell.number
 
 
 def cell_in_si(name: str, number: float, units: Units) -> float:

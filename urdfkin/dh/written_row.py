@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from urdfkin.dh.expression import Cell, NoCellError, cell_of
 from urdfkin.dh.row import DHRow
-from urdfkin.dh.units import Angles, Units, cell_in_si, read_number
+from urdfkin.dh.units import Angles, Units, cell_in_si, read_number, units_of
 from urdfkin.errors import InputError
 from urdfkin.model.tree import JointKind, Limit, Mimic
 
@@ -43,6 +44,7 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
     where = f"row {index + 1}"
     fields = row if isinstance(row, Mapping) else _of_list(row, where)
     _known(fields, _KEYS, "a row", where)
+    fields = _without_variable(fields, index, where)
     cells = {name: _cell(name, fields.get(name, 0.0), units, where) for name in (*ORDER, "beta")}
     return DHRow(
         **cells,
@@ -136,12 +138,68 @@ def _known(given: Mapping[str, Any], keys: Sequence[str], what: str, where: str)
             )
 
 
+def _without_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
+    """The row with "q3 + pi" taken apart into a constant, a kind and a sense."""
+    written = {name: fields[name] for name in ORDER if isinstance(fields.get(name), str)}
+    cells = {name: _read(value, f"{where}, {name}") for name, value in written.items()}
+    own = [name for name, cell in cells.items() if cell.times is not None]
+    if not own:
+        return fields
+    name, cell = own[0], cells[own[0]]
+    kind = {"theta": "R", "d": "P"}.get(name)
+    at = f"{where}, {name}"
+    if len(own) > 1 or kind is None or _kind(fields.get("kind", kind), where).turns != (kind == "R"):
+        raise InputError(
+            "the variable of a joint stands in theta if it turns and in d if it slides",
+            where=at,
+            found=repr(written[name]),
+            remedy="write numbers into the other cells",
+        )
+    if cell.times not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
+        raise InputError(
+            f"the variable of row {index + 1} is q{index + 1} or -q{index + 1}",
+            where=at,
+            found=repr(written[name]),
+            remedy="a joint that follows another has mimic = {leader, multiplier, offset}",
+        )
+    constant = f"{cell.number!r} {cell.unit or ''}"
+    return {"kind": kind, **fields, name: constant, "sense": cell.times}
+
+
+def units_in(cell: Cell, units: Units) -> Units:
+    """The units of a cell: its own, where it says one."""
+    if cell.unit in ("m", "mm"):
+        return units_of(units.angles, cell.unit, units.digits)
+    return units_of(cell.unit or units.angles, units.lengths, units.digits)
+
+
+def _read(text: str, where: str) -> Cell:
+    try:
+        return cell_of(text)
+    except NoCellError as error:
+        raise InputError(
+            "not a number",
+            where=where,
+            found=repr(text)[:60],
+            remedy=f"{error}: write 1.5708, pi/2 or 90 deg",
+        ) from None
+
+
 def _cell(name: str, value: Any, units: Units, where: str) -> float:
     """A cell in metres or radians; no angle of a table is more than a turn."""
-    number = read_number(value, f"{where}, {name}")
+    in_pi = False
+    if isinstance(value, str):
+        cell = _read(value, f"{where}, {name}")
+        number, in_pi = cell.number, cell.unit == "rad"
+        if cell.unit is not None:
+            if (cell.unit in ("m", "mm")) != (name in ("a", "d")):
+                kind = "a length" if name in ("a", "d") else "an angle"
+                raise InputError(f"{name} is {kind}", where=f"{where}, {name}", found=repr(value))
+            units = units_in(cell, units)
+    else:
+        number = read_number(value, f"{where}, {name}")
     if name in ("a", "d"):
         return cell_in_si(name, number, units)
-    in_pi = isinstance(value, str) and "pi" in value
     if not in_pi and units.angles is Angles.RADIANS and abs(number) > 2.0 * math.pi:
         raise InputError(
             f"{name} is more than a turn, if it is radians",
@@ -149,8 +207,7 @@ def _cell(name: str, value: Any, units: Units, where: str) -> float:
             found=repr(value),
             remedy="write angles = 'degrees' if the table's angles are degrees",
         )
-    # A multiple of pi is radians whatever the unit of plain numbers.
-    return number if in_pi else cell_in_si(name, number, units)
+    return cell_in_si(name, number, units)
 
 
 def _kind(value: Any, where: str) -> JointKind:

@@ -6,6 +6,7 @@ Nothing here knows a format; each form passes its own way to write pi, products 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -35,6 +36,13 @@ def variable(table: DHTable, row: DHRow, times: str = " ", name: str = "q{}") ->
     q = name.format(table.joint_names.index(leader) + 1)
     multiplier = row.sense * (row.mimic.multiplier if row.mimic else 1.0)
     return {1.0: q, -1.0: f"-{q}"}.get(multiplier, f"{multiplier:.10g}{times}{q}")
+
+
+def coordinate_names(table: DHTable, shown: Callable[[str], str] = str) -> str:
+    """Which coordinate is whose, where that is not row by row."""
+    if [row.joint for row in table.rows] == list(table.joint_names):
+        return ""
+    return "with " + ", ".join(f"q{i} = {shown(name)}" for i, name in enumerate(table.joint_names, 1))
 
 
 def constant_of(row: DHRow) -> float:

@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from urdfkin.dh.export.cells import cells, formula, headings, is_identity, pose_lines, snap_lines
+from urdfkin.dh.export.cells import (
+    cells,
+    coordinate_names,
+    formula,
+    headings,
+    is_identity,
+    pose_lines,
+    snap_lines,
+)
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors.printable import markdown_code, markdown_text
@@ -19,6 +27,8 @@ def write(table: DHTable, units: Units) -> str:
     lines = [f"{title}, {table.convention} Denavit-Hartenberg parameters: `{formula(table)}`", ""]
     lines += [_line(body[0]), _line(["---:", ":---", *["---:"] * (len(body[0]) - 2)])]
     lines += [_line(row) for row in body[1:]]
+    if names := coordinate_names(table, markdown_code):
+        lines += ["", names]
     for what, T in (("Base", table.base), ("Tool", table.tool)):
         if is_identity(T):
             lines += ["", f"{what}: the identity."]

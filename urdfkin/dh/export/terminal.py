@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from urdfkin.dh.export.cells import cells, formula, headings, is_identity, pose_lines, snap_lines
+from urdfkin.dh.export.cells import (
+    cells,
+    coordinate_names,
+    formula,
+    headings,
+    is_identity,
+    pose_lines,
+    snap_lines,
+)
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors.printable import printable
@@ -17,7 +25,7 @@ def write(table: DHTable, units: Units) -> str:
     lines += aligned(body)
     if not table.rows:
         lines.append("(nothing moves between the two frames)")
-    if names := _names(table):
+    if names := coordinate_names(table):
         lines += ["", names]
     for what, T in (("base", table.base), ("tool", table.tool)):
         if not is_identity(T):
@@ -42,10 +50,3 @@ def aligned(body: list[list[str]]) -> list[str]:
         ]
         lines.append("  ".join(texts).rstrip())
     return [lines[0], "-" * (sum(widths) + 2 * (len(widths) - 1)), *lines[1:]]
-
-
-def _names(table: DHTable) -> str:
-    """Which coordinate is whose, where that is not row by row."""
-    if [row.joint for row in table.rows] == list(table.joint_names):
-        return ""
-    return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))

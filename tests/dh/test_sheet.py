@@ -1,0 +1,192 @@
+"""Tables are read as people have them: spreadsheets, READMEs, papers, web pages, what programs print."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.cli.test_dh import run
+from tests.random_chains import trees
+from urdfkin.dh import dh_table, export, read_table, to_convention, units_of
+from urdfkin.dh.digits import last_digits
+from urdfkin.dh.expression import NoCellError, cell_of
+from urdfkin.dh.read import is_table_file, mapping_from_text, table_from_text
+from urdfkin.dh.references import reference_path, references
+from urdfkin.errors import InputError
+from urdfkin.loading import load
+from urdfkin.model.tree import KinematicTree
+
+#: A file -> its convention and its rows: a, alpha, d, theta, R or P.
+SHEETS: dict[str, tuple[str, str, list[tuple[float, float, float, float, str]]]] = {
+    "excel.csv": (
+        "\ufeffsep=;\r\nconvention: standard;;;;\r\nJoint;a [mm];α [°];d [mm];θ [°]\r\n"
+        "A1;0;90;89,159;0\r\nA2;-425;0;0;-45,5\r\n",
+        "standard",
+        [(0, math.pi / 2, 0.089159, 0, "R"), (-0.425, 0, 0, math.radians(-45.5), "R")],
+    ),
+    "toolbox.txt": (
+        "DHRobot: UR5 (by Universal Robotics), 6 joints (RRRRRR), standard DH parameters\n"
+        "┌───────────┬─────────┬─────────┬────────┐\n│θⱼ  │   dⱼ    │   aⱼ    │   ⍺ⱼ   │\n├──┼──┼──┼──┤\n"
+        "│ q1 │ 0.08946 │       0 │  90.0° │\n│ q2 + 180° │       0 │  -0.425 │   0.0° │\n└──┴──┴──┴──┘\n",
+        "standard",
+        [(0, math.pi / 2, 0.08946, 0, "R"), (-0.425, 0, 0, math.pi, "R")],
+    ),
+    "toolbox_modified.txt": (
+        "│ aⱼ₋₁  │  ⍺ⱼ₋₁  │ θⱼ  │  dⱼ   │\n├──┼──┼──┼──┤\n│ 0.0 │ 0.0° │  q1 │ 0.333 │\n"
+        "│ 0.0 │ -90.0° │  q2 │ 0.0 │\n",
+        "modified",
+        [(0, 0, 0.333, 0, "R"), (0, -math.pi / 2, 0, 0, "R")],
+    ),
+    "readme.md": (
+        "Modified DH parameters (Craig)\n\n| Joint | $a_{i-1}$ (mm) | $\\alpha_{i-1}$ (rad) | $d_i$ |"
+        " $\\theta_i$ |\n|---|:--:|---|---|---|\n| 1 | 0 | 0 | 333 mm | $\\theta_1$ |\n"
+        "| 2 | 82.5 | $-\\frac{\\pi}{2}$ | 0 | θ₂* + π |\n\nThe end.\n",
+        "modified",
+        [(0, 0, 0.333, 0, "R"), (0.0825, -math.pi / 2, 0, math.pi, "R")],
+    ),
+    "paper.tex": (
+        "In the classical convention,\n\\begin{tabular}{c|cccc}\\hline\nLink & $a_i$ & $\\alpha_i$ & $d_i$ &"
+        " $\\theta_i$ \\\\ \\hline\n1 & $0$ & $\\pi/2$ & $0.4$ & $\\theta_1^*$ \\\\\n"
+        "2 & $0.3$ & $-90^\\circ$ & $-d_2^* + 0.1$ & $0$ \\\\[2pt] \\hline\n\\end{tabular}\n",
+        "standard",
+        [(0, math.pi / 2, 0.4, 0, "R"), (0.3, -math.pi / 2, 0.1, 0, "P")],
+    ),
+    "vendor.tsv": (
+        "standard DH\nKinematics\ttheta [rad]\ta [m]\td [m]\talpha [rad]\nJoint 1\t0\t0\t0.1625\tπ/2\n"
+        "Joint 2\t0\t-0.425\t0\t0\n",
+        "standard",
+        [(0, math.pi / 2, 0.1625, 0, "R"), (-0.425, 0, 0, 0, "R")],
+    ),
+    "narrow.txt": (
+        "convention: modified\ni a(i-1) alpha(i-1) d theta\n1 0 0 0.333 q1\n2 0 -pi/2 0 q2 - pi / 2\n",
+        "modified",
+        [(0, 0, 0.333, 0, "R"), (0, -math.pi / 2, 0, -math.pi / 2, "R")],
+    ),
+    "offset.csv": (
+        "# convention: standard\ntheta,d,a,alpha,offset,sigma\n0,0.3,0,-pi/2,pi/4,0\n0,0,0.1,0,-0.05,1\n",
+        "standard",
+        [(0, -math.pi / 2, 0.3, math.pi / 4, "R"), (0.1, 0, -0.05, 0, "P")],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_a_sheet_is_read_as_its_author_meant_it(name: str, tmp_path: Path) -> None:
+    text, convention, rows = SHEETS[name]
+    path = tmp_path / name
+    path.write_text(text, "utf-8")
+    table = read_table(path)
+    assert table.convention == convention
+    for row, (*cells, kind) in zip(table.rows, rows, strict=True):
+        assert row.cells[:4] == pytest.approx(cells, abs=1e-15)
+        assert row.kind.turns == (kind == "R")
+    assert load(path, verify=False).nq == len(rows)
+
+
+def test_the_sign_of_a_variable_is_the_rows_sense() -> None:
+    assert table_from_text(SHEETS["paper.tex"][0], ".tex").rows[1].sense == -1
+    table = table_from_text(
+        'convention = "standard"\nrows = [{theta = "-q1 + 90 deg", d = "107 mm"}]', ".toml"
+    )
+    assert (table.rows[0].sense, table.rows[0].theta, table.rows[0].d) == (-1, math.pi / 2, 0.107)
+
+
+@pytest.mark.parametrize("form", ["terminal", "markdown", "latex", "csv"])
+@pytest.mark.parametrize("name", references())
+def test_what_urdfkin_prints_is_read_again(name: str, form: str) -> None:
+    table = read_table(reference_path(name))
+    endings = {"terminal": ".txt", "markdown": ".md", "latex": ".tex", "csv": ".csv"}
+    for units in (units_of(), units_of("degrees", "millimetres")):
+        again = table_from_text(export(table, form, units), endings[form])
+        for one in ("robot", "base_frame", "tip_frame", "convention"):
+            assert getattr(again, one) == getattr(table, one)
+        assert [row.joint for row in again.rows] == [row.joint for row in table.rows]
+        q = np.linspace(-1, 1, len(table.rows))
+        np.testing.assert_allclose(again.placement(q), table.placement(q), atol=1e-9)
+
+
+@pytest.mark.slow
+@given(
+    trees(min_joints=1),
+    st.sampled_from(["standard", "modified"]),
+    st.sampled_from(["terminal", "markdown"]),
+)
+@settings(max_examples=40)
+def test_the_printed_form_of_any_robot_is_read(tree: KinematicTree, convention: str, form: str) -> None:
+    table = dh_table(tree, "tip", convention=convention)
+    again = table_from_text(
+        export(table, form, units_of(digits=17)), {"terminal": ".txt", "markdown": ".md"}[form]
+    )
+    assert again.joint_names == table.joint_names
+    q = np.linspace(-1, 1, len(table.joint_names))
+    np.testing.assert_allclose(again.placement(q), table.placement(q), atol=1e-8 * max(1.0, table.span))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("i  a  alpha  d  theta\n1  0  pi/2  0.1  q1\n", "does not say its convention"),
+        ("# anlges: degrees\na,alpha,d,theta\n0,0,0,0\n", "unknown key in a table: found 'anlges'"),
+        ('a,alpha,d,theta\n"0,3",0,0,0\n', "row 1, a: not a number.*by semicolons if commas are decimal"),
+        ("a;alpha;d;phi\n0;0;0;0\n", "header: no column 'theta'"),
+        ("a;alpha;d;theta\n0;0;0\n", "row 1: a row has a cell for each of the 4 columns: found 3"),
+        ("a;alpha;d;theta\n0;q1;0;0\n", "variable of a joint stands in theta if it turns and in d"),
+        ("a;alpha;d;theta\n0;0;0;q7\n", "row 1, theta: a row moves with a variable that no row has"),
+        ("a;alpha;d;theta\n0;0;0;90 deg rad\n", "deg and rad in one cell"),
+        ("a;alpha;d;theta\n90 deg;0;0;0\n", "row 1, a: a is a length"),
+    ],
+)
+def test_what_is_no_table_says_where(text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        table_from_text(text if "pi/2  0.1" in text else "# convention: standard\n" + text, ".csv")
+
+
+@pytest.mark.parametrize(
+    "text", ["", "1_0", "nan", "1 2", "--1", "1/0", "q1 + q2", "pi deg", "3 *", "* 3", "٣", "1e999"]
+)
+def test_what_is_no_cell_is_refused(text: str) -> None:
+    with pytest.raises(NoCellError):
+        cell_of(text)
+
+
+@given(st.text(max_size=30))
+@settings(max_examples=300)
+def test_any_text_is_a_cell_or_is_refused(text: str) -> None:
+    with contextlib.suppress(NoCellError):
+        assert math.isfinite(cell_of(text).number)
+
+
+def test_the_last_digit_of_a_cell_with_a_unit_is_known() -> None:
+    data = mapping_from_text("a;alpha;d;theta\n311,1 mm;90°;0,25;0\n", ".csv", "sheet")
+    assert last_digits({"convention": "standard", **data})[0] == {
+        "a": pytest.approx(5e-5), "alpha": 0.0, "d": pytest.approx(5e-3), "theta": 0.0,
+    }  # fmt: skip
+
+
+def test_a_urdf_may_end_in_txt(tmp_path: Path) -> None:
+    urdf, table = tmp_path / "robot.txt", tmp_path / "table.txt"
+    urdf.write_text("  <robot name='r'><link name='l'/></robot>")
+    table.write_text(SHEETS["narrow.txt"][0])
+    assert not is_table_file(urdf)
+    assert is_table_file(table)
+
+
+def test_a_table_given_as_robot_is_written_as_it_stands(tmp_path: Path) -> None:
+    path, out = str(reference_path("kinova")), tmp_path / "again.csv"
+    result = run(path, "--degrees")
+    assert "q1 + 180" in result.stdout
+    assert "agrees within rounding" in result.stdout
+    assert run(path, "--format", "csv", "-o", str(out)).exit_code == 0
+    assert read_table(out).rows[0].theta == math.pi
+    modified = run(path, "--convention", "modified", "--format", "csv", "-o", str(out))
+    assert modified.exit_code == 0
+    wanted = to_convention(read_table(path), "modified")
+    assert [row.cells for row in read_table(out).rows] == [row.cells for row in wanted.rows]
+    derived = run(path, "--last", "flange")
+    assert "q1 + pi" not in derived.stdout
