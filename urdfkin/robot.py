@@ -719,6 +719,10 @@ class Robot:
         last: str = "tip",
         parallel_offset: str = "last",
         flip: Collection[str] = (),
+        first: str = "base",
+        sign: str = "theta",
+        slide: str = "drawn",
+        like: DHTable | None = None,
         verify: bool | None = None,
     ) -> DHTable:
         """The Denavit-Hartenberg table of the path between two frames, checked against Pinocchio.
@@ -735,6 +739,10 @@ class Robot:
             last: "tip" or "flange": whether the last row takes the tip.
             parallel_offset: "last", "first" or "each".
             flip: Joints to count the other way.
+            first: "base" or "joint": whether the first row takes the way from the base (Craig's d_1 is zero).
+            sign: "theta", "a" or "alpha": which of them x keeps small, or from being negative.
+            slide: "drawn" or "minimal": where the lines of sliding joints are.
+            like: A published table, whose frames, senses and zeros are to be taken.
             verify: Whether Pinocchio checks the table; None leaves it to the robot.
 
         Raises:
@@ -757,6 +765,10 @@ class Robot:
             last=word(last, "last"),
             parallel_offset=word(parallel_offset, "parallel_offset"),
             flip=[word(joint, "each of flip") for joint in words(flip, "flip")],
+            first=word(first, "first"),
+            sign=word(sign, "sign"),
+            slide=word(slide, "slide"),
+            like=like,
         )
         if self.verifier.wanted(verify):
             self.verifier.table(table)

@@ -32,6 +32,13 @@ def _choice(name: str, choices: tuple[str, ...], text: str) -> Any:
     return click.option(name, type=click.Choice(choices), default=choices[0], show_default=True, help=text)
 
 
+def _columns(_context: click.Context, _option: click.Parameter, value: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in value.split(","))
+    if sorted(names) != ["a", "alpha", "d", "theta"]:
+        raise click.BadParameter(f"{value!r} is not a, alpha, d and theta, each once, with commas between")
+    return names
+
+
 path_options = together(
     click.option("--base", metavar="NAME", help="A link or joint. Default: the robot's base frame."),
     click.option("--tip", metavar="NAME", help="A link or joint. Default: the robot's tip."),
@@ -51,6 +58,16 @@ choice_options = together(
     _choice("--last", ("tip", "flange"), "Whether the last row takes the tip where it can."),
     _choice("--parallel-offset", ("last", "first", "each"), "The row of parallel axes with the offset."),
     click.option("--flip", multiple=True, metavar="JOINT", help="Count a joint the other way; repeatable."),
+    _choice("--first", ("base", "joint"), "Whether d1 holds the base's offset, or is zero as Craig's."),
+    _choice(
+        "--sign", ("theta", "a", "alpha"), "What the direction of x keeps small, or from being negative."
+    ),
+    _choice("--slide", ("drawn", "minimal"), "Lines of sliding joints: the URDF's, or those with a = 0."),
+    click.option(
+        "--like",
+        metavar="TABLE",
+        help="The URDF's numbers in the frames, senses and zeros of a published table (as for --compare).",
+    ),
 )
 compare_options = together(
     click.option(
@@ -81,14 +98,24 @@ form_options = together(
     ),
     click.option("--degrees/--radians", default=False, help="Angles in what people read."),
     click.option("--millimetres/--metres", default=False, help="Lengths in what people read."),
+    click.option(
+        "--columns",
+        metavar="NAMES",
+        default="a,alpha,d,theta",
+        show_default=True,
+        callback=_columns,
+        help="Their order, in what people read.",
+    ),
     click.option("--digits", type=Whole(3, 17), default=10, show_default=True, help="Significant."),
 )
 
 
-_CHOICES = ("convention", "near_parallel", "snap", "last", "parallel_offset", "flip")
+#: What --like has decided.
+_SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
+_CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
 #: What a table that is a robot has to be derived for; without, it is written as it stands.
-_DERIVED = ("base", "tip", "all_", "near_parallel", "snap", "last", "parallel_offset", "flip")
-_UNITS = ("degrees", "millimetres", "digits")
+_DERIVED = ("base", "tip", "all_", *_CHOICES[1:])
+_UNITS = ("degrees", "millimetres", "digits", "columns")
 
 
 def _refuse_idle(context: click.Context, is_table: bool, options: dict[str, Any]) -> None:
@@ -99,7 +126,9 @@ def _refuse_idle(context: click.Context, is_table: bool, options: dict[str, Any]
         (("tolerance", "fit"), not compares, "without --compare"),
         ((*_CHOICES, "verify"), compares, "with --compare"),
         ((*_CHOICES, "base", "tip"), tree, "with --tree"),
-        (("tip",), options["all_"], "with --all"),
+        (("tip", "like"), options["all_"], "with --all"),
+        (_SIGNS, options["like"] is not None, "with --like"),
+        (("columns",), tree or compares, "but in the form of one table"),
         (
             _UNITS,
             form not in written,
@@ -149,7 +178,7 @@ def command(
     _refuse_idle(context, is_table, options)
     loaded = load_robot(robot, mimic, root_joint, verify=verify)
     written = robot if is_table and not any(typed(context, name) for name in _DERIVED) else None
-    if written and not typed(context, "convention"):
+    if (written or options["like"]) and not typed(context, "convention"):
         options["convention"] = None
     with compiling():
         code = run(Work(robot=loaded, written=written, output=output, **options))

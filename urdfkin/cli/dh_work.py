@@ -12,7 +12,7 @@ import numpy as np
 
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.output import write_file
-from urdfkin.dh import DHTable, Units, export, read_table, to_convention, units_of
+from urdfkin.dh import DHTable, Units, export, read_table, to_convention
 from urdfkin.dh.compare import CellDifference, Comparison, Slip, compare, comparison_text, diagnose
 from urdfkin.dh.digits import last_digits
 from urdfkin.dh.export.mapping import to_mapping
@@ -20,9 +20,10 @@ from urdfkin.dh.export.tree import as_mapping, write_tree
 from urdfkin.dh.hint import snap_hint
 from urdfkin.dh.printed import printed, printed_tree
 from urdfkin.dh.read import read_mapping, table_of
-from urdfkin.dh.references import reference_path
+from urdfkin.dh.references import published, reference_path
 from urdfkin.dh.to_tree import to_urdf
 from urdfkin.dh.tree_parameters import tree_parameters
+from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import InputError
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home
@@ -60,6 +61,10 @@ class Work:
     last: str
     parallel_offset: str
     flip: tuple[str, ...]
+    first: str
+    sign: str
+    slide: str
+    like: str | None
     compare: str | None
     tolerance: float
     fit: bool
@@ -67,14 +72,16 @@ class Work:
     degrees: bool
     millimetres: bool
     digits: int
+    columns: tuple[str, ...]
 
     @property
     def units(self) -> Units:
         """As the options say."""
-        return units_of(
-            "degrees" if self.degrees else "radians",
-            "millimetres" if self.millimetres else "metres",
+        return Units(
+            Angles.DEGREES if self.degrees else Angles.RADIANS,
+            Lengths.MILLIMETRES if self.millimetres else Lengths.METRES,
             self.digits,
+            self.columns,
         )
 
 
@@ -129,17 +136,25 @@ def _made(work: Work, tip: str | None, snap: float) -> DHTable:
     if work.written is not None:
         table = read_table(at_home(work.written))
         return to_convention(table, work.convention or table.convention)
+    like = None
+    if work.like is not None:
+        like = read_table(reference_path(work.like))
+        tip, base = tip or _known(work, like.tip_frame), base or _known(work, like.base_frame)
     if base is None and work.all_:
         base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
     return robot.dh(
         tip,
         base,
-        work.convention or "standard",
+        work.convention or (like.convention if like else "standard"),
         near_parallel=work.near_parallel,
         snap=snap,
         last=work.last,
         parallel_offset=work.parallel_offset,
         flip=work.flip,
+        first=work.first,
+        sign=work.sign,
+        slide=work.slide,
+        like=like,
         verify=False,
     )
 
@@ -162,6 +177,8 @@ def _said(work: Work, table: DHTable, check: TableCheck | None) -> str:
         lines.append(str(printed(table, work.units, _ROUNDED[work.format_])))
     if work.written is None and (hint := snap_hint(table, lambda snap: _made(work, table.tip_frame, snap))):
         lines.append(f"hint: {hint}")
+    if work.like is None and work.format_ in _READ:
+        lines += [f"hint: {line}" for line in published(work.robot.origin.source)]
     return "\n".join(lines)
 
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TypeVar
 
 import numpy as np
 
-from urdfkin.dh.elements import as_step, between_axes
+from urdfkin.dh.elements import along_axis, as_step, between_axes
 from urdfkin.dh.noise import Noise, noises, tilt_of
 from urdfkin.dh.normals import (
     NEARLY_PARALLEL,
@@ -29,7 +29,7 @@ from urdfkin.dh.normals import (
 from urdfkin.dh.row import Convention, DHRow, convention_of
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.kinematics.roundings import ENTRY, EPS
+from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
 from urdfkin.model.chain import ChainJoint, FrameChain
 from urdfkin.model.tree import FloatArray
 
@@ -42,6 +42,28 @@ class Last(StrEnum):
 
     TIP = "tip"
     FLANGE = "flange"
+
+
+class First(StrEnum):
+    """Where the way from the base to the first joint goes: into d_1 and theta_1, or into the base."""
+
+    BASE = "base"
+    JOINT = "joint"
+
+
+class Sign(StrEnum):
+    """Which way x points: so that theta is no more than a right angle, or that a or alpha is not negative."""
+
+    THETA = "theta"
+    A = "a"
+    ALPHA = "alpha"
+
+
+class Slide(StrEnum):
+    """Where the line of a sliding joint is: where the URDF draws it, or through a neighbour's axis."""
+
+    DRAWN = "drawn"
+    MINIMAL = "minimal"
 
 
 class ParallelOffset(StrEnum):
@@ -61,6 +83,9 @@ class Choices:
     last: Last = Last.TIP
     parallel_offset: ParallelOffset = ParallelOffset.LAST
     flip: tuple[str, ...] = ()
+    first: First = First.BASE
+    sign: Sign = Sign.THETA
+    slide: Slide = Slide.DRAWN
 
 
 _Choice = TypeVar("_Choice", bound=StrEnum)
@@ -82,6 +107,9 @@ def choices_of(
     last: str,
     parallel_offset: str,
     flip: Collection[str],
+    first: str = "base",
+    sign: str = "theta",
+    slide: str = "drawn",
 ) -> Choices:
     """Options by name; raises InputError or UnknownNameError for what does not exist."""
     names = [joint.name for joint in chain.joints]
@@ -94,11 +122,21 @@ def choices_of(
         _choice(Last, "last", last),
         _choice(ParallelOffset, "parallel_offset", parallel_offset),
         tuple(flip),
+        _choice(First, "first", first),
+        _choice(Sign, "sign", sign),
+        _choice(Slide, "slide", slide),
     )
 
 
-def derive(chain: FrameChain, choices: Choices) -> DHTable:
-    """The table of a chain: base . rows . tool equals the chain's placement for every q, to rounding."""
+def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
+    """The table of a chain: base . rows . tool equals the chain's placement for every q, to rounding.
+
+    Args:
+        chain: The path.
+        choices: The options.
+        like: A standard table of the same joints, whose directions of x, zeros of the first and the last
+            joint and offsets along parallel axes are taken, whatever the options say of these.
+    """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
     if not chain.joints:
@@ -107,15 +145,25 @@ def derive(chain: FrameChain, choices: Choices) -> DHTable:
     _use_freedom_of_prismatic_axes(chain, constants, choices, reach)
     base, phi_in, carry = _frame_zero(constants[0], reach, first)
     rows, steps = list[tuple[float, float]](), list[Step]()
-    for A, noise in zip(constants[1:-1], between, strict=True):
-        step, theta = _next_step(A, phi_in, carry, reach, choices, noise)
+    for i, (A, noise) in enumerate(zip(constants[1:-1], between, strict=True)):
+        if like is None:
+            step, theta = _next_step(A, phi_in, carry, reach, choices, noise)
+        else:
+            step, theta = _step_like(like.rows[i], A, phi_in, carry, reach, choices, noise, i)
         rows.append((theta, step.delta))
         steps.append(step)
         phi_in, carry = step.phi_next, step.delta_next
     theta, d, last, tool = _last(_lifted(constants[-1], carry), phi_in, carry, reach, choices, end)
+    if like is not None:
+        theta, d, last, tool = _last_like(like, theta, d, last, tool)
     rows.append((theta, d))
+    if like is not None:
+        base, rows[0] = _first_like(like.rows[0], base, rows[0])
     if choices.parallel_offset is ParallelOffset.FIRST:
         rows = _offsets_first(rows, steps)
+    if choices.first is First.JOINT:
+        base, rows[0] = base @ along_axis(*rows[0]), (0.0, 0.0)
+        _clean_rotation(base)
     return _table(chain, choices, rows, [*steps, last], (base, tool))
 
 
@@ -181,8 +229,15 @@ def _use_freedom_of_prismatic_axes(
     slides = [not joint.kind.turns for joint in chain.joints]
     noise = noises(chain, reach)
     n = len(slides)
+    minimal = choices.slide is Slide.MINIMAL
+    moved = [slides[k] and minimal and _onto_neighbour(constants, k, slides) for k in range(n)]
     moved = [
-        slides[k] and choices.near_parallel is NearParallel.STRICT and _meets_neighbour(constants, k, noise)
+        moved[k]
+        or (
+            slides[k]
+            and choices.near_parallel is NearParallel.STRICT
+            and _meets_neighbour(constants, k, noise)
+        )
         for k in range(n)
     ]
     if slides[0] and not moved[0]:
@@ -192,6 +247,17 @@ def _use_freedom_of_prismatic_axes(
         tip = constants[-1]
         if not _representable(tip, choices, noise[-1]) and abs(tip[2, 0]) <= noise[-1].radians:
             _shift_before(constants, n - 1, np.array([tip[0, 3], tip[1, 3], 0.0]))
+
+
+def _onto_neighbour(constants: list[FloatArray], k: int, slides: list[bool]) -> bool:
+    """Move joint k's line through the origin of a turning neighbour, the next if it has one: a is 0 there."""
+    if k + 1 < len(slides) and not slides[k + 1]:
+        _shift_before(constants, k, constants[k + 1][:3, 3].copy())
+        return True
+    if k > 0 and not slides[k - 1]:
+        _shift_after(constants, k, constants[k][:3, :3].T @ constants[k][:3, 3])
+        return True
+    return False
 
 
 def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) -> bool:
@@ -259,10 +325,85 @@ def _next_step(
     each = choices.parallel_offset is not ParallelOffset.LAST
     step = step_between(_lifted(A, carry), reach, choices.near_parallel, -phi_in, each, noise)
     theta = cleaned_angle(phi_in + step.phi)
-    if abs(theta) > math.pi / 2.0 + RIGHT_ANGLE_SLACK:
+    if _points_back(step, theta, choices.sign):
         step = step.turned()
         theta = cleaned_angle(phi_in + step.phi)
     return step, theta
+
+
+def _step_like(
+    row: DHRow,
+    A: FloatArray,
+    phi_in: float,
+    carry: float,
+    reach: float,
+    choices: Choices,
+    noise: Noise,
+    i: int,
+) -> tuple[Step, float]:
+    """The step with x as a row of another table has it, and d as there where that is free."""
+
+    def step_from(height: float) -> Step:
+        lifted = _lifted(A, carry - height)
+        step = step_between(lifted, reach, choices.near_parallel, row.theta - phi_in, noise=noise)
+        return replace(step, delta=step.delta + height) if height else step
+
+    step = step_from(0.0)
+    if row.d and i > 0 and (step.beta or step.alpha in (0.0, math.pi)):
+        step = step_from(row.d)
+
+    def unlike(one: Step) -> tuple[float, float]:
+        apart = abs(math.remainder(one.alpha - row.alpha, 2.0 * math.pi))
+        turned = abs(math.remainder(phi_in + one.phi - row.theta, 2.0 * math.pi))
+        return round(abs(one.a - row.a) / (reach or 1.0) + apart, 6), turned
+
+    if not step.free:
+        step = min((step, step.turned()), key=unlike)
+    return step, _near(phi_in + step.phi, row.theta)
+
+
+def _first_like(
+    row: DHRow, base: FloatArray, first: tuple[float, float]
+) -> tuple[FloatArray, tuple[float, float]]:
+    """Theta of the first row as another table has it, d where it is none there; the base takes the rest."""
+    theta, d = first
+    rest = (math.remainder(theta - row.theta, 2.0 * math.pi), 0.0 if row.d else d)
+    if abs(rest[0]) > ANGLE * EPS or rest[1]:
+        base = base @ along_axis(*rest)
+        _clean_rotation(base)
+    return base, (row.theta, d - rest[1])
+
+
+def _last_like(
+    like: DHTable, theta: float, d: float, last: Step, tool: FloatArray
+) -> tuple[float, float, Step, FloatArray]:
+    """The last row's own numbers if it ends where the other one does, else the other's, and a tool."""
+    row = like.rows[-1]
+    as_there = np.abs(like.tool - np.eye(4)).max() < 1e-6 and np.array_equal(tool, np.eye(4))
+    if as_there and abs(math.remainder(theta - row.theta, 2.0 * math.pi)) < RIGHT_ANGLE_SLACK:
+        return _near(theta, row.theta), d, last, tool
+    height = d if row.d else 0.0
+    rest = along_axis(theta, d) @ between_axes(last.a, last.alpha) @ tool
+    tool = np.linalg.inv(along_axis(row.theta, height) @ between_axes(row.a, row.alpha)) @ rest
+    _clean_rotation(tool)
+    tool[:3, 3] = [cleaned_length(float(x), like.span or 1.0) for x in tool[:3, 3]]
+    if np.abs(tool - np.eye(4)).max() <= ANGLE * EPS:
+        tool = np.eye(4)
+    return row.theta, height, Step(0.0, 0.0, row.a, row.alpha, 0.0, 0.0, 0.0), tool
+
+
+def _near(theta: float, there: float) -> float:
+    """An angle, by whole turns near another one, and that one where nothing but rounding is between them."""
+    off = math.remainder(theta - there, 2.0 * math.pi)
+    return there if abs(off) <= ANGLE * EPS else cleaned_angle(theta)
+
+
+def _points_back(step: Step, theta: float, sign: Sign) -> bool:
+    """Whether x is to be turned round; what says nothing (a = 0, alpha = 0 or pi) leaves it to the other."""
+    by_alpha = 0.0 if step.alpha == math.pi else step.alpha
+    if sign is Sign.THETA or (not step.a and not by_alpha):
+        return abs(theta) > math.pi / 2.0 + RIGHT_ANGLE_SLACK
+    return (step.a or by_alpha) < 0.0 if sign is Sign.A else (by_alpha or step.a) < 0.0
 
 
 def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from urdfkin.dh.derive import choices_of, derive
 from urdfkin.dh.lengths import demand_squares
+from urdfkin.dh.like import derive_like, reversed_like
 from urdfkin.dh.snapping import checked_tolerance, row_of_constant, snap_chain, snap_thetas, statement
 from urdfkin.dh.table import DHTable
 from urdfkin.model.chain import chain
@@ -24,6 +25,10 @@ def dh_table(
     last: str = "tip",
     parallel_offset: str = "last",
     flip: Collection[str] = (),
+    first: str = "base",
+    sign: str = "theta",
+    slide: str = "drawn",
+    like: DHTable | None = None,
 ) -> DHTable:
     """The Denavit-Hartenberg table of the path between two frames, exact to rounding.
 
@@ -41,6 +46,15 @@ def dh_table(
         parallel_offset: Which row of a run of parallel axes has the offset along them: the "last" (first
             after the run), the "first", or "each" its own link's.
         flip: Names of joints to count the other way; their rows get sense -1.
+        first: "base" puts the way from the base to the first axis into d_1 and theta_1 where it can; "joint"
+            into the base, so that d_1 and theta_1 are zero (Craig's frame 0).
+        sign: Which way x points: "theta" keeps theta within a right angle, "a" and "alpha" keep that cell
+            from being negative.
+        slide: Where the line of a sliding joint is, which has a direction only: "drawn" as in the URDF, or
+            "minimal", through the next turning axis' origin, so that its a is zero.
+        like: A published table: its senses, directions of x, zeros of the first and last joint and offsets
+            along parallel axes are taken, with the URDF's own numbers, base and tool; `flip`, `first`,
+            `last`, `sign` and `parallel_offset` then have no say.
 
     Raises:
         UnknownNameError: a frame or a joint that does not exist.
@@ -58,11 +72,17 @@ def dh_table(
         last=last,
         parallel_offset=parallel_offset,
         flip=flip,
+        first=first,
+        sign=sign,
+        slide=slide,
     )
+    if like is not None:
+        choices = replace(choices, flip=reversed_like(exact, choices, like))
     tolerance = checked_tolerance(snap)
     if tolerance == 0.0:
-        return derive(exact, choices)
+        return derive(exact, choices) if like is None else derive_like(exact, choices, like)
     rounder, placed = snap_chain(tree, tip, base, tolerance)
-    table, changes = snap_thetas(derive(rounder, choices), exact, tolerance)
+    made = derive(rounder, choices) if like is None else derive_like(rounder, choices, like)
+    table, changes = snap_thetas(made, exact, tolerance)
     changes += [replace(change, row=row_of_constant(table, k)) for k, change in placed]
     return replace(table, snap=statement(exact, table, changes, tolerance))

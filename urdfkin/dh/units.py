@@ -29,6 +29,11 @@ class Lengths(StrEnum):
     MILLIMETRES = "millimetres"
 
 
+#: The four columns in the order that is usual here; Craig has alpha, a, d, theta, the Robotics Toolbox theta,
+#: d, a, alpha.
+COLUMNS = ("a", "alpha", "d", "theta")
+
+
 @dataclass(frozen=True, slots=True)
 class Units:
     """How a table is written: radians and metres unless said otherwise.
@@ -37,11 +42,13 @@ class Units:
         angles: Radians, with pi as a fraction where that is exact, or degrees.
         lengths: Metres or millimetres.
         digits: Significant digits.
+        columns: The order of the columns in what people read.
     """
 
     angles: Angles = Angles.RADIANS
     lengths: Lengths = Lengths.METRES
     digits: int = 10
+    columns: tuple[str, ...] = COLUMNS
 
     @property
     def counts_millimetres(self) -> bool:

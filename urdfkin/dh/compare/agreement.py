@@ -49,7 +49,7 @@ def compare(
     Raises:
         InputError: the table has another number or other kinds of joints than the path.
     """
-    _check_joints(chain, reference)
+    check_joints(chain, reference)
     standard = to_standard(reference) if reference.convention is Convention.MODIFIED else reference
     tried, wanted = _samples(chain, FIT_SAMPLES, 1)
     scale = _reach(chain, wanted)
@@ -92,7 +92,7 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
     Raises:
         InputError: the table has another number or other kinds of joints than the path.
     """
-    _check_joints(chain, reference)
+    check_joints(chain, reference)
     standard = to_standard(reference) if reference.convention is Convention.MODIFIED else reference
     tried, wanted = _samples(chain, FIT_SAMPLES, 1)
     model = _best_fit(chain, standard, _written(standard), tried, wanted, _reach(chain, wanted), enough)
@@ -116,7 +116,8 @@ def _reach(chain: FrameChain, wanted: FloatArray) -> float:
     return max(min(chain.reach, across) if across > 1e-6 * chain.reach else chain.reach, 1e-9)
 
 
-def _check_joints(chain: FrameChain, reference: DHTable) -> None:
+def check_joints(chain: FrameChain, reference: DHTable) -> None:
+    """Raise InputError unless a table has as many joints as a path, of the same kinds, and at least one."""
     theirs = [row.kind.turns for row in reference.rows]
     ours = [joint.kind.turns for joint in chain.joints]
     if theirs != ours or not ours:

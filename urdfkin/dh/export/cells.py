@@ -66,7 +66,8 @@ def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: str
         theta = added(moves, units.angle(constant_of(row), pi))
     else:
         d = added(moves, units.length(constant_of(row)))
-    texts = [units.length(row.a), units.angle(row.alpha, pi), d, theta]
+    named = {"a": units.length(row.a), "alpha": units.angle(row.alpha, pi), "d": d, "theta": theta}
+    texts = [named[name] for name in units.columns]
     return [*texts, units.angle(row.beta, pi)] if table.has_hayati_rows else texts
 
 
@@ -74,7 +75,13 @@ def headings(table: DHTable, units: Units) -> list[str]:
     """Names of the columns of `cells`, with units."""
     at = "(i-1)" if table.convention is Convention.MODIFIED else ""
     angle, length = units.angle_name, units.length_name
-    names = [f"a{at} [{length}]", f"alpha{at} [{angle}]", f"d [{length}]", f"theta [{angle}]"]
+    named = {
+        "a": f"a{at} [{length}]",
+        "alpha": f"alpha{at} [{angle}]",
+        "d": f"d [{length}]",
+        "theta": f"theta [{angle}]",
+    }
+    names = [named[name] for name in units.columns]
     return [*names, f"beta{at} [{angle}]"] if table.has_hayati_rows else names
 
 

@@ -28,14 +28,13 @@ def write(table: DHTable, units: Units) -> str:
     at = "_{i-1}" if modified else "_i"
     angle = "rad" if units.angles is Angles.RADIANS else r"$^\circ$"
     length = units.length_name
-    heads = [
-        r"$i$",
-        "joint",
-        f"$a{at}$ [{length}]",
-        rf"$\alpha{at}$ [{angle}]",
-        f"$d_i$ [{length}]",
-        rf"$\theta_i$ [{angle}]",
-    ]
+    named = {
+        "a": f"$a{at}$ [{length}]",
+        "alpha": rf"$\alpha{at}$ [{angle}]",
+        "d": f"$d_i$ [{length}]",
+        "theta": rf"$\theta_i$ [{angle}]",
+    }
+    heads = [r"$i$", "joint", *(named[name] for name in units.columns)]
     if table.has_hayati_rows:
         heads.append(rf"$\beta{at}$ [{angle}]")
     rows = []

@@ -1,0 +1,151 @@
+"""A table in the frames of a published one: its cells, the URDF's numbers, and the URDF's motion exactly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.cli.test_dh import run
+from tests.dh.arms import arm
+from tests.dh.test_compare import disguised, elbow
+from tests.random_chains import configurations, rotation, shift, trees
+from urdfkin.dh import Convention, DHTable, dh_table, export, read_table, table_from_rows, units_of
+from urdfkin.dh.convert import to_convention
+from urdfkin.dh.read import read_mapping
+from urdfkin.dh.references import published, reference_path, references
+from urdfkin.errors import InputError
+from urdfkin.loading import load
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import KinematicTree
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("kinds", ["RRRRRR", "RRPRRR"])
+def test_the_cells_of_any_way_to_write_the_robot_come_back(seed: int, kinds: str) -> None:
+    tree = elbow(kinds)
+    reference = disguised(dh_table(tree, "tip"), seed)
+    table = dh_table(tree, "tip", like=reference)
+    for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
+        own = {"theta"} if row.kind.turns else {"d"}  # whose zeros are the URDF's
+        for name in (
+            {"a", "alpha", "d"} - own - ({"a", "alpha", "d"} if i == 5 else {"d"} if i == 0 else set())
+        ):
+            off = getattr(row, name) - getattr(other, name)
+            off = math.remainder(off, 2 * math.pi) if name == "alpha" else off
+            assert abs(off) < 1e-12, (i, name)
+    assert table.rows[0].theta == reference.rows[0].theta
+    q = configurations(6)
+    np.testing.assert_allclose(table.placement(q), chain(tree, "tip").placement(q), atol=1e-13)
+
+
+@given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
+@settings(max_examples=25)
+def test_a_table_like_another_is_the_urdf_to_rounding(tree: KinematicTree, seed: int) -> None:
+    for convention in ("standard", "modified"):
+        reference = to_convention(disguised(dh_table(tree, "tip"), seed), convention)
+        table = dh_table(tree, "tip", convention=convention, like=reference)
+        q = np.linspace(-1, 1, len(table.rows))
+        apart = np.abs(table.placement(q) - chain(tree, "tip").placement(q)).max()
+        assert apart <= 20 * float(table.rounding(q)) + 1e-13
+
+
+@pytest.mark.parametrize("name", sorted(set(references()) - {"kinova"}))
+def test_a_vendors_table_comes_out_in_every_cell(name: str) -> None:
+    data, reference = read_mapping(reference_path(name)), read_table(reference_path(name))
+    ends = (reference.tip_frame, reference.base_frame, str(reference.convention))
+    table = load(reference.robot).dh(*ends, like=reference, snap=data.get("snap", 0.0))
+    for row, other in zip(table.rows, reference.rows, strict=True):
+        assert (row.cells, row.sense) == (other.cells, 1)
+    np.testing.assert_array_equal(table.base, np.eye(4))
+    np.testing.assert_allclose(table.tool, reference.tool, atol=1e-15)
+
+
+def test_kinovas_sheet_comes_out_with_its_zeros_and_the_urdfs_lengths() -> None:
+    reference = read_table(reference_path("kinova"))
+    table = load("kinova").dh(reference.tip_frame, reference.base_frame, like=reference, snap=1e-9)
+    text = export(table, "terminal", units_of("degrees", "millimetres"))
+    assert "-q1 + 180" in text
+    assert "q2 - 90" in text
+    for row, other in zip(table.rows, reference.rows, strict=True):
+        assert (row.alpha, row.a) == pytest.approx((other.alpha, other.a), abs=1e-12)
+        assert row.d == pytest.approx(other.d, abs=6e-5)  # the sheet has D3 + D4 and D5 + D6 to 0.1 mm
+    assert table.rows[3].d == pytest.approx(-0.31105, abs=1e-9)
+
+
+def test_another_robots_table_is_refused() -> None:
+    other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
+    with pytest.raises(InputError, match=r"another robot.*hold it against the URDF with --compare"):
+        dh_table(elbow(), "tip", like=other)
+    with pytest.raises(InputError, match="the table's joints are not the path's"):
+        dh_table(elbow(), "tip", like=replace(other, rows=other.rows[:3]))
+
+
+def table_with(**options: str) -> DHTable:
+    return dh_table(elbow(), "tip", **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_x_points_so_that_a_or_alpha_is_not_negative(convention: str) -> None:
+    inner = slice(0, 5) if convention == "standard" else slice(1, 6)
+    by_a = table_with(convention=convention, sign="a").rows[inner]
+    by_alpha = table_with(convention=convention, sign="alpha").rows[inner]
+    assert all(row.a >= 0 for row in by_a)
+    assert all(row.alpha >= 0 for row in by_alpha)
+    assert any(row.alpha < 0 for row in by_a)
+    assert any(row.a < 0 for row in by_alpha)
+
+
+@pytest.mark.parametrize("sign", ["theta", "a", "alpha"])
+@pytest.mark.parametrize("kinds", ["RRRRRR", "PRRRRR", "RRPRRR", "RRRRRP"])
+def test_craigs_first_row_and_minimal_slides_are_the_robot(kinds: str, sign: str) -> None:
+    tree = elbow(kinds)
+    table = dh_table(tree, "tip", convention="modified", first="joint", sign=sign, slide="minimal")
+    assert (table.rows[0].d, table.rows[0].theta) == (0.0, 0.0)
+    np.testing.assert_allclose(
+        table.placement(configurations(6)), chain(tree, "tip").placement(configurations(6)), atol=1e-13
+    )
+
+
+def test_a_minimal_slide_has_no_a_on_the_side_of_its_neighbour() -> None:
+    tree = arm(
+        shift(0, 0, 0.3), shift(0.2, 0.1, 0) @ rotation("x", 1.2), shift(0.3, 0.2, 0.1) @ rotation("y", 0.7),
+        kinds="RPR", tip=shift(0.1, 0, 0.2),
+    )  # fmt: skip
+    drawn, minimal = (dh_table(tree, "tip", slide=slide) for slide in ("drawn", "minimal"))
+    assert drawn.rows[1].a > 0.1
+    assert minimal.rows[1].a == 0.0
+
+
+def test_columns_stand_in_the_order_asked_for() -> None:
+    result = run("ur5", "--like", "ur5", "--columns", "alpha,a,d,theta", "--snap", "1e-6", "--degrees")
+    assert result.exit_code == 0
+    lines = [line.split() for line in result.stdout.splitlines()]
+    assert ["i", "joint", "alpha", "[deg]", "a", "[m]", "d", "[m]", "theta", "[deg]"] in lines
+    assert ["1", "shoulder_pan_joint", "90", "0", "0.089159", "q1"] in lines
+    for form in ("markdown", "latex"):
+        text = run("ur5", "--like", "ur5", "--columns", "theta, d, a, alpha", "--format", form).stdout
+        head = next(line for line in text.splitlines() if "joint" in line and "alpha" in line)
+        assert head.index("theta") < head.index("alpha")
+    assert run("ur5", "--columns", "a,b,c,d").exit_code == 2
+
+
+def test_a_robot_with_a_published_table_is_told_of_it() -> None:
+    assert published("xarm7") == [
+        "the modified table that is published of this robot: --like xarm7_modified --snap 1e-04",
+        "the standard table that is published of this robot: --like xarm7_standard --snap 1e-04",
+    ]
+    assert published("nobody") == []
+    assert "hint: the standard table that is published of this robot: --like ur5" in run("ur5").stdout
+    assert "published" not in run("ur5", "--like", "ur5").stdout
+    for name in references():
+        assert Convention(read_mapping(reference_path(name))["convention"])
+
+
+def test_what_like_decides_is_not_decided_twice() -> None:
+    with pytest.raises(InputError, match="--sign does nothing with --like"):
+        run("ur5", "--like", "ur5", "--sign", "a")
