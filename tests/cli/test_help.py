@@ -9,11 +9,13 @@ from importlib import metadata
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 
 from tests.cli.running import process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.cli import cli, commands
+from urdfkin.loading import load
 from urdfkin.system.resources import robots_dir
 from urdfkin.urdf.catalogue import catalogue
 
@@ -71,6 +73,9 @@ def test_the_examples_of_the_help_run(command: str, tmp_path: Path, monkeypatch:
     (tmp_path / "robots").mkdir()
     for name in ("my", "robot", "arm", "robots/one"):
         (tmp_path / f"{name}.urdf").write_text(elbow())
+    panda = load("panda", verify=False)
+    q = panda.sample(5, seed=0)
+    np.savetxt(tmp_path / "log.csv", q, delimiter=",", header=",".join(panda.coordinate_names), comments="")
     run_examples(command)
 
 

@@ -243,6 +243,14 @@ class MujocoOracle:
         poses, velocity = self._moved(q, v, None, frames, base)[:2]
         return _referred(reference, poses, velocity)
 
+    def hessians(self, *asked: object) -> FloatArray:
+        """None: MuJoCo has no derivative of a Jacobian by the coordinates.
+
+        Raises:
+            OracleError: always.
+        """
+        raise OracleError("MuJoCo computes no Hessian", where=self._name, remedy="ask Pinocchio about it")
+
     def accelerations(
         self,
         q: FloatArray,

@@ -385,7 +385,7 @@ def mjcf_placements(
     Raises:
         OracleError: it does not accept the file, or finds other joints or bodies in it.
     """
-    import pinocchio as pin  # noqa: PLC0415  heavy: only when something is checked
+    pin = pinocchio()
 
     try:
         model = pin.buildModelFromMJCF(path)
