@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from urdfkin.model.chain import FrameChain
     from urdfkin.model.reference import Reference
     from urdfkin.robot import Robot
+    from urdfkin.sameness.changes import diff
+    from urdfkin.sameness.judging import same
     from urdfkin.validation.campaign import validate
     from urdfkin.verify.certificate import Certificate, VerificationError
     from urdfkin.verify.tables import TableError
@@ -46,8 +48,10 @@ _HOMES = {
     "UrdfkinError": "urdfkin.errors",
     "VerificationError": "urdfkin.verify.certificate",
     "check": "urdfkin.lint",
+    "diff": "urdfkin.sameness.changes",
     "load": "urdfkin.loading",
     "read_table": "urdfkin.dh",
+    "same": "urdfkin.sameness.judging",
     "table_from_rows": "urdfkin.dh",
     "validate": "urdfkin.validation.campaign",
 }
@@ -71,8 +75,10 @@ __all__ = [
     "UrdfkinError",
     "VerificationError",
     "check",
+    "diff",
     "load",
     "read_table",
+    "same",
     "table_from_rows",
     "validate",
 ]

@@ -168,6 +168,15 @@ def of_rows_read_back(rows: int) -> float:
     return 4.0 * of_rows(rows)
 
 
+def of_two_texts(joints: int) -> float:
+    """Of a pose that a text gives by so many joints, between it and another text of the same robot.
+
+    Each joint's constant is rounded by who read it and by who wrote it, its axis by both. Merging fixed
+    joints multiplies their constants and writes the product, which rounds no more than that.
+    """
+    return (CONSTANT + WRITTEN + AXES) * (joints + 1)
+
+
 def of_a_fit(rows: int) -> float:
     """Between a table and the fit of its freedoms to a URDF, which ends a dozen times off what rows round."""
     return 12.5 * of_rows(rows)

@@ -189,19 +189,20 @@ def motion_about_z(values: FloatArray, turns: bool) -> FloatArray:
 def _around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray]:
     """The constants before and after a joint's motion about its own z, in the path's direction."""
     if not joint.kind.has_axis:
-        return (_inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)
+        return (inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)
     align = np.eye(4)
     align[:3, :3] = axis_aligning(-joint.axis if backwards else joint.axis)
     if backwards:
-        return align, align.T @ _inverse(joint.T_parent_joint)
+        return align, align.T @ inverse(joint.T_parent_joint)
     return joint.T_parent_joint @ align, align.T
 
 
-def _inverse(T: FloatArray) -> FloatArray:
-    inverse = np.eye(4)
-    inverse[:3, :3] = T[:3, :3].T
-    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
-    return inverse
+def inverse(T: FloatArray) -> FloatArray:
+    """(4, 4) the pose of the outer frame in the inner one."""
+    back = np.eye(4)
+    back[:3, :3] = T[:3, :3].T
+    back[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return back
 
 
 def _norm(joint: Joint) -> float:

@@ -1,0 +1,487 @@
+"""Two mechanisms laid on each other: what is free is used up, what is left is a difference, joint by joint.
+
+One walk from a body that both have. With G what moves A's home to where B's lies, a joint of A leads to
+exp(S t), the joint of B to exp(S' t'); B's coordinate may count the other way and from another zero (t' and
+its screw are then written in A's), and G changes where B's axis, or what hangs on it, lies elsewhere. So B
+becomes A with a rigid motion L put in before some joints, and some axes exchanged:
+
+    T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H,
+
+with all S'_i = S_i, t'_i = t_i and L_i = 1 where nothing differs. Two models move alike if and only if
+nothing does, but for turns that screws on one line share.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from urdfkin.model.chain import inverse
+from urdfkin.model.tree import FloatArray
+from urdfkin.sameness.mechanism import Edge, Mechanism, Screw, tolerance_of
+from urdfkin.sameness.pairing import Pairing, family
+from urdfkin.sameness.rigid import along, angle_from_to, apart, between, turn_about
+
+IDENTITY = np.eye(4)
+IDENTITY.setflags(write=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """A joint of both models on the way from the base.
+
+    Attributes:
+        a: Joint of A (index in its tree).
+        b: Joint of B.
+        kind: "turns", "prismatic", "planar", "floating".
+        previous: The step before it, -1 for none.
+        sense: +1 or -1, and
+        offset: rad or m: B's value is sense * A's + offset.
+        before: (4, 4) L, put in before the joint, at A's home.
+        axis: A's screw at home, pointing away from the base.
+        other: B's, likewise; `axis` itself where they agree.
+        tilt: Radians by which B's axis is tilted.
+        shift: Metres by which it is off, or, of a planar or floating joint, its frame.
+        unlike: "a" or "b" where the joint is fixed in that model and moves in the other, "kind" where it
+        moves
+            in another way; else "".
+    """
+
+    a: int
+    b: int
+    kind: str
+    previous: int
+    sense: int
+    offset: float
+    before: FloatArray
+    axis: Screw
+    other: Screw
+    tilt: float
+    shift: float
+    unlike: str = ""
+
+    @property
+    def differs(self) -> bool:
+        """Whether its axis does."""
+        return self.tilt > 0.0 or self.shift > 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FramePair:
+    """A link of both models.
+
+    Attributes:
+        a: Link of A.
+        b: Link of B.
+        previous: The step that carries it, -1 for none.
+        home: (4, 4) A's at home.
+        end: (4, 4) L, put in behind the last joint, at A's home.
+        tilt: Radians by which B's is turned on its body.
+        shift: Metres by which it is moved on it.
+        tool: (4, 4) B's in A's frame, where that is taken for another tool and put right.
+    """
+
+    a: int
+    b: int
+    previous: int
+    home: FloatArray
+    end: FloatArray
+    tilt: float
+    shift: float
+    tool: FloatArray = field(default_factory=lambda: IDENTITY)
+
+    def put_right(self) -> FramePair:
+        """The same, B's frame seen as another tool."""
+        tool = inverse(self.home) @ self.end @ self.home
+        return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
+
+    @property
+    def differs(self) -> bool:
+        """Whether it lies elsewhere on its body."""
+        return self.tilt > 0.0 or self.shift > 0.0
+
+
+@dataclass(slots=True)
+class Alignment:
+    """What laying them on each other found.
+
+    Attributes:
+        a: One mechanism.
+        b: The other.
+        base: Links that the walk began at, of A and of B.
+        X: (4, 4) what brings B's root to where it must stand in A's.
+        steps: Joints, each behind the one before it.
+        frames: Links that both have.
+        only_a: Joints that only A has (indices).
+        only_b: Likewise.
+        matched: How many places agree.
+        worst: Metres: the largest disagreement, an angle counted with the robot's size.
+    """
+
+    a: Mechanism
+    b: Mechanism
+    base: tuple[int, int]
+    X: FloatArray
+    steps: list[Step] = field(default_factory=list)
+    frames: list[FramePair] = field(default_factory=list)
+    only_a: list[int] = field(default_factory=list)
+    only_b: list[int] = field(default_factory=list)
+    matched: int = 0
+    worst: float = 0.0
+
+    def indices(self, previous: int) -> list[int]:
+        """The steps from the base to one of them, itself too."""
+        found = []
+        while previous >= 0:
+            found.append(previous)
+            previous = self.steps[previous].previous
+        return found[::-1]
+
+    def path(self, previous: int) -> list[Step]:
+        """The same as steps."""
+        return [self.steps[i] for i in self.indices(previous)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Place:
+    """Where the walk stands: two bodies, how they were reached, what moves either home there."""
+
+    bodies: tuple[int, int]
+    came: tuple[Edge | None, Edge | None]
+    previous: int
+    G: FloatArray
+    XC: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gauge:
+    """What is free, taken as given: where B's root stands, each joint's sense and zero.
+
+    Attributes:
+        base: Links of A and of B on the bodies where the walk begins; None: by names.
+        X: (4, 4) B's root in A's.
+        zeros: Of joints of A that are not (1, 0.0).
+    """
+
+    base: tuple[str, str] | None = None
+    X: FloatArray = field(default_factory=lambda: IDENTITY)
+    zeros: Mapping[str, tuple[int, float]] = field(default_factory=dict)
+
+
+#: B as it is written: root on root, each coordinate the same number.
+AS_WRITTEN = Gauge()
+
+
+def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | None = None) -> Alignment:
+    """Lay B on A.
+
+    Args:
+        a: One.
+        b: The other.
+        given: Joints of A and their names in B.
+        gauge: What is free; None: whatever makes most agree.
+    """
+    walk = _Walk(a, b, Pairing(a, b, given), gauge)
+    best: Alignment | None = None
+    for base, X in walk.beginnings():
+        found = walk.run(base, X)
+        if best is None or _better((found.matched, found.worst), (best.matched, best.worst)):
+            best = found
+        if not best.worst:
+            break
+    assert best is not None
+    return best
+
+
+class _Walk:
+    def __init__(self, a: Mechanism, b: Mechanism, pairing: Pairing, gauge: Gauge | None) -> None:
+        self.a, self.b, self.pairing, self.gauge = a, b, pairing, gauge
+        self.tolerance = tolerance_of(a, b)
+        self.size = max(a.size, b.size, 1e-9)
+
+    # -- where to begin ------------------------------------------------------------------------------
+
+    def beginnings(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
+        """Bodies that both have and where B's root may stand, the likeliest first."""
+        if self.gauge is not None:
+            names = self.gauge.base
+            base = next(self._bases()) if names is None else self._bodies_of(*names)
+            yield base, self.gauge.X
+            return
+        for base in self._bases():
+            yield base, IDENTITY
+            for link_a, link_b in self.pairing.links(*base):
+                X = self.a.homes[link_a] @ inverse(self.b.homes[link_b])
+                if not self.tolerance.holds(*apart(IDENTITY, X)):
+                    yield base, X
+            yield from ((base, X) for X in self._by_axes(base))
+
+    def _bodies_of(self, link_a: str, link_b: str) -> tuple[int, int]:
+        a, b = self.a, self.b
+        return a.body_of[a.tree.link_index(link_a)], b.body_of[b.tree.link_index(link_b)]
+
+    def _bases(self) -> Iterator[tuple[int, int]]:
+        """A's root body with the body of B that has most of its links, or with any of B's."""
+        ours = {self.a.tree.links[link] for link in self.a.bodies[0]}
+        shared = [len(ours & {self.b.tree.links[k] for k in body}) for body in self.b.bodies]
+        if any(shared):
+            yield 0, max(range(len(shared)), key=shared.__getitem__)
+            return
+        yield from ((0, body) for body in range(len(self.b.bodies)))
+
+    def _by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
+        """Where the first two axes of B that are not parallel come to lie on A's."""
+        ours = next(_axis_frames(self.a, base[0]), None)
+        if ours is not None:
+            for theirs in _axis_frames(self.b, base[1]):
+                for flips in ((1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, -1.0, 1.0), (-1.0, 1.0, -1.0)):
+                    yield ours @ np.diag([*flips, 1.0]) @ inverse(theirs)
+
+    # -- the walk ------------------------------------------------------------------------------------
+
+    def run(self, base: tuple[int, int], X: FloatArray) -> Alignment:
+        found = Alignment(self.a, self.b, (self.a.bodies[base[0]][0], self.b.bodies[base[1]][0]), X)
+        stack = [_Place(base, (None, None), -1, IDENTITY, X)]
+        while stack:
+            place = stack.pop()
+            self._frames(place, found)
+            pairs, only_a, only_b = self.pairing.edges(place.bodies, place.came, place.G, place.XC)
+            found.only_a += _all_beyond(self.a, place.bodies[0], only_a)
+            found.only_b += _all_beyond(self.b, place.bodies[1], only_b)
+            for e, f in pairs:
+                stack.append(self._step(place, e, f, found))
+        return found
+
+    def _frames(self, place: _Place, found: Alignment) -> None:
+        for link_a, link_b in self._all_links(place):
+            home = self.a.homes[link_a]
+            at, seen = place.G @ home, place.XC @ self.b.homes[link_b]
+            angle, way = apart(at, seen)
+            end = IDENTITY
+            if self.tolerance.holds(angle, way):
+                angle = way = 0.0
+                found.matched += 1
+            else:
+                end = inverse(place.G) @ seen @ inverse(home)
+                found.worst = max(found.worst, angle * self.size + way)
+            found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, way))
+
+    def _all_links(self, place: _Place) -> list[tuple[int, int]]:
+        """Links of one name, then those that stand in one place under names that the other has not."""
+        pairs = self.pairing.links(*place.bodies)
+        taken = {j for _, j in pairs}
+        names_a, names_b = self.a.tree.links, self.b.tree.links
+        others = [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
+        for i in self.a.bodies[place.bodies[0]]:
+            if names_a[i] not in names_b:
+                at = place.G @ self.a.homes[i]
+                for j in others:
+                    if j not in taken and self.tolerance.holds(*apart(at, place.XC @ self.b.homes[j])):
+                        pairs.append((i, j))
+                        taken.add(j)
+                        break
+        return pairs
+
+    def _step(self, place: _Place, e: Edge, f: Edge, found: Alignment) -> _Place:
+        """Add the step that a pair of joints makes; where it leads."""
+        kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
+        came = e, f
+        backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
+        bodies = e.beyond(place.bodies[0]), f.beyond(place.bodies[1])
+        there = _Place(bodies, came, len(found.steps), place.G, place.XC)
+        if kinds[0] != kinds[1]:
+            step = self._unlike(place, came, kinds, backwards)
+        elif kinds[0] in ("turns", "prismatic"):
+            step, there = self._like(place, there, backwards, turns=kinds[0] == "turns")
+        else:
+            step, there = self._free(place, there, backwards, kinds[0])
+        found.steps.append(step)
+        if step.differs:
+            found.worst = max(found.worst, step.tilt * self.size + step.shift)
+        elif not step.unlike:
+            found.matched += 1
+        return there
+
+    def _unlike(
+        self, place: _Place, came: tuple[Edge, Edge], kinds: tuple[str, str], backwards: tuple[bool, bool]
+    ) -> Step:
+        """A joint fixed in one model, or of another kind: what hangs on it shows by how much."""
+        unlike = {kinds[0]: "a", kinds[1]: "b"}.get("fixed", "kind")
+        if unlike == "a":
+            axis = _outwards(self.b.screw(came[1]), backwards[1]).moved(inverse(place.G) @ place.XC)
+        else:
+            axis = _outwards(self.a.screw(came[0]), backwards[0])
+        kind = kinds[1] if unlike == "a" else kinds[0]
+        return Step(
+            came[0].joint, came[1].joint, kind, place.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0, unlike
+        )
+
+    def _free(
+        self, place: _Place, there: _Place, backwards: tuple[bool, bool], kind: str
+    ) -> tuple[Step, _Place]:
+        """A planar or floating joint: its frame is taken as it is."""
+        e, f = _both(there.came)
+        at, seen = place.G @ self.a.homes[e.joint + 1], place.XC @ self.b.homes[f.joint + 1]
+        angle, way = apart(at, seen)
+        K = IDENTITY
+        if self.tolerance.holds(angle, way):
+            angle = way = 0.0
+        else:
+            K = seen @ inverse(at)
+        axis = Screw(self.a.homes[e.joint + 1][:3, 2], self.a.homes[e.joint + 1][:3, 3])
+        unlike = "kind" if backwards[0] != backwards[1] else ""
+        before = inverse(place.G) @ K @ place.G if K is not IDENTITY else IDENTITY
+        step = Step(
+            e.joint, f.joint, kind, place.previous, 1, 0.0, before, axis, axis, angle, way, unlike
+        )  # fmt: skip
+        G = K @ place.G if K is not IDENTITY else place.G
+        return step, _Place(there.bodies, there.came, there.previous, G, place.XC)
+
+    def _like(
+        self, place: _Place, there: _Place, backwards: tuple[bool, bool], *, turns: bool
+    ) -> tuple[Step, _Place]:
+        """A joint that turns, or slides, in both: sense, zero, and what makes its axis the other's."""
+        e, f = _both(there.came)
+        s = _outwards(self.a.screw(e), backwards[0])
+        t = _outwards(self.b.screw(f), backwards[1])
+        start, end = s.moved(place.G), t.moved(place.XC)
+        sense, zero = self._given(self.a.joint(e).name)
+        sense = sense or (-1 if start.direction @ end.direction < 0.0 else 1)
+        if sense < 0:
+            end = end.reversed()
+        K, tilt, shift = between(start, end, turns=turns)
+        back = inverse(place.G)
+        kind, (a, b) = "turns" if turns else "prismatic", (e.joint, f.joint)
+        if self.tolerance.holds(tilt, shift):
+            offset, there, _ = self._best_zero(there, place.G, t, turns, zero)
+            return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there
+        # What hangs on the joint has moved with its axis, or its axis alone is another.
+        with_it = self._best_zero(there, K @ place.G, t, turns, zero)
+        alone = self._best_zero(there, place.G, t, turns, zero)
+        if _better(alone[2], with_it[2]):
+            other = end.moved(back)
+            step = Step(a, b, kind, place.previous, sense, alone[0], IDENTITY, s, other, tilt, shift)
+            return step, alone[1]
+        before = back @ K @ place.G
+        return Step(a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift), with_it[1]
+
+    # -- a joint's zero ------------------------------------------------------------------------------
+
+    def _given(self, joint: str) -> tuple[int, float | None]:
+        """Its sense and zero; 0 and None where they are free."""
+        return (0, None) if self.gauge is None else self.gauge.zeros.get(joint, (1, 0.0))
+
+    def _best_zero(
+        self, there: _Place, G: FloatArray, t: Screw, turns: bool, zero: float | None
+    ) -> tuple[float, _Place, tuple[int, float]]:
+        """The offset of B's joint with which most of what follows agrees; 0 has the first word."""
+        best: tuple[float, _Place, tuple[int, float]] | None = None
+        for offset in self._offsets(there, G, t, turns) if zero is None else (zero,):
+            XC = there.XC @ along(t, offset, turns=turns) if offset else there.XC
+            place = _Place(there.bodies, there.came, there.previous, G, XC)
+            score = self._score(place)
+            if best is None or _better(score, best[2]):
+                best = offset, place, score
+            if not score[1]:
+                break
+        assert best is not None
+        return best
+
+    def _score(self, place: _Place) -> tuple[int, float]:
+        """How many of the links and axes at a place agree, and the largest disagreement (m)."""
+        off = [
+            apart(place.G @ self.a.homes[i], place.XC @ self.b.homes[j])
+            for i, j in self.pairing.links(*place.bodies)
+        ]
+        pairs, _, _ = self.pairing.edges(place.bodies, place.came, place.G, place.XC)
+        off += [self.pairing.mismatch(e, f, place.G, place.XC) for e, f in pairs]
+        wrong = [angle * self.size + way for angle, way in off if not self.tolerance.holds(angle, way)]
+        return len(off) - len(wrong), max(wrong, default=0.0)
+
+    def _offsets(self, there: _Place, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
+        """Zeros of B's joint to try: none, and those with which one thing behind it agrees."""
+        yield 0.0
+        u = t.moved(there.XC)
+        for i, j in self.pairing.links(*there.bodies):
+            at, seen = G @ self.a.homes[i], there.XC @ self.b.homes[j]
+            if turns:
+                yield turn_about(u.direction, at[:3, :3] @ seen[:3, :3].T)
+            else:
+                yield float(u.direction @ (at[:3, 3] - seen[:3, 3]))
+        pairs, _, _ = self.pairing.edges(there.bodies, there.came, G, there.XC)
+        ours = [e for e in self.a.edges_of[there.bodies[0]] if e is not there.came[0]]
+        theirs = [f for f in self.b.edges_of[there.bodies[1]] if f is not there.came[1]]
+        for e, f in [*pairs, *((e, f) for e in ours for f in theirs)]:
+            if self.a.joint(e).kind.has_axis and self.b.joint(f).kind.has_axis:
+                yield from _zeros(u, self.a.screw(e).moved(G), self.b.screw(f).moved(there.XC), turns)
+
+
+def _zeros(u: Screw, ours: Screw, theirs: Screw, turns: bool) -> Iterator[float]:
+    """By how much theirs must be turned about u, or slid along it, to lie as ours does."""
+    if not turns:
+        across = u.direction - ours.direction * (ours.direction @ u.direction)
+        if across @ across > 1e-6:  # a guess to be tried, not a result
+            yield float(across @ (ours.point - theirs.point) / (across @ across))
+        return
+    guesses = angle_from_to(u.direction, theirs.direction, ours.direction)
+    if guesses is not None:
+        yield guesses
+        yield math.remainder(guesses + math.pi, 2.0 * math.pi)
+    feet = [
+        line.point - line.direction * (line.direction @ (line.point - u.point)) for line in (theirs, ours)
+    ]
+    guesses = angle_from_to(u.direction, feet[0] - u.point, feet[1] - u.point)
+    if guesses is not None:
+        yield guesses
+
+
+def _better(score: tuple[int, float], than: tuple[int, float]) -> bool:
+    """Whether more agrees, or as much and the rest twice as well."""
+    return score[0] > than[0] or (score[0] == than[0] and score[1] < 0.5 * than[1])
+
+
+def _outwards(screw: Screw, backwards: bool) -> Screw:
+    """A joint's screw as it moves what is behind it on the walk, by the joint's own value."""
+    return screw.reversed() if backwards else screw
+
+
+def _both(came: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
+    e, f = came
+    assert e is not None
+    assert f is not None
+    return e, f
+
+
+def _all_beyond(mechanism: Mechanism, body: int, edges: list[Edge]) -> list[int]:
+    """Some joints at a body and all behind them."""
+    found, stack = [], [(body, edge) for edge in edges]
+    while stack:
+        here, edge = stack.pop()
+        found.append(edge.joint)
+        beyond = edge.beyond(here)
+        stack += [(beyond, other) for other in mechanism.edges_of[beyond] if other is not edge]
+    return found
+
+
+def _axis_frames(mechanism: Mechanism, body: int) -> Iterator[FloatArray]:
+    """Frames on the first axis at a body with x across to the next that is not parallel: one for each way."""
+    for first in mechanism.edges_of[body]:
+        for second in mechanism.edges_of[first.beyond(body)]:
+            if second is first or not all(mechanism.joint(k).kind.has_axis for k in (first, second)):
+                continue
+            s, t = mechanism.screw(first), mechanism.screw(second)
+            x = np.cross(s.direction, t.direction)
+            sine = float(np.linalg.norm(x))
+            if sine < 1e-3:  # too parallel to begin with
+                continue
+            x = x / sine
+            T = np.eye(4)
+            T[:3, :3] = np.stack((x, np.cross(s.direction, x), s.direction), axis=1)
+            # The foot of the common normal on the first axis.
+            way = t.point - s.point
+            along_first = float(np.cross(way, t.direction) @ x) / sine
+            T[:3, 3] = s.point + s.direction * along_first
+            yield T

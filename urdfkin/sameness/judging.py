@@ -1,0 +1,249 @@
+"""`same`: are these two models the same robot? The verdict, and what it rests on."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator, Mapping
+from copy import copy
+
+import numpy as np
+
+from urdfkin.dh.table import DHTable
+from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.loading import load
+from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.robot import Robot
+from urdfkin.sameness.alignment import AS_WRITTEN, Alignment, FramePair, align
+from urdfkin.sameness.lower import Search, pinocchios, urdfkins
+from urdfkin.sameness.mechanism import Mechanism, Tolerance, tolerance_of
+from urdfkin.sameness.result import Interval, JointMap, Sameness, Verdict, demand_joint_names
+from urdfkin.sameness.rigid import apart
+from urdfkin.sameness.upper import FINE, upper_bounds
+from urdfkin.sameness.variables import Variables, variables_of
+from urdfkin.sameness.wording import differences, put_right, remarks
+from urdfkin.urdf.sources import Source
+from urdfkin.verify.choosing import checked_choice
+from urdfkin.verify.pinocchio import version
+
+#: Configurations at which Pinocchio confirms both robots.
+CONFIRMED = 8
+#: Frames that are far off at random configurations, one of which is the farthest.
+FARTHEST = 4
+
+
+def same(
+    a: Robot | Source | DHTable,
+    b: Robot | Source | DHTable,
+    *,
+    map: Mapping[str, str] | None = None,
+    bounds: bool = True,
+) -> Sameness:
+    """Whether two models move alike in every configuration, proven.
+
+    By the product of exponentials T(q) = exp(S_1 q_1) ... exp(S_n q_n) H, a link's motion is fixed by the
+    joints' screws S_i and its pose H at home. Two models move alike for all q if these agree, up to what may
+    differ: where the base stands, which fixed links there are, each joint's zero and sense, names, the order
+    of coordinates, frames that only are there to be looked at.
+
+    Args:
+        a: A robot, or what `load` takes.
+        b: Likewise.
+        map: Joints of `a` and what they are called in `b`, where names and places do not tell.
+        bounds: Whether the largest distances are bounded, which takes longest where models differ.
+
+    Returns:
+        The verdict with the map that it found, the first difference, and for every frame an interval in
+        which its largest distance over all configurations within limits lies.
+
+    Raises:
+        UrdfError: a model with errors; SourceError, UnknownNameError, InputError: as `load`.
+
+    Example:
+        >>> import urdfkin
+        >>> found = urdfkin.same("ur5", "ur5_limited")
+        >>> found.verdict.value, len(found.remarks)
+        ('same', 6)
+        >>> found = urdfkin.same("talos", "talos_reduced_corrected")
+        >>> bool(found)
+        False
+    """
+    robots = _robot(a), _robot(b)
+    given = dict(map or {})
+    for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
+        demand_joint_names(robot.tree, names, which)
+    # Copies, whose accounts are their own: what is computed here nobody was handed.
+    return Judge((copy(robots[0]), copy(robots[1])), given, bounds).judged()
+
+
+def _robot(source: Robot | Source | DHTable) -> Robot:
+    return source if isinstance(source, Robot) else load(source)
+
+
+class Judge:
+    """Two robots on their way to a verdict."""
+
+    def __init__(self, robots: tuple[Robot, Robot], given: dict[str, str], bounds: bool) -> None:
+        self.robots, self.given, self.bounds = robots, given, bounds
+        trees = robots[0].tree, robots[1].tree
+        parting = _fixed_here(trees[0], trees[1]), _fixed_here(trees[1], trees[0])
+        self.mechanisms = Mechanism(trees[0], parting[0]), Mechanism(trees[1], parting[1])
+        self.trees = trees
+        self.tolerance: Tolerance = tolerance_of(*self.mechanisms)
+
+    def judged(self) -> Sameness:
+        """The verdict."""
+        found = align(*self.mechanisms, self.given)
+        variables = variables_of(found, self.tolerance)
+        after = put_right(found, self.tolerance)
+        wrong = differences(found, variables)
+        verdict = Verdict.DIFFERS if wrong else Verdict.SAME_AFTER if after else Verdict.SAME
+        frames = self._intervals(found, variables)
+        as_written = None
+        if after and self.bounds:
+            written = align(*self.mechanisms, self._map(found), AS_WRITTEN)
+            as_written = self._farthest(written, variables_of(written, self.tolerance))
+        return Sameness(
+            names=(self.robots[0].name, self.robots[1].name),
+            sources=(self.robots[0].source, self.robots[1].source),
+            digests=(digest(self.robots[0]), digest(self.robots[1])),
+            verdict=verdict,
+            after=after,
+            differences=wrong,
+            remarks=remarks(found, variables, self.tolerance),
+            joints=tuple(
+                JointMap(self.trees[0].joints[s.a].name, self.trees[1].joints[s.b].name, s.sense, s.offset)
+                for s in found.steps
+            ),
+            links=tuple((self.trees[0].links[f.a], self.trees[1].links[f.b]) for f in found.frames),
+            base=found.X,
+            base_links=(self.trees[0].links[found.base[0]], self.trees[1].links[found.base[1]]),
+            rounding=self.rounding(found, variables),
+            frames=frames,
+            as_written=as_written,
+            checked=self._confirmed(found, variables, frames),
+            trees=self.trees,
+        )
+
+    def search(self, found: Alignment, variables: Variables) -> Search:
+        """What looks for the largest distances."""
+        return Search(self.robots, found, variables)
+
+    def _map(self, found: Alignment) -> dict[str, str]:
+        return {self.trees[0].joints[s.a].name: self.trees[1].joints[s.b].name for s in found.steps}
+
+    def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
+        """What everything that was taken for rounding can do together: each step's share, in turn."""
+        ways = [
+            max(abs(end) for end in ends)
+            for step, pair in zip(found.steps, variables.pairs, strict=True)
+            if pair is not None and step.kind == "prismatic"
+            if math.isfinite(sum(ends := variables.range(pair.a)))
+        ]
+        reach = max(self.mechanisms[0].size, self.mechanisms[1].size) + sum(ways)
+        deepest = 1 + max((len(found.path(i)) for i in range(len(found.steps))), default=0)
+        return deepest * (self.tolerance.way + self.tolerance.angle * reach), deepest * self.tolerance.angle
+
+    def _intervals(self, found: Alignment, variables: Variables) -> tuple[Interval, ...]:
+        frames = found.frames
+        metres, radians = self.rounding(found, variables)
+        if not self.bounds:
+            return ()
+        uppers = [upper_bounds(found, variables, frame) for frame in frames]
+        off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
+        fine = set[int]()
+        while off and (widest := max(off, key=lambda k: uppers[k])) not in fine:
+            uppers[widest] = upper_bounds(found, variables, frames[widest], FINE)
+            fine.add(widest)
+        search = self.search(found, variables)
+        seen = dict(zip(off, search.worst([frames[k] for k in off]), strict=True)) if off else {}
+        return tuple(
+            self._interval(found, frame, search, seen.get(k), (uppers[k][0] + metres, uppers[k][1] + radians))
+            for k, frame in enumerate(frames)
+        )
+
+    def _farthest(self, found: Alignment, variables: Variables) -> Interval | None:
+        """The interval of the frame that a search finds farthest."""
+        if not found.frames:
+            return None
+        metres, radians = self.rounding(found, variables)
+        search = self.search(found, variables)
+        off = search.seen(found.frames)[0].max(axis=0)
+        far = [found.frames[k] for k in np.argsort(-off, kind="stable")[:FARTHEST]]
+        if off.max() <= metres:  # nothing is moved: the one that is turned most
+            far = [max(found.frames, key=lambda frame: upper_bounds(found, variables, frame)[1])]
+        climbed = zip(search.worst(far), far, strict=True)
+        seen, frame = max(climbed, key=lambda both: both[0][0])
+        upper = upper_bounds(found, variables, frame, FINE)
+        return self._interval(found, frame, search, seen, (upper[0] + metres, upper[1] + radians))
+
+    def _interval(
+        self,
+        found: Alignment,
+        frame: FramePair,
+        search: Search,
+        seen: tuple[float, FloatArray] | None,
+        upper: tuple[float, float],
+    ) -> Interval:
+        names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
+        if seen is None:
+            return Interval(*names, 0.0, *upper, 0.0, (), ())
+        metres, z = seen
+        poses = search.poses(z[np.newaxis], [frame], urdfkins)
+        turned = apart(poses[0][0, 0], poses[1][0, 0])[0]
+        q_a, q_b = search.configurations(z[np.newaxis])
+        lower = max(0.0, metres - self.rounding(found, search.variables)[0])
+        return Interval(*names, lower, *upper, turned, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
+
+    def _confirmed(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> str:
+        """Pinocchio, which reads both texts itself, at some configurations: no frame may break its bound."""
+        if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
+            return "not asked of Pinocchio: loaded with verify=False"
+        for robot in self.robots:
+            if (reason := robot.verifier.cannot()) is not None:
+                return f"not verified by Pinocchio: {reason}"
+        search = self.search(found, variables)
+        off = search.metres(search.random(CONFIRMED), found.frames, pinocchios).max(axis=0, initial=0.0)
+        for interval, metres in zip(frames, off, strict=False):
+            if metres > interval.upper * (1.0 + EPS):
+                raise UrdfkinError(
+                    "Pinocchio finds a distance beyond its proven bound",
+                    where=f"frame {interval.frame}",
+                    found=f"{metres:.6g} m, bound {interval.upper:.6g} m",
+                    remedy="please report this as an error of urdfkin, with both robots",
+                )
+        seen = f"{off.max(initial=0.0):.2g} m"
+        return f"Pinocchio {version()} finds at most {seen} at {CONFIRMED} configurations, within the bounds"
+
+
+def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
+    """Fixed joints of a tree whose namesakes, or whose child link's joints, move in the other."""
+    moving = {joint.name for joint in other.joints if joint.kind.nv}
+    ours = {joint.name for joint in tree.joints if joint.kind.nv}
+    children = {
+        other.links[i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv and joint.name not in ours
+    }
+    return {
+        i
+        for i, joint in enumerate(tree.joints)
+        if not joint.kind.nv and (joint.name in moving or tree.links[i + 1] in children)
+    }
+
+
+def digest(robot: Robot) -> str:
+    """SHA-256 of a robot's text."""
+    return hashlib.sha256(robot.urdf.encode()).hexdigest()
+
+
+def parse_map(words: tuple[str, ...]) -> dict[str, str]:
+    """NAME=NAME, several; raises InputError for what is none."""
+    return dict(_pairs(words))
+
+
+def _pairs(words: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+    for word in words:
+        ours, equals, theirs = word.partition("=")
+        if not equals or not ours or not theirs:
+            raise InputError("a pair of joints is JOINT_OF_A=JOINT_OF_B", where="--map", found=repr(word))
+        yield ours, theirs

@@ -1,0 +1,131 @@
+"""A robot as what its motion is fixed by: rigid bodies, and between them joints with their screws at home.
+
+By the product of exponentials a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H, with the unit screws S_i and
+the pose H as they are where every joint's value is zero, all seen from one place. No link between the joints
+enters it, so that fixed links may be merged or split; and nothing in it says which body is the root: seen
+from another body, what lies on the way is passed backwards, with its screw reversed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from urdfkin.kinematics.roundings import EPS, of_two_texts
+from urdfkin.model.tree import FloatArray, Joint, KinematicTree
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Screw:
+    """A joint's axis as a line that points: a unit direction through a point."""
+
+    direction: FloatArray
+    point: FloatArray
+
+    def moved(self, T: FloatArray) -> Screw:
+        """The screw after a rigid motion."""
+        return Screw(T[:3, :3] @ self.direction, T[:3, :3] @ self.point + T[:3, 3])
+
+    def reversed(self) -> Screw:
+        """The same line, pointing the other way."""
+        return Screw(-self.direction, self.point)
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A joint between two bodies.
+
+    Attributes:
+        joint: Its index in the tree.
+        inner: The body that carries it.
+        outer: The body that it moves.
+    """
+
+    joint: int
+    inner: int
+    outer: int
+
+    def beyond(self, body: int) -> int:
+        """The body at the other end."""
+        return self.outer if body == self.inner else self.inner
+
+
+class Mechanism:
+    """Bodies and joints of a tree at home, where every joint's value is zero.
+
+    Args:
+        tree: The robot.
+        parting: Fixed joints (indices) that count as joints all the same, since another model's move there.
+    """
+
+    def __init__(self, tree: KinematicTree, parting: Collection[int] = ()) -> None:
+        self.tree = tree
+        homes, body, edges, bodies = [np.eye(4)], [0], list[Edge](), [[0]]
+        lengths, depths = [0.0], [0]
+        for i, joint in enumerate(tree.joints):
+            homes.append(homes[joint.parent] @ joint.T_parent_joint)
+            lengths.append(lengths[joint.parent] + float(np.linalg.norm(joint.T_parent_joint[:3, 3])))
+            depths.append(depths[joint.parent] + 1)
+            if joint.kind.nv or i in parting:
+                body.append(len(bodies))
+                edges.append(Edge(i, body[joint.parent], len(bodies)))
+                bodies.append([i + 1])
+            else:
+                body.append(body[joint.parent])
+                bodies[body[-1]].append(i + 1)
+        self.homes, self.body_of, self.edges = homes, body, edges
+        self.bodies = bodies
+        #: How far (m) the way from the root to each link is, and how many joints it passes, fixed ones too.
+        self.lengths, self.depths = lengths, depths
+
+    def joint(self, edge: Edge) -> Joint:
+        """What the tree says of it."""
+        return self.tree.joints[edge.joint]
+
+    def screw(self, edge: Edge) -> Screw:
+        """Of a joint that turns or slides, at home, seen from the root."""
+        T = self.homes[edge.joint + 1]
+        return Screw(T[:3, :3] @ self.joint(edge).axis, T[:3, 3])
+
+    @cached_property
+    def edges_of(self) -> list[list[Edge]]:
+        """The joints at each body."""
+        found: list[list[Edge]] = [[] for _ in self.bodies]
+        for edge in self.edges:
+            found[edge.inner].append(edge)
+            found[edge.outer].append(edge)
+        return found
+
+    @cached_property
+    def size(self) -> float:
+        """Metres: the longest way from the root to a link, the scale of its lengths."""
+        return max(self.lengths)
+
+    @cached_property
+    def rounding(self) -> float:
+        """By how much (rad, and as a share of `size`) what is read from a text may be off, for all links.
+
+        Pinocchio turns about some axes that are tilted by as little (URDF514).
+        """
+        return EPS * of_two_texts(max(self.depths)) + 2.0 * sum(joint.tilt for joint in self.tree.joints)
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """What of an angle (rad) and of a way (m) is rounding."""
+
+    angle: float
+    way: float
+
+    def holds(self, angle: float, way: float) -> bool:
+        """Whether both are."""
+        return angle <= self.angle and way <= self.way
+
+
+def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
+    """What two texts of one robot may differ by."""
+    k = a.rounding + b.rounding
+    return Tolerance(k, k * max(a.size, b.size, 1e-9))

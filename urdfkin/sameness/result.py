@@ -1,0 +1,234 @@
+"""What was found out about two models: the verdict, what it rests on, and how to use it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.errors import InputError
+from urdfkin.model.configuration import checked, neutral
+from urdfkin.model.tree import FloatArray, KinematicTree
+
+
+class Verdict(Enum):
+    """How two models move."""
+
+    SAME = "same"
+    SAME_AFTER = "same after"
+    DIFFERS = "differs"
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A frame's largest distance over all configurations within limits lies in here.
+
+    Attributes:
+        frame: Link of A, and
+        frame_b: of B.
+        lower: Metres, attained at `q_a` and `q_b`.
+        upper: Metres, proven; inf where nothing bounds it.
+        radians: What its orientations differ by at most, proven.
+        radians_seen: What they do differ by somewhere.
+        q_a: Configuration of A.
+        q_b: The one of B that belongs to it.
+    """
+
+    frame: str
+    frame_b: str
+    lower: float
+    upper: float
+    radians: float
+    radians_seen: float
+    q_a: tuple[float, ...]
+    q_b: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One place where two models differ.
+
+    Attributes:
+        place: The joint or link of A, "joint elbow".
+        what: The parameter in words, without the size: "axis", "origin", "mimic rule", "only in A", ...
+        words: All of it in a line.
+        radians: By how much, 0 where that says nothing.
+        metres: Likewise.
+    """
+
+    place: str
+    what: str
+    words: str
+    radians: float = 0.0
+    metres: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class JointMap:
+    """A joint of A and what it is in B: value_b = sense * value_a + offset (rad, m).
+
+    `sense` and `offset` are those of the joints' values; a planar or floating joint has 1 and 0.
+    """
+
+    a: str
+    b: str
+    sense: int
+    offset: float
+
+    @property
+    def changed(self) -> bool:
+        """Whether the value is another."""
+        return self.sense < 0 or self.offset != 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sameness:
+    """Whether two models are one robot; make one with `urdfkin.same`.
+
+    Attributes:
+        names: The robots' names.
+        sources: What was given.
+        digests: SHA-256 of the two texts.
+        verdict: `Verdict.SAME`, `SAME_AFTER` what `after` says, or `DIFFERS`.
+        after: What has to be done for them to agree, a line each; also where they differ even then.
+        differences: Where they do differ, from the base outwards; the first is the first place.
+        remarks: What is no matter of where things move: limits, kinds, links that only one has.
+        joints: Joints of A and of B that are each other's.
+        links: Likewise.
+        base: (4, 4) pose of B's root in A's root frame, at home; the identity where both stand alike.
+        base_links: The link of A, and the one of B on the same body, that both are seen from.
+        rounding: (m, rad) that frames may lie apart where nothing is said to differ.
+        frames: Of each link that both have, after what `after` says.
+        as_written: The same without it: of the frame that is then farthest; None where nothing has to be
+        done.
+        checked: What Pinocchio confirmed, or why it did not.
+    """
+
+    names: tuple[str, str]
+    sources: tuple[str, str]
+    digests: tuple[str, str]
+    verdict: Verdict
+    after: tuple[str, ...]
+    differences: tuple[Difference, ...]
+    remarks: tuple[Difference, ...]
+    joints: tuple[JointMap, ...]
+    links: tuple[tuple[str, str], ...]
+    base: FloatArray
+    base_links: tuple[str, str]
+    rounding: tuple[float, float]
+    frames: tuple[Interval, ...]
+    as_written: Interval | None
+    checked: str
+    trees: tuple[KinematicTree, KinematicTree]
+
+    def __bool__(self) -> bool:
+        """Whether they are the same, if need be after `after`."""
+        return self.verdict is not Verdict.DIFFERS
+
+    def __repr__(self) -> str:
+        return f"<Sameness {self.names[0]}, {self.names[1]}: {self.verdict.value}>"
+
+    @property
+    def worst(self) -> Interval | None:
+        """The frame whose distance may be largest; None where none is further apart than rounding."""
+        return max(
+            (frame for frame in self.frames if frame.lower > 0.0 or frame.upper > self.rounding[0]),
+            key=lambda frame: (frame.upper, frame.lower),
+            default=None,
+        )
+
+    @property
+    def worst_as_written(self) -> Interval | None:
+        """The same at equal coordinates, with nothing put right."""
+        return self.as_written or self.worst
+
+    def within(self, most: float) -> bool:
+        """Whether every link of either is one of both, and none is ever off by more, m and rad: proven.
+
+        It is for models whose files keep fewer digits than a double, which do differ, and do not matter.
+        """
+        moved = {one.what for one in self.differences} - {"axis", "place", "frame", "mimic rule", "fixed"}
+        return not moved and all(max(frame.upper, frame.radians) <= most for frame in self.frames)
+
+    def exit_code(self, *, strict: bool = False, within: float | None = None) -> int:
+        """0: the same, or after what is said, unless that is not wanted either; 1: they differ.
+
+        Args:
+            strict: Whether what has to be done, and remarks, count as differences.
+            within: Metres and radians by which they may differ, proven.
+        """
+        if self.verdict is Verdict.DIFFERS and not (within is not None and self.within(within)):
+            return 1
+        return int(strict and (self.verdict is Verdict.SAME_AFTER or bool(self.remarks)))
+
+    def to_b(self, q: ArrayLike) -> FloatArray:
+        """(..., nq) of B for A's configurations (..., nq): there both stand alike, but for `base`.
+
+        Coordinates that only B has are neutral.
+
+        Raises:
+            InputError: another length than A's.
+        """
+        return _mapped(self.trees, {one.a: one for one in self.joints}, checked(self.trees[0], q, "q"))
+
+
+def _mapped(
+    trees: tuple[KinematicTree, KinematicTree], joints: dict[str, JointMap], q: FloatArray
+) -> FloatArray:
+    tree_a, tree_b = trees
+    out = np.broadcast_to(neutral(tree_b), (*q.shape[:-1], tree_b.nq)).copy()
+    for i, joint in enumerate(tree_a.joints):
+        one = joints.get(joint.name)
+        if one is None:
+            continue
+        j = tree_b.joint_index(one.b)
+        theirs = tree_b.joints[j]
+        if theirs.mimic is not None or joint.kind.nq != theirs.kind.nq:
+            continue
+        at_a, at_b, n = tree_a.q_index[i], tree_b.q_index[j], joint.kind.nq
+        own = q[..., at_a : at_a + n]
+        if joint.mimic is not None:
+            own = joint.mimic.multiplier * own + joint.mimic.offset
+        out[..., at_b : at_b + n] = own if n != 1 else one.sense * own + one.offset
+    return out
+
+
+def length(metres: float) -> str:
+    """A length as people read it.
+
+    >>> length(0.0019), length(2e-9), length(1.5), length(math.inf)
+    ('1.9 mm', '2 nm', '1.5 m', 'without bound')
+    """
+    return _with_prefix(metres, "m")
+
+
+def angle(radians: float) -> str:
+    """Likewise.
+
+    >>> angle(0.0003), angle(1.5)
+    ('0.3 mrad', '1.5 rad')
+    """
+    return _with_prefix(radians, "rad")
+
+
+def _with_prefix(value: float, unit: str) -> str:
+    if math.isinf(value):
+        return "without bound"
+    if value == 0.0:
+        return f"0 {unit}"
+    for prefix, factor in (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9), ("p", 1e12)):
+        if abs(value) * factor >= 0.9995e-1 * (1.0 if prefix else 9.0):
+            return f"{value * factor:.4g} {prefix}{unit}"
+    return f"{value:.2g} {unit}"
+
+
+def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> None:
+    """Raise UnknownNameError for a name that no joint has, InputError for one given twice."""
+    for name in names:
+        tree.joint_index(name)
+    if len(set(names)) < len(names):
+        double = next(name for i, name in enumerate(names) if name in names[:i])
+        raise InputError(f"a joint of {which} is given twice", where="map", found=repr(double))

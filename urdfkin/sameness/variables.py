@@ -1,0 +1,189 @@
+"""What the joints of both models stand at, as lines in shared variables, and how far those range.
+
+A's coordinates are variables; B's follow from them by sense and zero of the joints, so that each joint's
+value is a constant and a multiple of a variable in either model. What B can do and A cannot (a follower that
+is free there, a joint that is fixed in A) is a variable of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from urdfkin.model.tree import FloatArray, Joint, JointKind
+from urdfkin.sameness.alignment import Alignment, Step
+from urdfkin.sameness.mechanism import Tolerance
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """constant + slope * variable; no variable where the slope is 0."""
+
+    variable: str
+    slope: float
+    constant: float
+
+    def moved(self, slope: float, constant: float) -> Line:
+        """The line of slope * self + constant."""
+        return Line(self.variable, slope * self.slope, slope * self.constant + constant)
+
+    def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
+        """Its value."""
+        return self.constant + (self.slope * values[self.variable] if self.slope else 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """The values of one step's joint in both models, both as A counts it."""
+
+    a: Line
+    b: Line
+    #: What B's file calls the value: sense * b + offset.
+    written: Line
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Variables:
+    """Values of all steps and what they range over.
+
+    Attributes:
+        pairs: For each step, None for planar and floating joints.
+        ranges: Of each variable, rad or m; infinite where nothing bounds it.
+        freer_a: Steps (indices) whose joint is free in A and follows in B.
+        freer_b: Likewise the other way.
+        rules: Steps whose joint follows by another rule in B.
+        leaders: B's coordinates by the names of their joints.
+    """
+
+    pairs: tuple[Pair | None, ...]
+    ranges: dict[str, tuple[float, float]]
+    freer_a: tuple[int, ...]
+    freer_b: tuple[int, ...]
+    rules: tuple[int, ...]
+    leaders: dict[str, Line]
+
+    def range(self, line: Line) -> tuple[float, float]:
+        """Between what a line's values lie."""
+        if not line.slope:
+            return line.constant, line.constant
+        ends = sorted(line.slope * end + line.constant for end in self.ranges[line.variable])
+        return ends[0], ends[1]
+
+    def off(self, pair: Pair) -> float:
+        """By how much (rad, m) a joint's values differ at most."""
+        if pair.a.variable == pair.b.variable or not pair.a.slope or not pair.b.slope:
+            variable = pair.a.variable if pair.a.slope else pair.b.variable
+            low, high = self.range(
+                Line(variable, pair.b.slope - pair.a.slope, pair.b.constant - pair.a.constant)
+            )
+        else:
+            (a_low, a_high), (b_low, b_high) = self.range(pair.a), self.range(pair.b)
+            low, high = b_low - a_high, b_high - a_low
+        return max(abs(low), abs(high))
+
+
+def variables_of(found: Alignment, tolerance: Tolerance) -> Variables:
+    """The lines of all steps of an alignment."""
+    return _Maker(found, tolerance).make()
+
+
+class _Maker:
+    def __init__(self, found: Alignment, tolerance: Tolerance) -> None:
+        self.found, self.tolerance = found, tolerance
+        self.trees = found.a.tree, found.b.tree
+        self.step_of_b = {step.b: i for i, step in enumerate(found.steps)}
+        self.leaders = self._leaders()
+
+    def _leaders(self) -> dict[str, Line]:
+        """Each coordinate of B as a line in A's, or as a variable of its own: A's own coordinates first."""
+        tree, used, lines = self.trees[1], set[str](), dict[str, Line]()
+        own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
+        followers_last = sorted(own, key=self._follows_in_a)
+        for i in followers_last:
+            name = tree.joints[i].name
+            lines[name] = Line(f"b:{name}", 1.0, 0.0)
+            step = self._step(i)
+            if step is None or step.unlike:
+                continue
+            value = self._a(step)
+            if value.slope and value.variable not in used:
+                used.add(value.variable)
+                lines[name] = value.moved(step.sense, step.offset)
+        return lines
+
+    def _step(self, joint_b: int) -> Step | None:
+        at = self.step_of_b.get(joint_b)
+        return None if at is None else self.found.steps[at]
+
+    def _follows_in_a(self, joint_b: int) -> bool:
+        step = self._step(joint_b)
+        return step is not None and self.trees[0].joints[step.a].mimic is not None
+
+    def _a(self, step: Step) -> Line:
+        joint = self.trees[0].joints[step.a]
+        if joint.kind is JointKind.FIXED:
+            return Line("", 0.0, 0.0)
+        if joint.mimic is None:
+            return Line(f"a:{joint.name}", 1.0, 0.0)
+        return Line(f"a:{joint.mimic.leader}", joint.mimic.multiplier, joint.mimic.offset)
+
+    def _b(self, step: Step) -> Line:
+        joint = self.trees[1].joints[step.b]
+        if joint.kind is JointKind.FIXED:
+            return Line("", 0.0, 0.0)
+        if joint.mimic is None:
+            return self.leaders[joint.name]
+        return self.leaders[joint.mimic.leader].moved(joint.mimic.multiplier, joint.mimic.offset)
+
+    def make(self) -> Variables:
+        pairs, freer_a, freer_b, rules = list[Pair | None](), list[int](), list[int](), list[int]()
+        for i, step in enumerate(self.found.steps):
+            if step.kind in ("planar", "floating") or step.unlike == "kind":
+                pairs.append(None)
+                continue
+            a, written = self._a(step), self._b(step)
+            b = written.moved(step.sense, -step.sense * step.offset)
+            follow = [
+                tree.joints[j].mimic is not None for tree, j in zip(self.trees, (step.a, step.b), strict=True)
+            ]
+            if self._alike(a, b):
+                b = a
+            elif not step.unlike:
+                (
+                    freer_a if follow == [False, True] else freer_b if follow == [True, False] else rules
+                ).append(i)
+            pairs.append(Pair(a, b, written))
+        ranges = self._ranges(pairs)
+        return Variables(tuple(pairs), ranges, tuple(freer_a), tuple(freer_b), tuple(rules), self.leaders)
+
+    def _alike(self, a: Line, b: Line) -> bool:
+        """Whether two lines differ by what is rounding; a slope counts for a turn or a metre."""
+        same = a.variable == b.variable or not (a.slope or b.slope)
+        off = abs(a.slope - b.slope), abs(a.constant - b.constant)
+        return same and max(off) <= self.tolerance.angle * max(1.0, abs(a.slope), abs(a.constant))
+
+    def _ranges(self, pairs: list[Pair | None]) -> dict[str, tuple[float, float]]:
+        """What keeps every joint of both within its limits; of the coordinate's own alone if nothing does."""
+        ranges: dict[str, tuple[float, float]] = {}
+        held: dict[str, tuple[float, float]] = {}
+        for step, pair in zip(self.found.steps, pairs, strict=True):
+            if pair is None:
+                continue
+            for tree, j, line in ((self.trees[0], step.a, pair.a), (self.trees[1], step.b, pair.written)):
+                if not line.slope:
+                    continue
+                ends = sorted((end - line.constant) / line.slope for end in limits(tree.joints[j]))
+                low, high = held.get(line.variable, (-math.inf, math.inf))
+                held[line.variable] = max(low, ends[0]), min(high, ends[1])
+                if line.variable == f"a:{tree.joints[j].name}" or line.variable not in ranges:
+                    ranges[line.variable] = ends[0], ends[1]
+        return {name: held[name] if held[name][0] < held[name][1] else own for name, own in ranges.items()}
+
+
+def limits(joint: Joint) -> tuple[float, float]:
+    """Between what a joint's value lies, infinite where nothing says."""
+    if joint.kind is JointKind.CONTINUOUS or joint.limit is None:
+        return -math.inf, math.inf
+    low, high = sorted((joint.limit.lower, joint.limit.upper))
+    return low, high

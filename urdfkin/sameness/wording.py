@@ -1,0 +1,208 @@
+"""What an alignment says, in words: what has to be done, where the models differ, and what else there is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from urdfkin.dh.units import units_of
+from urdfkin.kinematics.rotation.euler import rpy_of
+from urdfkin.model.tree import FloatArray, Joint, KinematicTree
+from urdfkin.sameness.alignment import IDENTITY, Alignment, FramePair, Step
+from urdfkin.sameness.mechanism import Tolerance
+from urdfkin.sameness.result import Difference, angle, length
+from urdfkin.sameness.variables import Variables, limits
+
+
+def put_right(found: Alignment, rounding: Tolerance) -> tuple[str, ...]:
+    """What makes B as A is, a line each; frames that are tools, set elsewhere, are put right in `found`."""
+    lines = list[str]()
+    tree_a, tree_b = found.a.tree, found.b.tree
+    seen_from = found.b.body_of[found.base[1]]
+    if seen_from:
+        lines.append(
+            f"B's root is {tree_b.links[0]}: seen from {tree_a.links[found.base[0]]}, joints between run back"
+        )
+    if found.X is not IDENTITY:
+        lines.append(f"B's root stands in A's root frame at {pose_words(found.X, rounding)}")
+    for step in found.steps:
+        if step.sense < 0 or step.offset:
+            sign = "-" if step.sense < 0 else ""
+            least = rounding.angle if step.kind == "turns" else rounding.way
+            unit = units_of(digits=17).angle if step.kind == "turns" else units_of(digits=17).length
+            offset = _rounded(step.offset, least)
+            constant = f" {'-' if offset < 0 else '+'} {unit(abs(offset))}" if offset else ""
+            lines.append(f"q[{tree_b.joints[step.b].name}] = {sign}q[{tree_a.joints[step.a].name}]{constant}")
+    for k, frame in enumerate(found.frames):
+        if not frame.differs or not _is_tool(found, frame):
+            continue
+        found.frames[k] = frame.put_right()
+        names = tree_b.links[frame.b], tree_a.links[frame.a]
+        moved = pose_words(found.frames[k].tool, rounding)
+        lines.append(f"frame {names[0]} is A's {names[1]} moved by {moved}")
+    return tuple(lines)
+
+
+def pose_words(T: FloatArray, rounding: Tolerance) -> str:
+    """A pose as a URDF's origin says it."""
+    xyz, rpy = T[:3, 3], rpy_of(T[:3, :3])
+    words = (
+        " ".join(repr(_rounded(float(x), least)) for x in numbers)
+        for numbers, least in ((xyz, rounding.way), (rpy, rounding.angle))
+    )
+    return 'xyz="{}" rpy="{}"'.format(*words)
+
+
+def _rounded(x: float, rounding: float) -> float:
+    """The shortest number within rounding."""
+    return round(x, math.ceil(-math.log10(rounding))) + 0.0
+
+
+def _is_tool(found: Alignment, frame: FramePair) -> bool:
+    """Whether nothing hangs on a frame, and it is fixed, in both models."""
+    for tree, link in ((found.a.tree, frame.a), (found.b.tree, frame.b)):
+        if link == 0 or tree.joints[link - 1].kind.nv or any(joint.parent == link for joint in tree.joints):
+            return False
+    return True
+
+
+def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...]:
+    """Where they move otherwise, from the base outwards."""
+    tree_a, tree_b = found.a.tree, found.b.tree
+    placed: list[tuple[float, list[Difference]]] = [
+        (len(found.path(i)), _of_step(found, variables, i)) for i in range(len(found.steps))
+    ]
+    placed += [
+        (len(found.path(frame.previous)) + 0.5, [_of_frame(tree_a, frame)])
+        for frame in found.frames
+        if frame.differs
+    ]
+    ordered = [one for _, some in sorted(placed, key=lambda pair: pair[0]) for one in some]
+    for tree, joints, which in ((tree_a, found.only_a, "A"), (tree_b, found.only_b, "B")):
+        ordered += [
+            Difference(
+                f"joint {tree.joints[j].name}",
+                f"only in {which}",
+                f"joint {tree.joints[j].name} is only in {which}",
+            )
+            for j in sorted(joints)
+            if tree.joints[j].kind.nv
+        ]
+    have = {tree_a.links[frame.a] for frame in found.frames}
+    for link in tree_a.links:
+        if link in tree_b.links and link not in have:
+            carried = [_carrier(tree, link) for tree in (tree_a, tree_b)]
+            if _of_the_pair(found, tree_a, tree_b, link):
+                ordered.append(
+                    Difference(
+                        f"link {link}",
+                        "carried by",
+                        f"link {link} is carried by {carried[0]} in A, by {carried[1]} in B",
+                    )
+                )
+    return tuple(ordered)
+
+
+def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree, link: str) -> bool:
+    """Whether a link that both have sits on bodies that both have: else its joint was named already."""
+    alone_a = {found.a.body_of[j + 1] for j in found.only_a}
+    alone_b = {found.b.body_of[j + 1] for j in found.only_b}
+    return (
+        found.a.body_of[tree_a.link_index(link)] not in alone_a
+        and found.b.body_of[tree_b.link_index(link)] not in alone_b
+    )
+
+
+def _carrier(tree: KinematicTree, link: str) -> str:
+    """The moving joint nearest before a link."""
+    path = [tree.joints[i] for i in tree.path(tree.link_index(link)) if tree.joints[i].kind.nv]
+    return f"joint {path[-1].name}" if path else "the base"
+
+
+def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]:
+    step, tree_a, tree_b = found.steps[i], found.a.tree, found.b.tree
+    joint, other = tree_a.joints[step.a], tree_b.joints[step.b]
+    place = f"joint {joint.name}"
+    if step.unlike == "kind":
+        words = f"{place} is {joint.kind.value} in A, {other.kind.value} in B"
+        return [Difference(place, "kind", words)]
+    if step.unlike:
+        fixed, moves = ("A", "B") if step.unlike == "a" else ("B", "A")
+        return [Difference(place, "fixed", f"{place} moves in {moves} and is fixed in {fixed}")]
+    some = []
+    if step.differs:
+        some.append(Difference(place, *_axis_words(place, step), step.tilt, step.shift))
+    for steps, words in (
+        (variables.freer_a, "{0} is free in A and follows in B: {2}"),
+        (variables.freer_b, "{0} follows in A and is free in B: {1}"),
+        (variables.rules, "{0} follows by another rule: {1} in A, {2} in B"),
+    ):
+        if i in steps:
+            text = words.format(place, _rule(joint), _rule(other))
+            some.append(Difference(place, "mimic rule", text))
+    return some
+
+
+def _rule(joint: Joint) -> str:
+    rule = joint.mimic
+    return f"{rule.multiplier!r} {rule.leader} {rule.offset:+.17g}" if rule else "free"
+
+
+def _axis_words(place: str, step: Step) -> tuple[str, str]:
+    """The parameter, and the line."""
+    if step.kind in ("planar", "floating"):
+        return "frame", f"{place}: its frame is turned by {angle(step.tilt)} and {length(step.shift)} off"
+    parts = [f"tilted by {angle(step.tilt)}"] if step.tilt > 1e-15 else []
+    parts += [f"{length(step.shift)} off"] if step.shift > 1e-15 else []
+    alone = " (what hangs on it is not)" if step.other is not step.axis else ""
+    return "axis", f"{place}: its axis is {' and '.join(parts)}{alone}"
+
+
+def _of_frame(tree: KinematicTree, frame: FramePair) -> Difference:
+    place = f"link {tree.links[frame.a]}"
+    parts = [f"{length(frame.shift)} off"] if frame.shift > 1e-15 else []
+    parts += [f"turned by {angle(frame.tilt)}"] if frame.tilt > 1e-15 else []
+    return Difference(
+        place, "place", f"{place} is {' and '.join(parts)} on its body", frame.tilt, frame.shift
+    )
+
+
+def remarks(found: Alignment, variables: Variables, tolerance: Tolerance) -> tuple[Difference, ...]:
+    """What differs without moving anything elsewhere: limits, kinds, and links that only one has."""
+    some = list[Difference]()
+    for step in found.steps:
+        if not step.unlike:
+            some += _of_limits(step, found.a.tree.joints[step.a], found.b.tree.joints[step.b], tolerance)
+    for tree, other, which in ((found.a.tree, found.b.tree, "A"), (found.b.tree, found.a.tree, "B")):
+        paired = {tree.links[frame.a if which == "A" else frame.b] for frame in found.frames}
+        lacking = [link for link in tree.links if link not in other.links and link not in paired]
+        if lacking:
+            some.append(
+                Difference(
+                    f"links of {which}", f"only in {which}", f"links only in {which}: {', '.join(lacking)}"
+                )
+            )
+    return tuple(some)
+
+
+def _of_limits(step: Step, a: Joint, b: Joint, tolerance: Tolerance) -> Iterator[Difference]:
+    place = f"joint {a.name}"
+    if a.kind is not b.kind:
+        yield Difference(place, "kind", f"{place} is {a.kind.value} in A, {b.kind.value} in B")
+    back = sorted(step.sense * (end - step.offset) for end in limits(b))
+    ours = limits(a)
+    if any(not _close(x, y, tolerance.angle) for x, y in zip(ours, back, strict=True)):
+        words = f"{place}: limits {_range(ours)} in A, {_range((back[0], back[1]))} in B"
+        yield Difference(place, "limits", words + (" (as A counts)" if step.sense < 0 or step.offset else ""))
+    for what in ("velocity", "effort"):
+        x, y = (getattr(joint.limit, what, math.inf) for joint in (a, b))
+        if not _close(x, y, tolerance.angle):
+            yield Difference(place, what, f"{place}: {what} limit {x:g} in A, {y:g} in B")
+
+
+def _close(x: float, y: float, share: float) -> bool:
+    return x == y or abs(x - y) <= share * max(1.0, abs(x), abs(y))
+
+
+def _range(ends: tuple[float, float]) -> str:
+    return f"{ends[0]:.12g} to {ends[1]:.12g}"
