@@ -38,7 +38,8 @@ _OPEN = 1
 
 
 @cache
-def _environment() -> Environment:
+def environment() -> Environment:
+    """What fills templates in: every name is escaped, a missing one is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415  keeps --help fast
 
     environment = Environment(
@@ -60,7 +61,7 @@ def as_html(document: Document) -> str:
     robots = document["robots"]
     quantities = columns(robots)
     return (
-        _environment()
+        environment()
         .get_template("report.html.j2")
         .render(
             document=document,

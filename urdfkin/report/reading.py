@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from itertools import islice
 from pathlib import Path
 from typing import cast
@@ -26,11 +27,15 @@ def read_document(path: Path) -> Document:
         InputError: it is not JSON, not a validation report, of another version, breaks the schema, or
             contradicts itself.
     """
+    return checked(read_json(path), str(path))
+
+
+def read_json(path: Path) -> object:
+    """What a file of JSON says; raises SourceError, or InputError where it is none."""
     try:
-        data = json.loads(read_bytes(path), parse_constant=_number, parse_float=_number)
+        return json.loads(read_bytes(path), parse_constant=_number, parse_float=_number)
     except (ValueError, RecursionError) as error:
         raise InputError("not a JSON file", where=str(path), found=str(error)) from error
-    return checked(data, str(path))
 
 
 def _number(word: str) -> float:
@@ -43,22 +48,7 @@ def _number(word: str) -> float:
 
 def checked(data: object, where: str) -> Document:
     """`data` as a document; raises InputError as `read_document` does."""
-    found = data.get("schema") if isinstance(data, dict) else None
-    if found != SCHEMA:
-        raise InputError(
-            f"not a report with the layout {SCHEMA}",
-            where=where,
-            found=repr(found) if found else "no 'schema' entry",
-            remedy="write one with: urdfkin validate ROBOT --json FILE",
-        )
-    from jsonschema import Draft202012Validator  # noqa: PLC0415  only who reads files needs it
-    from jsonschema.exceptions import best_match  # noqa: PLC0415
-
-    error = best_match(Draft202012Validator(schema()).iter_errors(data))
-    if error is not None:
-        raise InputError(
-            f"breaks the layout {SCHEMA}", where=where, found=f"{error.json_path}: {error.message}"
-        )
+    keeps_to(schema(), data, SCHEMA, where, "urdfkin validate ROBOT --json FILE")
     document = cast("Document", data)
     if against := list(islice(contradictions(document), _SHOWN + 1)):
         more = " ..." if len(against) > _SHOWN else ""
@@ -69,3 +59,34 @@ def checked(data: object, where: str) -> Document:
             remedy="have it made again: urdfkin validate ROBOT --json FILE",
         )
     return document
+
+
+def keeps_to(layout: Mapping[str, object], data: object, name: str, where: str, made_by: str) -> None:
+    """Demand that data keep to a published schema.
+
+    Args:
+        layout: The schema.
+        data: What a file says.
+        name: The layout's, which the entry "schema" must give.
+        where: The file.
+        made_by: The command that writes one.
+
+    Raises:
+        InputError: another layout, or one that is broken.
+    """
+    found = data.get("schema") if isinstance(data, dict) else None
+    if found != name:
+        raise InputError(
+            f"not a report with the layout {name}",
+            where=where,
+            found=repr(found) if found else "no 'schema' entry",
+            remedy=f"write one with: {made_by}",
+        )
+    from jsonschema import Draft202012Validator  # noqa: PLC0415  only who reads files needs it
+    from jsonschema.exceptions import best_match  # noqa: PLC0415
+
+    error = best_match(Draft202012Validator(layout).iter_errors(data))
+    if error is not None:
+        raise InputError(
+            f"breaks the layout {name}", where=where, found=f"{error.json_path}: {error.message}"
+        )

@@ -1,0 +1,231 @@
+"""`same`: verdicts, what has to be done, what is only remarked upon, and certificates."""
+
+from __future__ import annotations
+
+import copy
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as run
+from tests.sameness import pairs
+from tests.sameness.test_pairs import ALIKE, UNLIKE, changed, robot
+from urdfkin.report.certificates import read_certificate
+from urdfkin.robot import Robot
+from urdfkin.sameness.certificate import certificate, recheck
+from urdfkin.sameness.result import Verdict
+from urdfkin.urdf.writer import to_urdf
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+
+def other(name: str, what: str) -> Robot:
+    found = changed(name, (ALIKE | UNLIKE)[what])
+    assert found is not None
+    return found
+
+
+def test_a_robot_is_itself_and_pinocchio_sees_no_distance() -> None:
+    found = urdfkin.same("panda", "panda")
+    assert found.verdict is Verdict.SAME
+    assert (found.after, found.differences, found.remarks) == ((), (), ())
+    assert found.checked.endswith("finds at most 0 m at 8 configurations, within the bounds")
+    assert found.worst is None
+
+
+def test_it_can_be_taken_for_the_answer() -> None:
+    assert urdfkin.same("panda", "panda_collision")
+    assert not urdfkin.same("ur5", "ur3", bounds=False)
+
+
+def test_limits_are_told_apart_from_motion() -> None:
+    found = urdfkin.same("ur5", "ur5_limited")
+    assert found.verdict is Verdict.SAME
+    assert {one.what for one in found.remarks} == {"limits"}
+    assert (found.exit_code(), found.exit_code(strict=True)) == (0, 1)
+
+
+@pytest.mark.parametrize("what", ["all of it", "axes flipped", "zeros shifted", "all renamed"])
+@pytest.mark.parametrize("name", ["panda", "talos", "polar"])
+def test_what_has_to_be_done_makes_them_move_alike(name: str, what: str) -> None:
+    a, b = robot(name), other(name, what)
+    found = urdfkin.same(a, b, bounds=False)
+    assert found
+    q = a.sample(5, 1)
+    T_a = a.placement(q, [f"link:{ours}" for ours, _ in found.links])
+    T_b = b.placement(found.to_b(q), [f"link:{theirs}" for _, theirs in found.links])
+    assert np.abs(T_a - found.base @ T_b).max() <= 1e-12
+
+
+def test_two_models_differ_whichever_is_called_a() -> None:
+    a, b = robot("elbow"), other("elbow", "tilted by 0.001")
+    there, back = urdfkin.same(a, b).worst, urdfkin.same(b, a).worst
+    assert there is not None
+    assert back is not None
+    assert (there.lower, there.upper) == pytest.approx((back.lower, back.upper), rel=5e-3)
+
+
+def test_a_follower_that_was_dropped_is_found() -> None:
+    a, b = robot("panda"), urdfkin.load(robot("panda").urdf, mimic=False, verify=False)
+    found = urdfkin.same(a, b)
+    assert [one.words for one in found.differences] == [
+        "joint panda_finger_joint2 follows in A and is free in B: 1.0 panda_finger_joint1 +0"
+    ]
+    assert found.worst is not None
+    assert found.worst.lower == pytest.approx(0.04)  # one finger open, the other closed
+
+
+def test_a_joint_that_is_fixed_in_one_model_is_named_and_its_effect_bounded() -> None:
+    found = urdfkin.same("icub", "icub_reduced")
+    assert {one.place for one in found.differences} == {
+        f"joint neck_{way}" for way in ("pitch", "roll", "yaw")
+    }
+    assert found.worst is not None
+    assert found.worst.lower <= found.worst.upper <= 1.05 * found.worst.lower
+
+
+def test_another_tool_is_something_to_be_done_not_a_difference() -> None:
+    tree = urdfkin.load("panda").tree
+    at = tree.joint_index("panda_hand_tcp_joint")
+    T = tree.joints[at].T_parent_joint @ pairs.pose([0.0, 0.0, 0.0], [0.0, 0.0, 0.125])
+    b = urdfkin.load(to_urdf(pairs.with_joint(tree, at, replace(tree.joints[at], T_parent_joint=T))))
+    found = urdfkin.same(robot("panda"), b)
+    assert found.verdict is Verdict.SAME_AFTER
+    assert found.after == (
+        'frame panda_hand_tcp is A\'s panda_hand_tcp moved by xyz="0.0 0.0 0.125" rpy="0.0 0.0 0.0"',
+    )
+    assert found.as_written is not None
+    assert found.as_written.frame == "panda_hand_tcp"
+    assert found.as_written.lower == pytest.approx(0.125)
+    assert (found.exit_code(), found.exit_code(strict=True)) == (0, 1)
+
+
+def test_a_table_is_the_robot_that_it_was_made_of() -> None:
+    found = urdfkin.same("ur5", urdfkin.load("ur5").dh("tool0", "base"))
+    assert found.differences == ()
+    assert len(found.joints) == 6
+
+
+def test_joints_can_be_paired_by_hand() -> None:
+    a, b = robot("panda"), other("panda", "all renamed")
+    name = next(one.b for one in urdfkin.same(a, b, bounds=False).joints if one.a == "panda_joint1")
+    assert urdfkin.same(a, b, map={"panda_joint1": name}, bounds=False)
+    with pytest.raises(urdfkin.UnknownNameError, match="unknown joint 'panda_jointl'; did you mean"):
+        urdfkin.same(a, b, map={"panda_jointl": name})
+    with pytest.raises(urdfkin.InputError, match="given twice"):
+        urdfkin.same(a, b, map={"panda_joint1": name, "panda_joint2": name})
+
+
+@pytest.mark.parametrize(("name", "seconds"), [("panda", 1.0), ("talos", 5.0)])
+def test_it_is_quick(name: str, seconds: float) -> None:
+    a, b = urdfkin.load(name), urdfkin.load(name)
+    began = time.process_time()
+    assert urdfkin.same(a, b)
+    assert time.process_time() - began <= seconds
+
+
+# -- certificates ------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def compared() -> tuple[Robot, Robot, dict[str, Any]]:
+    a, b = robot("elbow"), other("elbow", "tilted by 0.001")
+    return a, b, json.loads(json.dumps(certificate(urdfkin.same(a, b))))
+
+
+def test_a_certificate_holds(compared: tuple[Robot, Robot, dict[str, Any]], tmp_path: Path) -> None:
+    a, b, document = compared
+    (tmp_path / "c.json").write_text(json.dumps(document))
+    assert recheck(read_certificate(tmp_path / "c.json"), a, b) == []
+
+
+def test_a_certificate_of_what_was_turned_round_holds() -> None:
+    a, b = robot("panda"), other("panda", "all of it")
+    assert recheck(certificate(urdfkin.same(a, b)), a, b) == []
+
+
+FORGED: dict[str, Any] = {
+    "is not proven": lambda d: d["frames"][-1].update(upper=0.99 * d["frames"][-1]["lower"]),
+    "finds": lambda d: d["frames"][-1].update(lower=1.01 * d["frames"][-1]["lower"]),
+    "do not belong together": lambda d: d["frames"][-1]["q_b"].__setitem__(0, 0.123),
+    "leave the limits": lambda d: [d["frames"][-1][q].__setitem__(1, 50.0) for q in ("q_a", "q_b")],
+    "the verdict is differs": lambda d: d.update(verdict="same"),
+    "not named as a difference": lambda d: d.update(differences=[]),
+    "no difference": lambda d: d["differences"].append({**d["differences"][0], "words": "joint x"}),
+    "has no interval": lambda d: d["frames"].pop(),
+}
+
+
+@pytest.mark.parametrize("said", FORGED)
+def test_a_forged_certificate_does_not(compared: tuple[Robot, Robot, dict[str, Any]], said: str) -> None:
+    a, b, document = compared
+    forged = copy.deepcopy(document)
+    FORGED[said](forged)
+    assert any(said in line for line in recheck(forged, a, b))
+
+
+def test_a_certificate_of_other_texts_is_refused(compared: tuple[Robot, Robot, dict[str, Any]]) -> None:
+    a, _, document = compared
+    with pytest.raises(urdfkin.InputError, match=r"model B: the certificate was made of another text"):
+        recheck(document, a, a)
+
+
+# -- the command -------------------------------------------------------------------------------------
+
+
+def test_the_commands_exit_says_whether(tmp_path: Path) -> None:
+    files = {}
+    for what in ("axes flipped", "tilted by 0.01"):
+        files[what] = tmp_path / f"{what}.urdf"
+        files[what].write_text(other("elbow", what).urdf)
+    base = tmp_path / "elbow.urdf"
+    base.write_text(robot("elbow").urdf)
+    flipped, tilted = map(str, files.values())
+    assert [
+        run("same", str(base), *words).code for words in ([str(base)], [flipped], [flipped, "--strict"])
+    ] == [0, 0, 1]
+    assert run("same", str(base), tilted, "--within", "0.011").code == 0  # 6 mm and 10 mrad
+    assert run("same", str(base), tilted, "--within", "0.009").code == 1
+    forms = [f for name in ("certificate", "markdown", "html") for f in (f"--{name}", str(tmp_path / name))]
+    done = run("same", str(base), tilted, *forms)
+    assert done.code == 1
+    assert "; first here: joint joint_4: its axis is tilted by 10 mrad" in done.text
+    assert (tmp_path / "html").read_text().count('<svg viewBox="-150') == 3
+    assert "| tool |" in (tmp_path / "markdown").read_text()
+    again = run("same", str(base), tilted, "--recheck", str(tmp_path / "certificate"))
+    assert (again.code, again.text) == (1, "the certificate holds: differs\n")
+    refused = run("same", str(base), flipped, "--recheck", str(tmp_path / "certificate"))
+    assert refused.code == 2
+    assert "another text" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "name two models: urdfkin same A B"),
+        (["panda"], "name two models"),
+        (["panda", "pandaa"], "did you mean"),
+        (["panda", "panda", "--map", "x"], "a pair of joints is JOINT_OF_A=JOINT_OF_B"),
+        (["panda", "panda", "--map", "x=y"], "unknown joint 'x'"),
+        (["panda", "panda", "--recheck", "/dev/null"], "not a JSON file"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused_in_a_line(words: list[str], said: str) -> None:
+    done = run("same", *words)
+    assert done.code == 2
+    assert said in done.err
+
+
+def test_the_schema_is_printed_and_is_one() -> None:
+    from jsonschema import Draft202012Validator  # noqa: PLC0415
+
+    done = run("same", "--schema")
+    Draft202012Validator.check_schema(done.data)
+    made = run("same", "elbow", "elbow", "--format", "json").data
+    Draft202012Validator(done.data).validate(made)

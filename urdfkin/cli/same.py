@@ -1,0 +1,133 @@
+"""`urdfkin same`: are these two models the same robot?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from urdfkin.cli.arguments import load_robot, xacro_option
+from urdfkin.cli.door import say
+from urdfkin.cli.numbers import NumberFrom
+from urdfkin.cli.output import compiling, console, write_file
+from urdfkin.cli.reports import check_writable
+from urdfkin.errors.printable import json_text
+
+if TYPE_CHECKING:
+    from urdfkin.robot import Robot
+    from urdfkin.sameness.result import Sameness
+
+EXAMPLE = "urdfkin same old.urdf new.urdf --certificate same.json"
+_PATH = click.Path(path_type=Path, dir_okay=False)
+
+
+@click.command(epilog=f"Example: {EXAMPLE}")
+@click.argument("a", metavar="A", required=False)
+@click.argument("b", metavar="B", required=False)
+@click.option(
+    "--map",
+    "pairs",
+    multiple=True,
+    metavar="JOINT_OF_A=JOINT_OF_B",
+    help="Joints that are each other's; may be repeated.",
+)
+@click.option(
+    "--strict",
+    is_flag=True,
+    help="Exit 1 too where they are the same only after something, or limits differ.",
+)
+@click.option(
+    "--within",
+    type=NumberFrom(0.0),
+    help="Exit 0 too where no frame is ever off by more, metres and radians: by the proven bound.",
+)
+@click.option("--all", "all_", is_flag=True, help="Show every line.")
+@click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
+@click.option("--certificate", type=_PATH, help="Write what was found as JSON that --recheck verifies.")
+@click.option("--recheck", type=_PATH, help="Verify a certificate against both models, without searching.")
+@click.option("--markdown", type=_PATH, help="Write Markdown that fits a pull request's comment.")
+@click.option("--html", type=_PATH, help="Write a page with a picture of both at the worst configuration.")
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of a certificate instead.")
+@xacro_option
+@click.pass_context
+def command(
+    context: click.Context,
+    a: str | None,
+    b: str | None,
+    pairs: tuple[str, ...],
+    strict: bool,
+    within: float | None,
+    all_: bool,
+    format_: str,
+    certificate: Path | None,
+    recheck: Path | None,
+    markdown: Path | None,
+    html: Path | None,
+    schema: bool,
+) -> None:
+    """Are A and B the same robot, in every configuration?
+
+    A and B are what other commands take for a robot, or Denavit-Hartenberg tables. The same means: every
+    joint's screw and every link's place at home agree, up to where the base stands, joints' zeros and senses,
+    fixed links, names and order. Where they differ, the largest distance over all configurations within
+    limits is enclosed: a configuration that attains it, and a proven bound.
+    Exit 0: the same, or after what is printed, or as near as --within asks. 1: they differ; with --strict
+    also where something has to be done. 2: bad input.
+    """
+    from urdfkin.report.certificates import read_certificate, schema_text  # noqa: PLC0415  keeps --help fast
+
+    if schema:
+        click.echo(schema_text(), nl=False)
+        return
+    if a is None or b is None:
+        raise click.UsageError("name two models: urdfkin same A B")
+    check_writable(certificate, markdown, html)
+    robots = load_robot(a, None, None), load_robot(b, None, None)
+    with compiling():
+        if recheck is not None:
+            from urdfkin.sameness.certificate import recheck as held  # noqa: PLC0415
+
+            document = read_certificate(recheck)
+            against = held(document, *robots)
+            for line in against:
+                say(line, err=True)
+            say(
+                "the certificate does not hold"
+                if against
+                else f"the certificate holds: {document['verdict']}"
+            )
+            context.exit(1 if against or document["verdict"] == "differs" else 0)
+        from urdfkin.sameness.judging import parse_map, same  # noqa: PLC0415
+
+        found = same(*robots, map=parse_map(pairs))
+    paths = {"certificate": certificate, "markdown": markdown, "html": html}
+    _write(found, robots, format_, paths, all_=all_)
+    context.exit(found.exit_code(strict=strict, within=within))
+
+
+def _write(
+    found: Sameness,
+    robots: tuple[Robot, Robot],
+    format_: str,
+    paths: dict[str, Path | None],
+    *,
+    all_: bool,
+) -> None:
+    """Every form that was asked for."""
+    from urdfkin.report.sameness import markdown_of, print_sameness  # noqa: PLC0415
+    from urdfkin.sameness.certificate import certificate  # noqa: PLC0415
+
+    data = json_text(certificate(found)) + "\n"
+    if (path := paths["certificate"]) is not None:
+        write_file(path, data.encode())
+    if (path := paths["markdown"]) is not None:
+        write_file(path, markdown_of(found).encode())
+    if (path := paths["html"]) is not None:
+        from urdfkin.report.sameness_html import as_html  # noqa: PLC0415
+
+        write_file(path, as_html(found, robots).encode())
+    if format_ == "json":
+        click.echo(data, nl=False)
+    else:
+        print_sameness(found, console(), all_=all_)
