@@ -33,6 +33,7 @@ _AFTER: dict[str, tuple[str, str]] = {
     "dh": ("urdfkin.cli.dh", "Denavit-Hartenberg tables, checked, compared, in many forms"),
     "diff": ("urdfkin.cli.diff", "what changed between two versions of a description, and what that moves"),
     "same": ("urdfkin.cli.same", "whether two models are the same robot, proven"),
+    "export": ("urdfkin.cli.export", "kinematics as code in many languages, with its proof"),
     "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
     "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),
     "explain": ("urdfkin.cli.explain", "what a finding's code means, or an equation's number"),

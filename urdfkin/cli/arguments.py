@@ -69,8 +69,7 @@ def xacro_args() -> dict[str, str]:
     return given
 
 
-robot_argument = together(
-    click.argument("robot", metavar="ROBOT"),
+robot_options = together(
     click.option(
         "--mimic/--no-mimic",
         default=None,
@@ -83,6 +82,7 @@ robot_argument = together(
     ),
     xacro_option,
 )
+robot_argument = together(click.argument("robot", metavar="ROBOT"), robot_options)
 
 frame_option = click.option("--frame", metavar="NAME", help="A link or joint. Default: the robot's tip.")
 reference_option = click.option(

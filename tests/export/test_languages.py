@@ -1,0 +1,196 @@
+"""Files that urdfkin writes run, and compute what is true; where they do not, they say so."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.export.writing import ALL, built, code, file, need, ran
+from tests.laws.subjects import robot_of, state
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.export import LANGUAGES, write
+from urdfkin.export.check import check
+from urdfkin.model.reference import Reference
+
+#: An arm; planar and floating joints in the middle.
+SUBJECTS = ("panda", "planar_and_floating_in_the_middle")
+RUN = [to for to in LANGUAGES if to != "latex"]
+
+
+def module(path: Path) -> ModuleType:
+    """A file, imported."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    found = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(found)
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("to", RUN)
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_a_file_computes_its_fifty_digit_values(name: str, to: str, tmp_path: Path) -> None:
+    need(to)
+    found = check(file(code(robot_of(name)), to, tmp_path))
+    assert found.good, found.lines
+    assert len(found.lines) == len(ALL) * (2 if to in ("c", "cpp") else 1)
+
+
+@pytest.mark.parametrize("to", ["c", "numpy"])
+def test_a_small_robots_file_does_so_in_every_reference(to: str, tmp_path: Path) -> None:
+    need(to)
+    robot = urdfkin.load("planar_two_link")
+    for reference in Reference:
+        found = check(file(code(robot, reference=reference), to, tmp_path))
+        assert found.good
+        assert found.verified
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize(
+    "options", [["-std=c99", "-O2"], ["-std=c11", "-O3", "-march=native", "-ffp-contract=fast"]]
+)
+def test_c_compiles_without_a_warning_wherever_eight_numbers_are_one(
+    compiler: str, options: list[str], tmp_path: Path
+) -> None:
+    written = code(robot_of("mimic_hand_40_sliding"), quantities=("jacobian", "acceleration"))
+    path, name = file(written, "c", tmp_path), written.name.upper()
+    for more in ([], [f"-D{name}_PORTABLE"], [f"-D{name}_REAL=float"]):
+        said = built(path, compiler, *options, *more)
+        assert said.count("good ") == 2
+        assert "WRONG" not in said
+
+
+@pytest.mark.slow
+def test_c_touches_nothing_that_is_not_its_own(tmp_path: Path) -> None:
+    need("c")
+    path = file(code(robot_of("planar_and_floating_in_the_middle")), "c", tmp_path)
+    said = built(path, "cc", "-std=c99", "-g", "-O1", "-fsanitize=address,undefined")
+    assert said.count("good ") == len(ALL)
+
+
+@pytest.mark.parametrize("to", ["c", "numpy"])
+def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None:
+    need(to)
+    path = file(code(urdfkin.load("ur5"), quantities=("placement", "acceleration")), to, tmp_path)
+    text, count = re.subn(r"0\.39225", "0.39226", path.read_text("utf-8"), count=1)
+    assert count == 1
+    path.write_text(text, "utf-8")
+    found = check(path)
+    assert not found.good
+    assert any(line.startswith("WRONG placement") for line in found.lines)
+    assert any(line.startswith("good acceleration") for line in found.lines)
+
+
+def test_a_file_can_say_so_without_urdfkin(tmp_path: Path) -> None:
+    path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "numpy", tmp_path)
+    assert "urdfkin" not in "".join(
+        re.findall(r"^(?:from|import) .*$", path.read_text("utf-8"), re.MULTILINE)
+    )
+    done = ran(path)
+    assert done.returncode == 0
+    assert done.stdout.startswith("good jacobian: 4 test vectors")
+
+
+def test_numpys_functions_take_any_batch(tmp_path: Path) -> None:
+    robot = robot_of("panda")
+    own = module(file(code(robot), "numpy", tmp_path))
+    q, v, a = state(robot, 6, 1)
+    q = q.reshape(2, 3, -1)
+    assert own.jacobian(q).shape == (2, 3, 6, robot.nv)
+    assert own.acceleration(q, v[0], a[0]).shape == (2, 3, 6)
+    frame = robot.tip_frame
+    assert np.allclose(
+        own.acceleration(q, v[0], a[0]), robot.acceleration(q, v[0], a[0], frame), rtol=0, atol=1e-12
+    )
+
+
+@pytest.mark.slow
+def test_jax_differentiates_maps_and_compiles_it(tmp_path: Path) -> None:
+    jax: Any = pytest.importorskip("jax")
+    jax.config.update("jax_enable_x64", True)
+    robot = robot_of("panda")
+    own = module(file(code(robot, quantities=("placement", "jacobian", "velocity")), "jax", tmp_path))
+    q, v, _ = state(robot, 5, 2)
+    Js = np.asarray(jax.vmap(jax.jit(own.jacobian))(q))
+    slopes = jax.vmap(jax.jacfwd(lambda x: own.placement(x)[:3, 3]))(q)
+    assert np.abs(np.asarray(slopes) - Js[:, :3]).max() < 1e-13
+    backwards = jax.vmap(jax.jacrev(lambda x: own.placement(x)[:3, 3]))(q)
+    assert np.abs(np.asarray(backwards) - Js[:, :3]).max() < 1e-13
+    pushed = jax.vmap(lambda x, y: jax.jvp(own.placement, (x,), (y,))[1])(q, v)
+    assert (
+        np.abs(np.asarray(pushed)[:, :3, 3] - np.asarray(jax.vmap(own.velocity)(q, v))[:, :3]).max() < 1e-12
+    )
+
+
+@pytest.mark.slow
+def test_casadis_and_sympys_symbols_differentiate_to_the_jacobian(tmp_path: Path) -> None:
+    casadi: Any = pytest.importorskip("casadi")
+    sympy: Any = pytest.importorskip("sympy")
+    robot = urdfkin.load("planar_two_link")
+    written = code(robot, quantities=("placement", "jacobian"))
+    q = [0.3, -0.7]
+    J = robot.jacobian(q, robot.tip_frame)[:3]
+    own = module(file(written, "casadi", tmp_path))
+    x = casadi.SX.sym("q", 2)
+    slopes = casadi.Function("J", [x], [casadi.jacobian(own.placement(x)[:3, 3], x)])(q)
+    assert np.abs(np.array(slopes) - J).max() < 1e-15
+    own = module(file(written, "sympy", tmp_path))
+    y = sympy.symbols("q:2")
+    symbolic = own.placement(y)[:3, 3].jacobian(y).subs(dict(zip(y, q, strict=True)))
+    assert np.abs(np.array(symbolic, dtype=float) - J).max() < 1e-15
+
+
+def test_what_is_not_a_file_of_ours_is_refused(tmp_path: Path) -> None:
+    other = tmp_path / "other.c"
+    other.write_text("int main(void) { return 0; }\n")
+    with pytest.raises(InputError, match="not a file that urdfkin export has written"):
+        check(other)
+    mine = file(code(urdfkin.load("planar_two_link")), "numpy", tmp_path)
+    broken = mine.with_name("broken.py")
+    broken.write_text(mine.read_text("utf-8").replace("def check", "def ("), "utf-8")
+    with pytest.raises(InputError, match="the file does not run"):
+        check(broken)
+
+
+def test_what_cannot_be_exported_is_refused_with_what_can() -> None:
+    robot = urdfkin.load("planar_two_link")
+    with pytest.raises(UnknownNameError, match="language"):
+        robot.export("fortran")
+    with pytest.raises(UnknownNameError, match="frame"):
+        robot.export("c", "nowhere")
+    with pytest.raises(UnknownNameError, match="quantity"):
+        robot.export("c", quantities=["placment"])
+    with pytest.raises(InputError, match="choose among placement, velocity"):
+        robot.export("c", quantities=["screws"])
+    with pytest.raises(InputError, match="no quantity"):
+        robot.export("c", quantities=[])
+    with pytest.raises(InputError, match="without columns"):
+        robot_of("single_link").export("c")
+    assert "double" in robot_of("single_link").export("c", quantities=["placement"])
+
+
+def test_what_nobody_checked_says_so_in_its_first_line(tmp_path: Path) -> None:
+    robot = urdfkin.load("planar_two_link")
+    for to in LANGUAGES:
+        first = robot.export(to, verify=False).splitlines()[0]
+        assert "UNVERIFIED" in first
+        assert "UNVERIFIED" not in write(code(robot), to)
+    found = check(file(code(urdfkin.load("planar_two_link", verify=False)), "numpy", tmp_path))
+    assert found.good
+    assert not found.verified
+
+
+def test_an_export_is_not_entered_in_the_robots_own_account() -> None:
+    robot = urdfkin.load("planar_two_link")
+    robot.export("numpy")
+    assert not robot.certificate().lines

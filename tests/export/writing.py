@@ -1,0 +1,70 @@
+"""Files of code in a folder, and what runs them."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from urdfkin.export import LANGUAGES, write
+from urdfkin.export.code import Code, code_of
+from urdfkin.model.reference import Reference
+from urdfkin.robot import Robot
+from urdfkin.verify.quantities import walked
+
+ALL = tuple(row.method for row in walked())
+#: What a file in a language needs to run.
+PROGRAMS = {"c": "cc", "cpp": "c++", "matlab": "octave-cli"}
+LIBRARIES = ("numba", "jax", "casadi", "sympy")
+
+
+def code(
+    robot: Robot,
+    frame: str | None = None,
+    quantities: tuple[str, ...] = ALL,
+    reference: Reference = Reference.LOCAL_WORLD_ALIGNED,
+) -> Code:
+    """What is written about a frame."""
+    frame = frame or robot.tip_frame
+    return code_of(robot.verifier, robot.plan, frame, quantities, reference, name=None, verify=None)
+
+
+def file(written: Code, to: str, folder: Path) -> Path:
+    """Its text in a language, as a file."""
+    path = folder / f"{written.name}{LANGUAGES[to][1]}"
+    path.write_text(write(written, to), encoding="utf-8")
+    return path
+
+
+def need(to: str) -> None:
+    """Skip where a language is not there."""
+    if (program := PROGRAMS.get(to)) and shutil.which(program) is None:
+        pytest.skip(f"no {program}")
+    if to in LIBRARIES and importlib.util.find_spec(to) is None:
+        pytest.skip(f"no {to}")
+
+
+def built(path: Path, compiler: str, *options: str) -> str:
+    """What its program says, all warnings being errors."""
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no {compiler}")
+    name = path.stem.upper()
+    strict = ["-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror"]
+    program = path.with_suffix(".out")
+    command = [compiler, *strict, f"-D{name}_MAIN", *options, str(path), "-o", str(program), "-lm"]
+    subprocess.run(command, check=True)
+    done = subprocess.run([str(program)], capture_output=True, text=True, check=False)
+    return done.stdout
+
+
+def ran(path: Path) -> subprocess.CompletedProcess[str]:
+    """A Python file as a program."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    return subprocess.run(
+        [sys.executable, str(path)], capture_output=True, text=True, check=False, env=environment
+    )

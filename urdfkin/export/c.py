@@ -1,0 +1,243 @@
+"""C99 without allocation and without variables of its own, in double or single precision, with a batch form.
+
+A function is a straight line over numbers that lie `L` apart: next to each other for one configuration, a
+register apart for a batch, where a compiler makes one instruction for all lanes of each line. What does not
+depend on the robot stands in `frames/`, with places for the rest.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from urdfkin.export.code import Code, Writer
+from urdfkin.export.expression import Node
+from urdfkin.export.function import Function
+
+_FRAMES = Path(__file__).with_name("frames")
+_PLACE = re.compile(r"@(\w+)@")
+
+
+def write(code: Code, to: str = "c") -> str:
+    """A translation unit, which declares its functions alone where `NAME_DECLARATIONS` is defined."""
+    return framed(
+        "file.c",
+        head=comment(_head(code)),
+        UP=code.name.upper(),
+        declarations="\n".join(_declarations(code)),
+        sines=framed("sines.c") if any(function.angles for function in code.functions) else "",
+        functions="".join(_function(code, function) for function in code.functions),
+        main="\n".join([*vectors(code), main(code, "check_one.c")]),
+    )
+
+
+def framed(name: str, /, **parts: str | int) -> str:
+    """A frame with its places filled; what is put in is not looked at again."""
+    text = (_FRAMES / name).read_text(encoding="utf-8")
+    return _PLACE.sub(lambda found: str(parts[found[1]]), text)
+
+
+def literal(x: float) -> str:
+    """A constant of the file's own precision."""
+    return f"R({x!r})"
+
+
+def comment(lines: Sequence[str]) -> str:
+    """Lines as a comment."""
+    return "/* " + "\n".join(f" * {line}".rstrip() for line in lines)[3:] + "\n */"
+
+
+def _head(code: Code) -> list[str]:
+    name, up = code.name, code.name.upper()
+    return [
+        *code.head,
+        "",
+        f"To try it:     cc -std=c99 -O2 -D{up}_MAIN {name}.c -lm && ./a.out",
+        f"To compile it: cc -std=c99 -O3 -march=native -ffp-contract=fast -fno-math-errno -c {name}.c",
+        f"In float:      add -D{up}_REAL=float",
+        f'To call it:    #define {up}_DECLARATIONS, then #include "{name}.c"',
+        f"CMake:         add_library({name} STATIC {name}.c)",
+        f"               target_link_libraries({name} PUBLIC m)",
+        f"pkg-config:    Name: {name}",
+        f"               Description: kinematics of {code.robot}",
+        "               Version: 1",
+        f"               Libs: -l{name} -lm",
+    ]
+
+
+def what(function: Function) -> str:
+    """A function's result in words."""
+    return f"{' x '.join(map(str, function.shape))}, eq. {', '.join(function.quantity.equations)}"
+
+
+def _given(function: Function, real: str) -> str:
+    return ", ".join([*(f"const {real} *{letter}" for letter in function.inputs), f"{real} *out"])
+
+
+def _declarations(code: Code) -> Iterator[str]:
+    yield "/* `out` is written row by row; a batch has n of everything, one configuration after the other. */"
+    for function in code.functions:
+        given = _given(function, f"{code.name.upper()}_REAL")
+        yield f"/* {what(function)} */"
+        yield f"void {code.name}_{function.name}({given});"
+        yield f"void {code.name}_{function.name}_batch(size_t n, {given});"
+
+
+# -- a function --------------------------------------------------------------------------------------------
+
+
+def _function(code: Code, function: Function) -> str:
+    writer, layout = Writer(code, function, literal, sine=False), Layout(function)
+    count, widths = len(function.results), code.widths(function)
+    return framed(
+        "function.c",
+        name=function.name,
+        title=code.name,
+        operations=function.operations,
+        given=f"({_given(function, 'real')})",
+        given_rest=f"{_given(function, 'real')})",
+        count=count,
+        room=layout.room,
+        lane_room=layout.room + len(layout.made),
+        inputs=", ".join(f"{x.op}[{x.of[0]}]" for x in layout.inputs) or "R(0.0)",
+        lines="\n".join(f"    {line}" for line in _lines(writer, layout)),
+        sines="\n".join(f"    {line}" for line in _sines(writer, layout)),
+        reads="\n".join(f"    {line}" for line in _reads(layout, widths)),
+        lane_sines="\n".join(f"    {line}" for line in _lane_sines(writer, layout)),
+        # So many rows more are eight numbers more.
+        spare=max(-(-8 // width) if width else 0 for width in (*widths.values(), count)),
+        passed=", ".join(widths),
+        advance=", ".join(f"{x} += LANES * {width}" for x, width in widths.items()),
+        advance_m="\n".join(f"        {x} += m * {width};" for x, width in widths.items()),
+        copies=", ".join(f"own_{x}[LANES * {width} + 8] = {{R(0.0)}}" for x, width in widths.items()),
+        copy="\n".join(
+            f"        for (size_t i = 0; i < m * {width}; ++i) own_{x}[i] = {x}[i];"
+            for x, width in widths.items()
+            if width
+        ),
+        own=", ".join(f"own_{x}" for x in widths),
+    )
+
+
+class Layout:
+    """Where a function's inputs, sines and cosines stand in front of its line."""
+
+    def __init__(self, function: Function) -> None:
+        self.inputs = [node for node in function.nodes if node.op in function.inputs]
+        self.angles = function.angles
+        self.made = [node for node in self.angles if node not in self.inputs]
+        self.room = max(1, len(self.inputs) + 2 * len(self.angles))
+
+    def place(self, node: Node) -> int:
+        """Of an input, a sine or a cosine."""
+        if node.op not in ("sin", "cos"):
+            return self.inputs.index(node)
+        at = len(self.inputs) + self.angles.index(node.of[0])
+        return at + len(self.angles) * (node.op == "cos")
+
+
+def _lines(writer: Writer, layout: Layout) -> Iterator[str]:
+    for node in writer.given:
+        yield f"const real {writer.words[node]} = in[{layout.place(node)} * L];"
+    for head, lines in writer.statements():
+        yield f"/* {head} */"
+        yield from (f"const real {word} = {value};" for word, value in lines)
+    yield from (f"out[{k} * L] = {value};" for k, value in enumerate(writer.results()))
+
+
+def _sines(writer: Writer, layout: Layout) -> Iterator[str]:
+    at, count = len(layout.inputs), len(layout.angles)
+    for k, node in enumerate(layout.angles):
+        angle = writer.whole(node, lambda x: f"in[{layout.place(x)}]")
+        yield f"in[{at + k}] = sin({angle});"
+        yield f"in[{at + count + k}] = cos({angle});"
+
+
+def _reads(layout: Layout, widths: dict[str, int]) -> Iterator[str]:
+    for x, width in widths.items():
+        for first in range(0, width, 8):
+            found = [node for node in layout.inputs if node.op == x and node.of[0] // 8 == first // 8]
+            if found:
+                yield f"{{ eight x[8]; columns({x} + {first}, {width}, x);"
+                yield from (
+                    f"  put(in + {layout.place(node)} * LANES, x + {node.of[0] % 8});" for node in found
+                )
+                yield "}"
+        yield f"(void){x};"
+    yield "(void)in;"
+
+
+def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
+    at, count = len(layout.inputs), len(layout.angles)
+    if not count:
+        return
+    for k, node in enumerate(layout.made):
+        value = writer.whole(node, lambda x: f"in[{layout.place(x)} * LANES + k]")
+        yield f"for (int k = 0; k < LANES; ++k) in[{layout.room + k} * LANES + k] = {value};"
+    calls = []
+    for k, node in enumerate(layout.angles):
+        angle = layout.place(node) if node in layout.inputs else layout.room + layout.made.index(node)
+        calls.append(", ".join(f"in + {place} * LANES" for place in (angle, at + k, at + count + k)))
+    yield "real most[LANES] = {R(0.0)};"
+    yield from (f"sine_cosine({call}, most);" for call in calls)
+    yield "if (any_far(most)) {"
+    yield from (f"    library_sines({call});" for call in calls)
+    yield "}"
+
+
+# -- its test vectors --------------------------------------------------------------------------------------
+
+
+def vectors(code: Code) -> Iterator[str]:
+    """Inputs, true values and what they may be off by, as arrays."""
+    found, n = code.proof.vectors, len(code.proof.vectors)
+    yield "/* The true values at fifty digits, and how far a number may be off, in eps of its kind. */"
+    for k, (letter, width) in enumerate(
+        code.widths(max(code.functions, key=lambda f: len(f.inputs))).items()
+    ):
+        rows = [[repr(x) for x in vector.inputs[k]] or ["0.0"] for vector in found]
+        yield _array(f"given_{letter}[{n}][{max(1, width)}]", rows)
+    for function in code.functions:
+        size = f"{function.name}[{n}][{len(function.results)}]"
+        yield _array(f"true_{size}", [vector.results[function.name] for vector in found])
+        yield _array(f"within_{size}", [vector.within[function.name] for vector in found])
+
+
+def _array(declared: str, rows: Sequence[Sequence[str]]) -> str:
+    inside = ",\n".join(f"    {{\n{_numbers(row)}}}" for row in rows)
+    return f"static const double {declared} = {{\n{inside}\n}};"
+
+
+def _numbers(values: Sequence[str]) -> str:
+    """A list of numbers over several lines."""
+    lines, line = list[str](), "       "
+    for value in values:
+        if len(line) + len(value) > 108:
+            lines.append(line)
+            line = "       "
+        line += f" {value},"
+    return "\n".join([*lines, line.rstrip(",")])
+
+
+def main(code: Code, frame: str) -> str:
+    """A program that computes the test vectors."""
+    return framed("check.c", checks="".join(_check(code, function, frame) for function in code.functions))
+
+
+def _check(code: Code, function: Function, frame: str) -> str:
+    widths, n = code.widths(function), len(code.proof.vectors)
+    return framed(
+        frame,
+        title=code.name,
+        name=function.name,
+        n=n,
+        count=len(function.results),
+        arrays=", ".join(f"{x}[N][{max(1, width)}]" for x, width in widths.items()),
+        fill="\n".join(
+            f"            for (int i = 0; i < {max(1, width)}; ++i) {x}[k][i] = R(given_{x}[k % {n}][i]);"
+            for x, width in widths.items()
+        ),
+        all=", ".join(f"&{x}[0][0]" for x in widths),
+        each=", ".join(f"{x}[k]" for x in widths),
+    )

@@ -1,0 +1,234 @@
+"""What a file of code is written from: the functions of one frame, the names in them, and their proof."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from urdfkin.compiled.plan import Plan, Step
+from urdfkin.errors import InputError
+from urdfkin.errors.demands import words
+from urdfkin.export.expression import Node, Number
+from urdfkin.export.function import Function, function_of
+from urdfkin.export.naming import all_safe, shown, title
+from urdfkin.export.proof import Proof, prove
+from urdfkin.model.configuration import coordinate_names, rate_names
+from urdfkin.model.reference import Reference
+from urdfkin.verify.quantities import Quantity, quantity, walked
+from urdfkin.verify.verifier import Verifier
+
+#: Of a sum, a product, and what needs no brackets.
+_SUM, _SIGN, _PRODUCT, _ATOM = range(4)
+_LEVEL = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
+
+
+@dataclass(frozen=True)
+class Code:
+    """A frame's functions.
+
+    Attributes:
+        name: A word that the names of functions begin with.
+        robot: The robot's name, fit for a comment; so are the others.
+        frame: The frame's.
+        reference: For which point and in which axes.
+        functions: One for each quantity.
+        coordinates: Of q.
+        rates: Of v and a.
+        joints: The path's moving joints.
+        proof: What they are worth.
+        nq: Length of q.
+        nv: Length of v and a.
+        words: Identifiers: by letter of the input, for each of its numbers; and for the path's joints.
+    """
+
+    name: str
+    robot: str
+    frame: str
+    reference: Reference
+    functions: tuple[Function, ...]
+    coordinates: tuple[str, ...]
+    rates: tuple[str, ...]
+    joints: tuple[str, ...]
+    proof: Proof
+    words: dict[str, list[str]]
+
+    @property
+    def nq(self) -> int:
+        """Length of q."""
+        return len(self.coordinates)
+
+    @property
+    def nv(self) -> int:
+        """Length of v and a."""
+        return len(self.rates)
+
+    def widths(self, function: Function) -> dict[str, int]:
+        """How many numbers a function takes of q, v and a, as far as it takes them."""
+        return {letter: self.nq if letter == "q" else self.nv for letter in function.inputs}
+
+    @property
+    def head(self) -> list[str]:
+        """What a reader must know, without comment marks; whether it is verified comes first."""
+        verdict, *rest = self.proof.lines
+        lines = [verdict] if not self.proof.certificate.verified else []
+        lines += [
+            f"Kinematics of {self.robot}, frame {self.frame}: straight-line code for this robot and frame."
+        ]
+        lines += ["", *([verdict] if not lines[0].startswith("UNVERIFIED") else []), *rest, ""]
+        lines += [
+            "Metres, radians, seconds. Results are row by row; six-vectors and Jacobian rows are [linear;"
+        ]
+        lines += [f"angular], seen in {self.reference.name}; accelerations are classical, without gravity."]
+        lines += ["Numbers such as 7.130 are the equations' in the chapter: urdfkin explain 7.130", ""]
+        lines += [f"q[{i}] {name}" for i, name in enumerate(self.coordinates)]
+        if self.rates != self.coordinates:
+            lines += [f"v[{i}], a[{i}] {name}" for i, name in enumerate(self.rates)]
+        return lines
+
+
+def code_of(
+    verifier: Verifier,
+    plan_of: Callable[[Sequence[int]], Plan],
+    frame: str,
+    quantities: Collection[str],
+    reference: Reference | str,
+    *,
+    name: str | None,
+    verify: bool | None,
+) -> Code:
+    """Everything that is written about a frame.
+
+    Raises:
+        UnknownNameError: no such frame, quantity or reference.
+        InputError: no quantity, or one that the walk does not compute.
+        VerificationError: Pinocchio computes something else.
+    """
+    tree, reference = verifier.tree, Reference.of(reference)
+    plan = plan_of([tree.frame_link(frame)])
+    rows = _rows(quantities)
+    if not tree.nv and any(row.columns for row in rows):
+        raise InputError(
+            "a Jacobian without columns",
+            where=tree.name,
+            found="nothing that moves",
+            remedy="export the placement",
+        )
+    functions = tuple(function_of(plan, row, reference) for row in rows)
+    coordinates, rates = coordinate_names(tree), rate_names(tree)
+    joints = tuple(tree.joints[i].name for i in plan.joints)
+    return Code(
+        name=title("", name) if name else title(tree.name, frame),
+        robot=shown(tree.name),
+        frame=shown(frame),
+        reference=reference,
+        functions=functions,
+        coordinates=tuple(map(shown, coordinates)),
+        rates=tuple(map(shown, rates)),
+        joints=tuple(map(shown, joints)),
+        proof=prove(verifier, plan_of, frame, reference, functions, verify),
+        words={"q": all_safe(coordinates), "v": all_safe(rates), "a": all_safe(rates), "s": all_safe(joints)},
+    )
+
+
+def _rows(names: Collection[str]) -> list[Quantity]:
+    rows = [quantity(name.replace("_", " ")) for name in dict.fromkeys(words(names, "quantities"))]
+    if not rows:
+        raise InputError(
+            "no quantity to export", remedy=f"name some of {', '.join(x.method for x in walked())}"
+        )
+    for row in rows:
+        if row not in walked():
+            raise InputError(
+                f"the {row.name} cannot be exported",
+                remedy=f"choose among {', '.join(x.method for x in walked())}",
+            )
+    return rows
+
+
+class Writer:
+    """A function's expressions as text, in any language with infix operators.
+
+    Args:
+        code: Whose names are used.
+        function: One of its functions.
+        literal: Writes a constant.
+        sine: Whether sine and cosine are operations; else they are given like inputs.
+    """
+
+    def __init__(
+        self, code: Code, function: Function, literal: Callable[[float], str] = repr, *, sine: bool = True
+    ) -> None:
+        self.code, self.function, self.literal = code, function, literal
+        self.own = set(function.statements)
+        self.leaves = () if sine else ("sin", "cos")
+        self.inside = function.within(self.leaves)
+        self.words = {node: self._word(node, k) for k, node in enumerate(function.nodes)}
+
+    def _word(self, node: Node, k: int) -> str:
+        words = self.code.words
+        if node.op in words:
+            return f"{node.op}_{words[node.op][node.of[0]]}"
+        if node.op in ("sin", "cos"):
+            return f"{node.op[0]}_{words['s'][node.place]}"
+        return node.name or f"t{k}"
+
+    @property
+    def given(self) -> list[Node]:
+        """What is needed of q, v and a; and sines and cosines, where they are given."""
+        leaves = (*self.code.words, *self.leaves)
+        return [node for node in self.function.nodes if node.op in leaves and node in self.inside]
+
+    def statements(self) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+        """For each place on the path its head, and its statements: names and values."""
+        nodes = [x for x in self.function.statements if x in self.inside and x.op not in self.leaves]
+        for place, group in groupby(nodes, key=lambda node: node.place):
+            found = list(group)
+            numbers = dict.fromkeys(n for x in found for n in x.equation.split(", ") if n)
+            lines = [(self.words[node], self.defined(node)) for node in found]
+            yield ": ".join(filter(None, (self._place(place), ", ".join(numbers)))), lines
+
+    def _place(self, place: int) -> str:
+        joints, steps = self.code.joints, self.function.plan.steps
+        if place < len(joints):
+            kind = ("turns", "slides", "is planar", "is floating")[steps[place, Step.KIND]]
+            return f"{joints[place]} {kind}"
+        return self.code.frame if place == len(joints) else "results"
+
+    def results(self) -> list[str]:
+        """The values, row by row."""
+        return [self.text(x) for x in self.function.results]
+
+    def text(self, x: Number, level: int = _SUM) -> str:
+        """An expression as an operand that must bind as tightly as `level`."""
+        if not isinstance(x, Node):
+            return self.literal(float(x))
+        if x in self.own or x.op in self.code.words:
+            return self.words[x]
+        return self.defined(x, level)
+
+    def defined(self, x: Node, level: int = _SUM) -> str:
+        """What a statement says."""
+        if x.op in ("sin", "cos", "sqrt"):
+            return f"{x.op}({self.text(x.of[0])})"
+        if x.op == "neg":
+            text, own = f"-{self.text(x.of[0], _PRODUCT)}", _SIGN
+        else:
+            own = _LEVEL[x.op]
+            left, right = x.of
+            # a + (b + c) keeps its brackets: it is rounded as it was evaluated for the check.
+            text = f"{self.text(left, own)} {x.op} {self.text(right, own + 1)}"
+        return text if own >= level else f"({text})"
+
+    def whole(self, x: Number, given: Callable[[Node], str], level: int = _SUM) -> str:
+        """An expression with nothing left out: for an angle, which stands before the statements."""
+        if not isinstance(x, Node):
+            return self.literal(float(x))
+        if x.op in self.code.words:
+            return given(x)
+        own = _LEVEL.get(x.op, _SIGN)
+        if x.op == "neg":
+            text = f"-{self.whole(x.of[0], given, _PRODUCT)}"
+        else:
+            text = f"{self.whole(x.of[0], given, own)} {x.op} {self.whole(x.of[1], given, own + 1)}"
+        return text if own >= level else f"({text})"

@@ -1,0 +1,96 @@
+@head@
+
+#include <stddef.h>
+#ifndef @UP@_REAL
+#define @UP@_REAL double
+#endif
+@declarations@
+#ifndef @UP@_DECLARATIONS
+#include <float.h>
+#include <tgmath.h>
+
+#ifdef __FAST_MATH__
+#error "-ffast-math takes apart the reduction of angles; -O3 -ffp-contract=fast -fno-math-errno is as fast"
+#endif
+#ifdef __GNUC__
+#define INLINE static inline __attribute__((always_inline))
+#define ALIGNED __attribute__((aligned(64)))
+#else
+#define INLINE static inline
+#define ALIGNED
+#endif
+
+typedef @UP@_REAL real;
+#define R(x) ((real)(x))
+/* Configurations side by side in the batch form. */
+#define LANES 8
+
+/* Eight numbers at once: from eight rows of memory to eight columns, and back. */
+#if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12)) && !defined(@UP@_PORTABLE)
+typedef real eight __attribute__((vector_size(8 * sizeof(real))));
+typedef real anywhere __attribute__((vector_size(8 * sizeof(real)), aligned(sizeof(real)), may_alias));
+INLINE void get(eight *x, const real *from) { *x = *(const anywhere *)from; }
+INLINE void put(real *to, const eight *x) { *(anywhere *)to = *x; }
+INLINE void transpose(eight *x)
+{
+    eight y[8];
+    for (int i = 0; i < 8; i += 2) {
+        y[i] = __builtin_shufflevector(x[i], x[i + 1], 0, 8, 2, 10, 4, 12, 6, 14);
+        y[i + 1] = __builtin_shufflevector(x[i], x[i + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+    }
+    for (int i = 0; i < 8; i += i % 4 == 1 ? 3 : 1) {
+        x[i] = __builtin_shufflevector(y[i], y[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+        x[i + 2] = __builtin_shufflevector(y[i], y[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+    for (int i = 0; i < 4; ++i) {
+        y[i] = __builtin_shufflevector(x[i], x[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+        y[i + 4] = __builtin_shufflevector(x[i], x[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+    }
+    for (int i = 0; i < 8; ++i) x[i] = y[i];
+}
+#else
+typedef struct { real lane[8]; } eight;
+INLINE void get(eight *x, const real *from)
+{
+    for (int i = 0; i < 8; ++i) x->lane[i] = from[i];
+}
+INLINE void put(real *to, const eight *x)
+{
+    for (int i = 0; i < 8; ++i) to[i] = x->lane[i];
+}
+INLINE void transpose(eight *x)
+{
+    for (int i = 0; i < 8; ++i)
+        for (int k = 0; k < i; ++k) {
+            const real one = x[i].lane[k];
+            x[i].lane[k] = x[k].lane[i];
+            x[k].lane[i] = one;
+        }
+}
+#endif
+
+/* Eight columns of LANES rows that are so wide; what lies beyond a row's end is read as well. */
+INLINE void columns(const real *rows, int width, eight *x)
+{
+    for (int k = 0; k < 8; ++k) get(x + k, rows + k * width);
+    transpose(x);
+}
+
+/* Row after row. Where a row is shorter than eight numbers, what is written beyond it is the next row's. */
+INLINE void write_rows(const real *results, int count, real *out)
+{
+    for (int j = 0; j < count; j += 8) {
+        const int first = j + 8 <= count || count < 8 ? j : count - 8;
+        eight x[8];
+        for (int i = 0; i < 8; ++i) get(x + i, results + (first + i < count ? first + i : first) * LANES);
+        transpose(x);
+        for (int k = 0; k < 8; ++k) put(out + k * count + first, x + k);
+    }
+}
+@sines@
+@functions@
+#ifdef @UP@_MAIN
+#include <stdio.h>
+@main@
+#endif
+#endif

@@ -1,0 +1,45 @@
+
+/* ---- @name@: @operations@ operations ---- */
+
+/* From what is known of a configuration, its inputs, then sines, then cosines, L apart. */
+INLINE void line_@name@(const real *in, real *out, const size_t L)
+{
+    (void)in;
+    (void)L;
+@lines@
+}
+
+void @title@_@name@@given@
+{
+    real in[@room@] = {@inputs@};
+@sines@
+    line_@name@(in, out, 1);
+}
+
+static void lanes_@name@@given@
+{
+    ALIGNED real in[@lane_room@ * LANES];
+    ALIGNED real results[@count@ * LANES];
+@reads@
+@lane_sines@
+    for (int k = 0; k < LANES; ++k)
+        line_@name@(in + k, results + k, (size_t)LANES);
+    write_rows(results, @count@, out);
+}
+
+void @title@_@name@_batch(size_t n, @given_rest@
+{
+    /* Nothing beyond an array's end is touched: the last rows are computed in copies. */
+    for (; n > LANES + @spare@; n -= LANES, @advance@, out += LANES * @count@)
+        lanes_@name@(@passed@, out);
+    while (n) {
+        const size_t m = n < LANES ? n : LANES;
+        real @copies@, own[LANES * @count@ + 8];
+@copy@
+        lanes_@name@(@own@, own);
+        for (size_t i = 0; i < m * @count@; ++i) out[i] = own[i];
+        n -= m;
+@advance_m@
+        out += m * @count@;
+    }
+}

@@ -1,0 +1,171 @@
+"""One quantity of one frame as a function: what it takes, what it gives, and the statements between.
+
+A statement is an expression that is used more than once, that is a number of a link's state, or a sine, a
+cosine or a root. All others stand where they are used.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from urdfkin.compiled.plan import Plan
+from urdfkin.export import walk
+from urdfkin.export.expression import Graph, Node, Number, needed
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.verify.quantities import Quantity
+
+_INPUTS = ("q", "v", "a")
+#: What a statement of its own is made for, wherever it is used.
+_ALWAYS = ("sin", "cos", "sqrt", "/")
+#: More operations than these no line has.
+_LONGEST = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Function:
+    """Straight-line code for one quantity.
+
+    Attributes:
+        quantity: Its row of the table.
+        reference: For which point and in which axes.
+        plan: The path.
+        results: Row by row: constants and expressions.
+    """
+
+    quantity: Quantity
+    reference: Reference
+    plan: Plan
+    results: tuple[Number, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the quantity, as a word."""
+        return self.quantity.method
+
+    @property
+    def inputs(self) -> str:
+        """What it takes: "q", "qv" or "qva"."""
+        return self.quantity.inputs
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the result."""
+        return self.quantity.own_shape(self.plan.nv)
+
+    @cached_property
+    def nodes(self) -> list[Node]:
+        """All that is needed, in an order in which it can be computed."""
+        return needed(self.results)
+
+    @cached_property
+    def operations(self) -> int:
+        """How many there are, a change of sign none."""
+        return sum(node.op not in (*_INPUTS, "neg") for node in self.nodes)
+
+    @cached_property
+    def angles(self) -> list[Node]:
+        """Whose sine or cosine is needed."""
+        found = (node.of[0] for node in self.nodes if node.op in ("sin", "cos"))
+        return list(dict.fromkeys(found))
+
+    @cached_property
+    def statements(self) -> list[Node]:
+        """The nodes with a line of their own, in order."""
+        uses = Counter[Node]()
+        for value in self.results:
+            if isinstance(value, Node):
+                uses[_bare(value)] += 1
+        for node in self.nodes:
+            if node.op != "neg":
+                uses.update(map(_bare, node.operands))
+        found, length = list[Node](), dict[Node, int]()
+        for node in self.nodes:
+            length[node] = 1 + sum(length[x] for x in node.operands)
+            if node.op in _INPUTS or node.op == "neg":
+                length[node] = 0 if node.op in _INPUTS else length[node.of[0]]
+            elif node.name or uses[node] > 1 or node.op in _ALWAYS or length[node] > _LONGEST:
+                found.append(node)
+                length[node] = 0
+        return found
+
+    def within(self, leaves: Collection[str]) -> set[Node]:
+        """The nodes that results are made of, without what is behind these operations."""
+        waiting, found = [x for x in self.results if isinstance(x, Node)], set[Node]()
+        while waiting:
+            if (node := waiting.pop()) not in found:
+                found.add(node)
+                waiting += [] if node.op in leaves else node.operands
+        return found
+
+    def evaluated(self, inputs: Sequence[FloatArray]) -> FloatArray:
+        """(n, ...) for q (n, nq), and v and a (n, nv) as far as it takes them; no code is written for it."""
+        value: dict[Node, Any] = {}
+        given = dict(zip(_INPUTS, inputs, strict=False))
+        for node in self.nodes:
+            if node.op in given:
+                value[node] = given[node.op][:, node.of[0]]
+            else:
+                value[node] = _OPERATIONS[node.op](*(value[x] if isinstance(x, Node) else x for x in node.of))
+        out = np.empty((len(inputs[0]), len(self.results)))
+        for k, x in enumerate(self.results):
+            out[:, k] = value[x] if isinstance(x, Node) else x
+        return out.reshape(len(out), *self.shape)
+
+
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "+": np.add,
+    "-": np.subtract,
+    "*": np.multiply,
+    "/": np.divide,
+    "neg": np.negative,
+    "sin": np.sin,
+    "cos": np.cos,
+    "sqrt": np.sqrt,
+}
+
+
+def _bare(node: Node) -> Node:
+    """Without its sign: -x is written where it is used."""
+    return node.of[0] if node.op == "neg" else node
+
+
+def function_of(plan: Plan, quantity: Quantity, reference: Reference) -> Function:
+    """The function for the plan's only frame.
+
+    Args:
+        plan: The path.
+        quantity: A row that the walk computes.
+        reference: For which point and in which axes.
+    """
+    graph = Graph()
+
+    def entering(place: int) -> None:
+        graph.place = place
+
+    kind = walk.Kind(graph.chapter, graph.sine_cosine, graph.root, entering, _name)
+    inputs = [
+        [graph.input(letter, i) for i in range(plan.nq if letter == "q" else plan.nv)]
+        if letter in quantity.inputs
+        else [0.0] * plan.nv
+        for letter in _INPUTS
+    ]
+    results = walk.QUANTITIES[quantity.name](plan, kind, inputs, reference)
+    return Function(quantity, reference, plan, tuple(x if isinstance(x, Node) else x + 0.0 for x in results))
+
+
+def _name(place: int, state: walk.State) -> None:
+    """Call the numbers of a state by the text's letters."""
+    named = {f"R{place + 1}_{r}{c}": x for r, row in enumerate(state.R) for c, x in enumerate(row)}
+    for letter in ("p", "w", "vel", "alpha", "acc"):
+        vector = getattr(state, letter)
+        named |= {f"{letter}{place + 1}_{axis}": x for axis, x in zip("xyz", vector, strict=True)}
+    for name, x in named.items():
+        if isinstance(x, Node) and x.op in ("+", "-", "*") and not x.name:
+            x.name = name

@@ -1,0 +1,180 @@
+"""What goes along with code: who confirmed it, and results that are right to fifty digits.
+
+The expressions that are printed are evaluated as they stand and held against Pinocchio's results. Whether a
+language, its compiler and its library compute the same from the printed text, the test vectors say wherever
+the file arrives: true values at fifty digits from the URDF's decimals, and for each number how far a correct
+computation may be off, in eps of the number's own kind. Their inputs are numbers of single precision, so that
+they are the same in both.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import dataclass
+from importlib import metadata
+
+import numpy as np
+
+from urdfkin.compiled.plan import Plan
+from urdfkin.dh.export.code import plain
+from urdfkin.export.function import Function
+from urdfkin.kinematics.roundings import SMALLEST
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.verify.call import Call
+from urdfkin.verify.certificate import Certificate
+from urdfkin.verify.exact.decimals import read_exact
+from urdfkin.verify.exact.recursion import move
+from urdfkin.verify.exact.vectors import DIGITS, exact, mp
+from urdfkin.verify.sampling import draw
+from urdfkin.verify.verifier import Verifier, bound_of
+
+#: Configurations that Pinocchio is asked about, besides the neutral one and the ends of the limits.
+CHECKED = 100
+#: Configurations with results at fifty digits.
+VECTORS = 4
+
+
+@dataclass(frozen=True)
+class Vector:
+    """One configuration, and what each function makes of it.
+
+    Attributes:
+        inputs: q, v and a.
+        results: By quantity, the true values, row by row, as decimals.
+        within: By quantity, how far each number may be off, in eps.
+    """
+
+    inputs: tuple[list[float], ...]
+    results: dict[str, list[str]]
+    within: dict[str, list[str]]
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What a file is worth.
+
+    Attributes:
+        sha256: Of the URDF's text.
+        urdfkin: Version.
+        certificate: Of the printed expressions.
+        vectors: To be computed again.
+    """
+
+    sha256: str
+    urdfkin: str
+    certificate: Certificate
+    vectors: tuple[Vector, ...]
+
+    @property
+    def lines(self) -> list[str]:
+        """In words."""
+        oracle = f"Pinocchio {self.certificate.pinocchio}"
+        if not self.certificate.verified:
+            reasons = plain("; ".join(self.certificate.not_verified)) or "nothing was checked"
+            verdict = [f"UNVERIFIED by {oracle}: {reasons}"]
+        else:
+            verdict = [f"Verified by {oracle}, the expressions below evaluated in double precision:"] + [
+                f"  {line.quantity}: {line.checked} configurations, worst disagreement {line.worst:.2g}"
+                f" eps*scale, {line.share:.2%} of the bound"
+                for line in self.certificate.lines
+            ]
+        return [
+            *verdict,
+            f"URDF sha256 {self.sha256}",
+            f"Written by urdfkin {self.urdfkin}; {len(self.vectors)} test vectors at {DIGITS} digits below",
+        ]
+
+
+def prove(
+    verifier: Verifier,
+    plan_of: Callable[[Sequence[int]], Plan],
+    frame: str,
+    reference: Reference,
+    functions: Sequence[Function],
+    verify: bool | None,
+) -> Proof:
+    """Hold functions against Pinocchio, and compute test vectors.
+
+    Raises:
+        VerificationError: Pinocchio computes something else.
+    """
+    tree = verifier.tree
+    checker = copy(verifier)  # with an account of its own
+    drawn = draw(tree, CHECKED, np.random.default_rng(0), with_special=True)
+    for function in functions:
+        inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
+        call = Call(tree, plan_of, frame, reference, None, inputs)
+        found = function.evaluated((call.q, *call.rates))
+        checker.check(function.quantity, call, found, bool(checker.wanted(verify)))
+    return Proof(
+        sha256=hashlib.sha256(verifier.text.encode()).hexdigest(),
+        urdfkin=_version(),
+        certificate=checker.certificate(),
+        vectors=_vectors(verifier, plan_of, frame, reference, functions),
+    )
+
+
+def _version() -> str:
+    try:
+        return metadata.version("urdfkin")
+    except metadata.PackageNotFoundError:
+        return "of a checkout"
+
+
+def _vectors(
+    verifier: Verifier,
+    plan_of: Callable[[Sequence[int]], Plan],
+    frame: str,
+    reference: Reference,
+    functions: Sequence[Function],
+) -> tuple[Vector, ...]:
+    tree = verifier.tree
+    link = tree.frame_link(frame)
+    path = tree.path(link)
+    joints = read_exact(verifier.text, tree, mp, path)
+    drawn = draw(tree, VECTORS, np.random.default_rng(1), with_special=False)
+    inputs = tuple(_single(x) for x in (drawn.q, drawn.v, drawn.a))
+    whole = Call(tree, plan_of, frame, reference, None, inputs)
+    part = whole.part(slice(0, VECTORS))
+    within = {f.name: _within(f, part) for f in functions}
+    found = []
+    for k in range(VECTORS):
+        numbers = [[exact(x) for x in row[k]] for row in inputs]
+        motion = move(tree, joints, *numbers)
+        true = {f.name: f.quantity.truth(motion, link, reference).ravel() for f in functions}
+        results = {name: [_decimal(x) for x in values] for name, values in true.items()}
+        found.append(
+            Vector(
+                tuple(row[k].tolist() for row in inputs),
+                results,
+                {name: [_rounded_down(x) for x in values[k]] for name, values in within.items()},
+            )
+        )
+    return tuple(found)
+
+
+def _single(x: FloatArray) -> FloatArray:
+    return x.astype(np.float32).astype(np.float64)
+
+
+def _within(function: Function, part: object) -> FloatArray:
+    """(n, numbers) k * scale."""
+    bound = bound_of(function.quantity, part)  # type: ignore[arg-type]
+    scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST), 0.0)
+    n = len(scale)
+    shape = (n, 1, *function.shape)
+    return np.asarray(np.broadcast_to(scale * bound.k, shape)).reshape(n, -1)
+
+
+def _decimal(x: object) -> str:
+    text: str = mp.nstr(mp.mpf(x), DIGITS)
+    return text
+
+
+def _rounded_down(x: float) -> str:
+    """Six digits, and no more than x."""
+    text = f"{x:.6g}"
+    return text if float(text) <= x else f"{x * (1.0 - 1e-6):.6g}"

@@ -1,0 +1,219 @@
+"""Python for NumPy, Numba, JAX, CasADi and SymPy: the same lines, which differ in what stands around them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from urdfkin.export.code import Code, Writer
+from urdfkin.export.function import Function
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """What a library wants.
+
+    Attributes:
+        about: What a function of the file takes and gives.
+        imports: Lines, `sin`, `cos` and `sqrt` among what they bring.
+        decorator: Before each function, if anything.
+        entering: Lines at a function's beginning, from its inputs.
+        index: Of a number of an input.
+        result: Lines that return numbers of a shape.
+        values: The body of `_values(function, inputs)`: the results for each of a list of configurations.
+        before: What a run of the file's own check sets first.
+    """
+
+    about: str
+    imports: str
+    result: Callable[[list[str], tuple[int, ...]], Iterator[str]]
+    values: str
+    decorator: str = ""
+    entering: Callable[[str], list[str]] = lambda inputs: []
+    index: str = "{}[{}]"
+    before: str = ""
+
+
+def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
+    return [values[i : i + width] for i in range(0, len(values), width)] if width else []
+
+
+def _in_array(create: str, index: str) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
+    """Written one by one into an array."""
+
+    def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
+        yield f"out = {create.format(', '.join(map(str, shape)))}"
+        width = shape[1] if len(shape) > 1 else 1
+        for k, value in enumerate(values):
+            place = f"{k // width}, {k % width}" if len(shape) > 1 else str(k)
+            yield f"out[{index}{place}] = {value}"
+        yield "return out"
+
+    return result
+
+
+def _nested(
+    opening: str, closing: str, row: str = "[{}]"
+) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
+    """Row by row, inside one call."""
+
+    def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
+        yield f"return {opening}"
+        if len(shape) == 1:
+            yield from (f"    {value}," for value in values)
+        for line in _rows(values, shape[1]) if len(shape) > 1 else ():
+            first, last = row.split("{}")
+            yield f"    {first}"
+            yield from (f"        {value}," for value in line)
+            yield f"    {last},"
+        yield closing
+
+    return result
+
+
+def _shapes(inputs: str) -> list[str]:
+    lines = [f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs]
+    shapes = ", ".join(f"{x}.shape[:-1]" for x in inputs)
+    return [*lines, f"shape = np.broadcast_shapes({shapes})"]
+
+
+_ONE_BY_ONE = "return [{} for one in zip(*inputs)]"
+
+DIALECTS = {
+    "numpy": Dialect(
+        about="Arrays q (..., {nq}), v and a (..., {nv}), which broadcast; results have the same.",
+        imports="import numpy as np\nfrom numpy import cos, sin, sqrt",
+        entering=_shapes,
+        index="{}[..., {}]",
+        result=_in_array("np.empty((*shape, {}))", "..., "),
+        values="return np.reshape(function(*map(np.array, inputs)), (len(inputs[0]), -1)).tolist()",
+    ),
+    "numba": Dialect(
+        about="One configuration, float64 arrays q ({nq},), v and a ({nv},); compiled when first called.",
+        imports="from math import cos, sin, sqrt\n\nimport numpy as np\nfrom numba import njit",
+        decorator='@njit(error_model="numpy")',
+        result=_in_array("np.empty(({},))", ""),
+        values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
+    ),
+    "jax": Dialect(
+        about="One configuration, arrays q ({nq},), v and a ({nv},), of any precision; for jit, vmap, grad.",
+        imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import cos, sin, sqrt",
+        entering=lambda inputs: [f"{x} = jnp.asarray({x})" for x in inputs],
+        result=_nested("jnp.array([", "], dtype=q.dtype)"),
+        values="found = jax.vmap(jax.jit(function))(*map(jnp.array, inputs))\n"
+        "    return found.reshape(len(inputs[0]), -1).tolist()",
+        before='jax.config.update("jax_enable_x64", True)',
+    ),
+    "casadi": Dialect(
+        about="Columns SX, MX or DM: q ({nq}), v and a ({nv}).",
+        imports="import casadi\nfrom casadi import cos, sin, sqrt",
+        result=_nested("casadi.vertcat(", ")", "casadi.horzcat({})"),
+        values=_ONE_BY_ONE.format(
+            "[float(x) for row in casadi.DM(function(*map(casadi.DM, one))).full().tolist() for x in row]"
+        ),
+    ),
+    "sympy": Dialect(
+        about="Lists of symbols or numbers: q ({nq}), v and a ({nv}); a result is a Matrix.",
+        imports="from sympy import Matrix, cos, sin, sqrt",
+        result=_nested("Matrix([", "])"),
+        values=_ONE_BY_ONE.format("[float(x) for x in function(*one)]"),
+    ),
+}
+
+
+def write(code: Code, to: str) -> str:
+    """A module with a function for each quantity, and its check: `python FILE`."""
+    dialect = DIALECTS[to]
+    about = dialect.about.format(nq=code.nq, nv=code.nv)
+    lines = [
+        '"""' + code.head[0],
+        *code.head[1:],
+        "",
+        about,
+        f"To try it: python {code.name}_{to}.py",
+        '"""',
+        "",
+    ]
+    lines += [dialect.imports, ""]
+    for function in code.functions:
+        lines += ["", *_function(code, function, dialect), ""]
+    return "\n".join([*lines, *_check(code, dialect), ""])
+
+
+def _function(code: Code, function: Function, dialect: Dialect) -> Iterator[str]:
+    writer = Writer(code, function)
+    if dialect.decorator:
+        yield dialect.decorator
+    yield f"def {function.name}({', '.join(function.inputs)}):"
+    size = ", ".join(map(str, function.shape)) + ("," if len(function.shape) == 1 else "")
+    numbers = ", ".join(function.quantity.equations)
+    yield f'    """({size}), eq. {numbers}; {function.operations} operations."""'
+    yield from (f"    {line}" for line in dialect.entering(function.inputs))
+    for node in writer.given:
+        yield f"    {writer.words[node]} = {dialect.index.format(node.op, node.of[0])}"
+    for head, lines in writer.statements():
+        yield f"    # {head}"
+        yield from (f"    {word} = {value}" for word, value in lines)
+    yield from (f"    {line}" for line in dialect.result(writer.results(), function.shape))
+
+
+_CHECK = '''
+def _values(function, inputs):
+    {values}
+
+
+def check():
+    """For each function its largest error as a share of what it may be off by: at most 1."""
+    shares = {{}}
+    for function in ({functions},):
+        name, worst = function.__name__, 0.0
+        inputs = [GIVEN[letter] for letter in INPUTS[name]]
+        for found, true, within in zip(_values(function, inputs), TRUE[name], WITHIN[name]):
+            for x, y, k in zip(found, true, within):
+                error, least = abs(x - float(y)), k * 2.0**-52
+                share = error / least if least else (0.0 if error == 0.0 else float("inf"))
+                worst = worst if share <= worst else share  # NaN is the worst
+        shares[name] = worst
+    return shares
+
+
+if __name__ == "__main__":
+{before}    wrong = False
+    for name, worst in check().items():
+        good = worst <= 1.0
+        wrong |= not good
+        line = f"{{name}}: {{len(TRUE[name])}} test vectors, worst error {{worst:.3g}} of the bound"
+        print("good" if good else "WRONG", line)
+    raise SystemExit(wrong)
+'''
+
+
+def _check(code: Code, dialect: Dialect) -> Iterator[str]:
+    yield "\n# Configurations, true values at fifty digits, and how far a number may be off, in eps = 2^-52."
+    vectors = code.proof.vectors
+    most = max((function.inputs for function in code.functions), key=len)
+    yield "INPUTS = {" + ", ".join(f'"{f.name}": "{f.inputs}"' for f in code.functions) + "}"
+    yield "GIVEN = {"
+    for k, letter in enumerate(most):
+        yield f'    "{letter}": ['
+        yield from (f"        {v.inputs[k]!r}," for v in vectors)
+        yield "    ],"
+    yield "}"
+    for what, of, form in (("TRUE", "results", '"{}"'), ("WITHIN", "within", "{}")):
+        yield f"{what} = {{"
+        for function in code.functions:
+            yield f'    "{function.name}": ['
+            for vector in vectors:
+                yield "        ["
+                found = [form.format(x) for x in getattr(vector, of)[function.name]]
+                yield from (
+                    f"            {', '.join(row)}," for row in _rows(found, 4 if what == "WITHIN" else 2)
+                )
+                yield "        ],"
+            yield "    ],"
+        yield "}"
+    yield _CHECK.format(
+        values=dialect.values,
+        functions=", ".join(function.name for function in code.functions),
+        before=f"    {dialect.before}\n" if dialect.before else "",
+    ).rstrip()
