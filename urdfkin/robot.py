@@ -54,6 +54,7 @@ from urdfkin.verify.verifier import Verifier
 from urdfkin.verify.witnesses import WitnessName
 
 if TYPE_CHECKING:
+    from urdfkin.export.compiled_frame import CompiledFrame
     from urdfkin.verify.exact.enclosure import Enclosures
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
@@ -100,10 +101,12 @@ class Robot:
         self._tip_frame = tip_frame
         self._plans: dict[tuple[int, ...], Plan] = {}
         self._prepared: dict[object, PreparedFrame] = {}
+        self._compiled: dict[object, CompiledFrame] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         # Compiled plans are cheap to rebuild where they are needed; a copy has an account of its own.
-        return {**self.__dict__, "verifier": copy(self.verifier), "_plans": {}, "_prepared": {}}
+        made: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_compiled": {}}
+        return {**self.__dict__, "verifier": copy(self.verifier), **made}
 
     def __repr__(self) -> str:
         return f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>"
@@ -685,6 +688,24 @@ class Robot:
             plan = self.plan([self.tree.frame_link(frame)])
             prepared = self._prepared[key] = PreparedFrame(self, frame, Reference.of(reference), plan)
         return prepared
+
+    def compiled(self, frame: str, reference: Reference | str = _ALIGNED) -> CompiledFrame:
+        """One frame compiled for this robot alone by the system's compiler, the fastest form: see there.
+
+        Each quantity is compiled when it is first asked for, some seconds once on a machine, and held against
+        Pinocchio. Without a compiler Numba's walk computes.
+
+        Raises:
+            UnknownNameError: no such frame or reference.
+            VerificationError: when it is first called: Pinocchio computes something else.
+        """
+        from urdfkin.export.compiled_frame import CompiledFrame  # noqa: PLC0415  seldom wanted
+
+        self.tree.frame_link(frame)
+        key = type(frame), frame, Reference.of(reference)
+        if (found := self._compiled.get(key)) is None:
+            found = self._compiled[key] = CompiledFrame(self, frame, key[2])
+        return found
 
     def export(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from hypothesis import given
@@ -12,7 +13,7 @@ from urdfkin.export.expression import Graph, Node, needed
 from urdfkin.kinematics import equations
 
 INPUTS = (0.7, -1.3, 2.9)
-_OPERATIONS = {
+_OPERATIONS: dict[str, Callable[..., Any]] = {
     "+": lambda x, y: x + y,
     "-": lambda x, y: x - y,
     "*": lambda x, y: x * y,

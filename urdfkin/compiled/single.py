@@ -213,12 +213,36 @@ def single(
     local = reference is Reference.LOCAL
     turned = quantity == "placement" or local
     program = program_of(plan, turned=turned, columns=columns > 0, pairs=columns > 1)
-    memory, task = scratch(program), np.zeros(len(Task), dtype=np.int64)
-    task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
-    task[Task.SCRATCH], task[Task.REFERENCE], task[Task.N] = memory.ctypes.data, reference, 1
-    task[Task.CORE], task[Task.ORDERS] = (local_core if local else core).address, orders
-    task[Task.NQ], task[Task.NV] = plan.nq, plan.nv  # strides are 0: there is no next configuration
+    memory = scratch(program)
     shape = (4, 4) if quantity == "placement" else (6, *[plan.nv] * columns)
+    address = (local_core if local else core).address
+    compute, task = _called(address, orders, shape, plan, program, memory)
+    task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
+    task[Task.SCRATCH], task[Task.REFERENCE] = memory.ctypes.data, reference
+    return compute, task
+
+
+def called(
+    core: Any, orders: int, shape: tuple[int, ...], plan: Plan
+) -> tuple[Callable[..., FloatArray | None], IntArray]:
+    """The same for a function of C's that takes a task, a result being of some shape.
+
+    Args:
+        core: Of `ctypes`.
+        orders: How many of q, v and a it takes.
+        shape: Of the result.
+        plan: Whose q and v they are.
+    """
+    address = ctypes.cast(core, ctypes.c_void_p).value
+    return _called(address or 0, orders, shape, plan, core)
+
+
+def _called(
+    address: int, orders: int, shape: tuple[int, ...], plan: Plan, *alive: object
+) -> tuple[Callable[..., FloatArray | None], IntArray]:
+    task = np.zeros(len(Task), dtype=np.int64)
+    task[Task.CORE], task[Task.ORDERS], task[Task.N] = address, orders, 1
+    task[Task.NQ], task[Task.NV] = plan.nq, plan.nv  # strides are 0: there is no next configuration
     task[Task.AXES], task[Task.ROWS], task[Task.COLUMNS] = len(shape), *(*shape, 1)[:2]
-    bound = task, np.ndarray, None, np.empty, shape, program, memory
-    return _built_in(quantity, one_configuration.address, *bound), task
+    bound = task, np.ndarray, None, np.empty, shape, *alive
+    return _built_in("compute", one_configuration.address, *bound), task

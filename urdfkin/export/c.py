@@ -21,14 +21,19 @@ _PLACE = re.compile(r"@(\w+)@")
 
 def write(code: Code, to: str = "c") -> str:
     """A translation unit, which declares its functions alone where `NAME_DECLARATIONS` is defined."""
+    return unit(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
+
+
+def unit(code: Code, head: str = "", main: str = "") -> str:
+    """The functions, with what stands before them and the program after them."""
     return framed(
         "file.c",
-        head=comment(_head(code)),
+        head=head,
         UP=code.name.upper(),
         declarations="\n".join(_declarations(code)),
         sines=framed("sines.c") if any(function.angles for function in code.functions) else "",
         functions="".join(_function(code, function) for function in code.functions),
-        main="\n".join([*vectors(code), main(code, "check_one.c")]),
+        main=main,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 from urdfkin.compiled.plan import Plan, Step
@@ -15,6 +15,7 @@ from urdfkin.export.naming import all_safe, shown, title
 from urdfkin.export.proof import Proof, prove
 from urdfkin.model.configuration import coordinate_names, rate_names
 from urdfkin.model.reference import Reference
+from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, walked
 from urdfkin.verify.verifier import Verifier
 
@@ -36,10 +37,8 @@ class Code:
         coordinates: Of q.
         rates: Of v and a.
         joints: The path's moving joints.
-        proof: What they are worth.
-        nq: Length of q.
-        nv: Length of v and a.
         words: Identifiers: by letter of the input, for each of its numbers; and for the path's joints.
+        vouched: What they are worth; None for what urdfkin compiles for itself.
     """
 
     name: str
@@ -50,8 +49,15 @@ class Code:
     coordinates: tuple[str, ...]
     rates: tuple[str, ...]
     joints: tuple[str, ...]
-    proof: Proof
     words: dict[str, list[str]]
+    vouched: Proof | None = None
+
+    @property
+    def proof(self) -> Proof:
+        """What they are worth."""
+        if self.vouched is None:
+            raise ValueError("code without a proof is not handed out")
+        return self.vouched
 
     @property
     def nq(self) -> int:
@@ -114,19 +120,30 @@ def code_of(
             found="nothing that moves",
             remedy="export the placement",
         )
-    functions = tuple(function_of(plan, row, reference) for row in rows)
+    code = bare(tree, plan, frame, rows, reference, title("", name) if name else title(tree.name, frame))
+    return replace(code, vouched=prove(verifier, plan_of, frame, reference, code.functions, verify))
+
+
+def bare(
+    tree: KinematicTree,
+    plan: Plan,
+    frame: str,
+    rows: Sequence[Quantity],
+    reference: Reference,
+    name: str,
+) -> Code:
+    """The same without a proof."""
     coordinates, rates = coordinate_names(tree), rate_names(tree)
     joints = tuple(tree.joints[i].name for i in plan.joints)
     return Code(
-        name=title("", name) if name else title(tree.name, frame),
+        name=name,
         robot=shown(tree.name),
         frame=shown(frame),
         reference=reference,
-        functions=functions,
+        functions=tuple(function_of(plan, row, reference) for row in rows),
         coordinates=tuple(map(shown, coordinates)),
         rates=tuple(map(shown, rates)),
         joints=tuple(map(shown, joints)),
-        proof=prove(verifier, plan_of, frame, reference, functions, verify),
         words={"q": all_safe(coordinates), "v": all_safe(rates), "a": all_safe(rates), "s": all_safe(joints)},
     )
 

@@ -71,7 +71,7 @@ class Proof:
     @property
     def lines(self) -> list[str]:
         """In words."""
-        oracle = f"Pinocchio {self.certificate.pinocchio}"
+        oracle = self.certificate.oracle
         if not self.certificate.verified:
             reasons = plain("; ".join(self.certificate.not_verified)) or "nothing was checked"
             verdict = [f"UNVERIFIED by {oracle}: {reasons}"]

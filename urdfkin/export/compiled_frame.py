@@ -1,0 +1,209 @@
+"""One frame of one robot, compiled for it alone: the fastest form, single configurations and batches.
+
+The C that `export` writes goes through the system's compiler the first time that a quantity is asked for.
+What comes back is held against Pinocchio before it is used. Without a compiler Numba's walk computes.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.compiled.batch import in_blocks
+from urdfkin.compiled.plan import Plan
+from urdfkin.compiled.prepared import Fast
+from urdfkin.compiled.task import Task
+from urdfkin.errors import NotFiniteError, RangeError
+from urdfkin.export.code import bare
+from urdfkin.export.library import NoCompilerError, library
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.system.forking import importing, lock_over_forks
+from urdfkin.verify.call import Call
+from urdfkin.verify.quantities import QUANTITIES, Quantity
+from urdfkin.verify.sampling import draw
+from urdfkin.verify.verifier import Verifier
+
+#: Configurations that Pinocchio is asked about, besides the neutral one and the ends of the limits.
+CHECKED = 100
+_PLACES = Task.Q, Task.V, Task.A
+_compiling = lock_over_forks()
+
+
+class _Robot(Protocol):
+    """Whose frame it is."""
+
+    verifier: Verifier
+
+    @property
+    def plan(self) -> Callable[[Sequence[int]], Plan]: ...
+    @property
+    def compute(self) -> Callable[..., FloatArray]: ...
+    @property
+    def compiled(self) -> Callable[..., CompiledFrame]: ...
+
+
+class CompiledFrame:
+    """One frame of a robot in one reference; make one with `Robot.compiled`.
+
+    Results are those of `Robot` within the bound, not to the last bit; those of a batch and of its
+    configurations one by one are the same. Inputs are looked at as everywhere: another shape, or a number
+    that is not finite, is an error. A call is not checked by Pinocchio, and the ledger says so; the machine
+    code was, on a hundred configurations, unless the robot was loaded with `verify=False`.
+
+    Attributes:
+        frame: The frame's name.
+        reference: For velocities, Jacobians and accelerations.
+
+    >>> import urdfkin
+    >>> robot = urdfkin.load("ur5")
+    >>> fast, q = robot.compiled("tool0"), robot.sample(1000)
+    >>> fast.jacobian(q).shape
+    (1000, 6, 6)
+    """
+
+    def __init__(self, robot: _Robot, frame: str, reference: Reference) -> None:
+        self.frame, self.reference = frame, reference
+        self._robot, self._tree = robot, robot.verifier.tree
+        self._plan = robot.plan([self._tree.frame_link(frame)])
+        self._batches: dict[str, Callable[[int], int] | None] = {}
+        # Compiled, or read from disk, when they are first called.
+        self._placement: Fast = partial(self._first, "placement")
+        self._velocity: Fast = partial(self._first, "velocity")
+        self._jacobian: Fast = partial(self._first, "jacobian")
+        self._jacobian_rate: Fast = partial(self._first, "jacobian rate")
+        self._acceleration: Fast = partial(self._first, "acceleration")
+
+    def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
+        # It holds addresses of this process.
+        return self._robot.compiled, (self.frame, self.reference)
+
+    def placement(
+        self, q: ArrayLike, out: FloatArray | None = None, *, threads: int | None = None
+    ) -> FloatArray:
+        """(..., 4, 4) T_world_frame: eq. 7.77. Arguments and errors as `Robot.placement`."""
+        if threads is None and (one := self._placement(q, out)) is not None:
+            return one
+        return self._computed("placement", (q,), out, threads)
+
+    def velocity(
+        self, q: ArrayLike, v: ArrayLike, out: FloatArray | None = None, *, threads: int | None = None
+    ) -> FloatArray:
+        """(..., 6) [linear; angular] m/s, rad/s: eq. 7.127, 7.128."""
+        if threads is None and (one := self._velocity(q, v, out)) is not None:
+            return one
+        return self._computed("velocity", (q, v), out, threads)
+
+    def jacobian(
+        self, q: ArrayLike, out: FloatArray | None = None, *, threads: int | None = None
+    ) -> FloatArray:
+        """(..., 6, nv): eq. 7.85."""
+        if threads is None and (one := self._jacobian(q, out)) is not None:
+            return one
+        return self._computed("jacobian", (q,), out, threads)
+
+    def jacobian_rate(
+        self, q: ArrayLike, v: ArrayLike, out: FloatArray | None = None, *, threads: int | None = None
+    ) -> FloatArray:
+        """(..., 6, nv): eq. 7.126."""
+        if threads is None and (one := self._jacobian_rate(q, v, out)) is not None:
+            return one
+        return self._computed("jacobian rate", (q, v), out, threads)
+
+    def acceleration(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        out: FloatArray | None = None,
+        *,
+        threads: int | None = None,
+    ) -> FloatArray:
+        """(..., 6) [linear; angular] m/s^2, rad/s^2, classical: eq. 7.129, 7.130."""
+        if threads is None and (one := self._acceleration(q, v, a, out)) is not None:
+            return one
+        return self._computed("acceleration", (q, v, a), out, threads)
+
+    # -- inside --------------------------------------------------------------------------------------------
+
+    def _first(self, name: str, q: ArrayLike, *others: object) -> FloatArray | None:
+        """Make what computes one configuration, and compute."""
+        with importing:
+            from urdfkin.compiled.single import arrays_are_known, called  # noqa: PLC0415  loads Numba
+
+        own = (
+            self._tree.floating_joints or self._plan.is_large
+        )  # a quaternion's norm, or a range, is looked at
+        if own or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
+            return None
+        row = QUANTITIES[name]
+        if (core := self._machine_code(row)) is None:
+            return None
+        compute, task = called(core, len(row.inputs), row.own_shape(self._plan.nv), self._plan)
+        self._robot.verifier.ledger.account(name).counters.append((task, Task.COUNT))
+        setattr(self, f"_{row.method}", compute)
+        return compute(q, *others)
+
+    def _machine_code(self, row: Quantity) -> Any:
+        """The function `task`, compiled and checked once; None without a compiler."""
+        with _compiling:
+            if row.name not in self._batches:
+                self._batches[row.name] = self._made(row)
+            return self._batches[row.name]
+
+    def _made(self, row: Quantity) -> Any:
+        verifier = self._robot.verifier
+        code = bare(verifier.tree, self._plan, self.frame, [row], self.reference, "robot")
+        if not code.functions[0].results:
+            return None
+        try:
+            made = library(code).task
+        except NoCompilerError:
+            return None
+        made.argtypes, made.restype = [ctypes.c_void_p], ctypes.c_int64
+        drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
+        call = self._call((drawn.q, drawn.v, drawn.a)[: len(row.inputs)])
+        verifier.check(row, call, call.in_shape(self._run(made, row, call, None, 1)), verifier.wanted(None))
+        return made
+
+    def _call(self, inputs: Sequence[ArrayLike]) -> Call:
+        return Call(self._tree, self._robot.plan, self.frame, self.reference, None, inputs)
+
+    def _computed(
+        self, name: str, inputs: Sequence[ArrayLike], out: FloatArray | None, threads: int | None
+    ) -> FloatArray:
+        """Any batch, in parts for several threads."""
+        row = QUANTITIES[name]
+        if (made := self._machine_code(row)) is None:
+            return self._robot.compute(
+                name, inputs, self.frame, self.reference, out=out, threads=threads, verify=False
+            )
+        call = self._call(inputs)
+        to = call.flat(out, row.own_shape(self._tree.nv))
+        found = call.compute(self._run, made, row, call, to, threads)
+        self._robot.verifier.ledger.unchecked(name, call.results)
+        return call.in_shape(found) if out is None else out
+
+    def _run(
+        self, made: Any, row: Quantity, call: Call, out: FloatArray | None, threads: int | None
+    ) -> FloatArray:
+        inputs = [np.ascontiguousarray(x) for x in (call.q, *call.rates)]
+        found = np.empty((call.n, 1, *row.own_shape(self._tree.nv))) if out is None else out
+
+        def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
+            task = np.zeros(len(Task), dtype=np.int64)
+            task[Task.N], task[Task.OUT] = len(part), part.ctypes.data
+            for place, x in zip(_PLACES, parts, strict=False):
+                task[place] = x.ctypes.data
+            return int(made(task.ctypes.data))
+
+        if in_blocks(compute, inputs, found, threads):
+            raise NotFiniteError("q, v and a must be finite")
+        if self._plan.is_large and not np.isfinite(found).all():
+            raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
+        return found
