@@ -15,9 +15,9 @@ from urdfkin.export import LANGUAGES, write
 from urdfkin.export.code import Code, code_of
 from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
-from urdfkin.verify.quantities import walked
+from urdfkin.verify.quantities import validated
 
-ALL = tuple(row.method for row in walked())
+ALL = tuple(row.method for row in validated())
 #: What a file in a language needs to run.
 PROGRAMS = {"c": "cc", "cpp": "c++", "matlab": "octave-cli"}
 LIBRARIES = ("numba", "jax", "casadi", "sympy")

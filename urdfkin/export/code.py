@@ -16,7 +16,7 @@ from urdfkin.export.proof import Proof, prove
 from urdfkin.model.configuration import coordinate_names, rate_names
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import KinematicTree
-from urdfkin.verify.quantities import Quantity, quantity, walked
+from urdfkin.verify.quantities import Quantity, quantity, validated
 from urdfkin.verify.verifier import Verifier
 
 #: Of a sum, a product, and what needs no brackets.
@@ -152,13 +152,13 @@ def _rows(names: Collection[str]) -> list[Quantity]:
     rows = [quantity(name.replace("_", " ")) for name in dict.fromkeys(words(names, "quantities"))]
     if not rows:
         raise InputError(
-            "no quantity to export", remedy=f"name some of {', '.join(x.method for x in walked())}"
+            "no quantity to export", remedy=f"name some of {', '.join(x.method for x in validated())}"
         )
     for row in rows:
-        if row not in walked():
+        if row not in validated():
             raise InputError(
                 f"the {row.name} cannot be exported",
-                remedy=f"choose among {', '.join(x.method for x in walked())}",
+                remedy=f"choose among {', '.join(x.method for x in validated())}",
             )
     return rows
 
