@@ -15,6 +15,7 @@ from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError,
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rules.axes import tilts
 from urdfkin.lint.rules.dialect import NEWER_VERSION
+from urdfkin.lint.rules.mimic import MIMIC_CONTINUOUS
 from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_tilts
 from urdfkin.robot import Robot
@@ -29,6 +30,9 @@ from urdfkin.verify.choosing import Verify, checked_choice
 from urdfkin.verify.made_of_mjcf import demand_the_mjcfs
 from urdfkin.verify.made_of_table import demand_the_tables
 from urdfkin.verify.witnesses import WitnessName, witness_of
+
+#: What concerns those who write a URDF, and nobody whose URDF was made of something else.
+_OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
 def load(
@@ -166,8 +170,7 @@ def _robot(
         raise UrdfError(findings)
     if text.entry is None:
         for finding in findings:
-            # What was made of something else may need URDF 1.2: no news for who has no URDF.
-            if finding.severity is Severity.WARNING and not (made and finding.code == NEWER_VERSION.id):
+            if finding.severity is Severity.WARNING and not (made and finding.code in _OF_A_TEXT):
                 warnings.warn(str(finding), UrdfWarning, stacklevel=4 if made else 3)
     read = read_tree if text.entry is None else remembered_tree
     tree = read(urdf, mimic=mimic, root_joint=root_joint)

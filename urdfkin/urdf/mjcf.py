@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -137,7 +138,9 @@ def read_mjcf(source: str | os.PathLike[str]) -> Mjcf:
         else:
             spec = mujoco.MjSpec.from_file(str(at_home(source)))
         left = list(_stripped(mujoco, spec))
-        model = spec.compile()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # about masses
+            model = spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         found = str(error).strip().replace("\n", "; ")
         raise InputError(
@@ -158,6 +161,11 @@ def _stripped(mujoco: Any, spec: Any) -> Iterator[Listed]:
     """Take out what kinematics does not need, so that no mesh has to be there; say what it was."""
     spec.compiler.fusestatic = False
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    for one in list(spec.equalities):
+        if one.type != mujoco.mjtEq.mjEQ_JOINT:
+            kind = str(one.type).rpartition("_")[2].lower()
+            yield Listed(f"a constraint ({kind}) that a tree cannot hold", f"equality {one.name}", moves=True)
+            spec.delete(one)
     gone = []
     for words in (
         "keys", "sensors", "actuators", "tendons", "excludes", "pairs", "skins", "flexes", "geoms", "cameras",
@@ -172,6 +180,9 @@ def _stripped(mujoco: Any, spec: Any) -> Iterator[Listed]:
                 yield Listed(f"{words} move nothing here", words, moves=True)
     if gone:
         yield Listed(f"left out, since kinematics does not use them: {', '.join(gone)}")
+    for site in spec.sites:
+        site.material = ""
+    spec.memory = -1  # what the file has measured for its own dynamics
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
         body.inertia, body.iquat, body.fullinertia = (1.0,) * 3, (1.0, 0.0, 0.0, 0.0), (np.nan,) * 6
@@ -287,14 +298,13 @@ class _Reader:
         m, rules = self.model, dict[str, Mimic]()
         for i in range(m.neq):
             where = f"equality {m.equality(i).name or i}"
-            rule = self._rule(i) if m.eq_type[i] == self.mujoco.mjtEq.mjEQ_JOINT else None
-            if rule is None:
-                kind = str(self.mujoco.mjtEq(m.eq_type[i])).rpartition("_")[2].lower()
-                self.listed.append(
-                    Listed(f"a constraint ({kind}) that a tree cannot hold", where, moves=True)
-                )
-            elif not m.eq_active0[i]:
+            rule = self._rule(i)
+            if not m.eq_active0[i]:
                 self.listed.append(Listed("a constraint that is not active", where))
+            elif rule is None:
+                self.listed.append(
+                    Listed("a constraint that is no line between two joints", where, moves=True)
+                )
             elif rule[0] in rules or _leads(rules, rule[1].leader, rule[0]):
                 self.listed.append(
                     Listed(f"joint {rule[0]} is held twice, or in a circle", where, moves=True)

@@ -87,5 +87,8 @@ def _pinocchios(mjcf: Mjcf, path: str | None, q: FloatArray, ours: FloatArray, b
     if (share <= 1.0).all():
         return "Pinocchio's MJCF reader places the bodies likewise"
     f = int(share.max(axis=0).argmax())
-    off = float(np.abs(ours[:, bodies[f]] - theirs[:, f])[:, :3, 3].max())
-    return f"Pinocchio's MJCF reader stands alone: it places {names[f]} elsewhere, by up to {off:.3g} m"
+    off = np.abs(ours[:, bodies[f]] - theirs[:, f])[:, :3]
+    return (
+        f"Pinocchio's MJCF reader stands alone: it has {names[f]} up to {off[..., 3].max():.3g} m away,"
+        f" and its axes {off[..., :3].max():.3g}"
+    )

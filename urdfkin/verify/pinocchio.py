@@ -14,7 +14,7 @@ q_full = G q + g_0, v_full = G v, J = J_full G.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 from xml.parsers.expat import ExpatError
 
@@ -391,7 +391,7 @@ def mjcf_placements(
         model = pin.buildModelFromMJCF(path)
     except Exception as error:  # it raises what its parsers do
         raise OracleError("it does not accept the file", found=str(error).strip()) from error
-    joints = {str(name): model.joints[j] for j, name in enumerate(model.names) if j}
+    joints = dict(_numbered(model, list(coordinates)))
     if joints.keys() != coordinates.keys():
         found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:5])
         raise OracleError("it finds other joints", found=found)
@@ -402,16 +402,31 @@ def mjcf_placements(
     for k, numbers in enumerate(qpos):
         q = pin.neutral(model)
         for name, at in coordinates.items():
-            own, x = joints[name], numbers[at]
-            if own.nq == _CARTESIAN:
-                q[own.idx_q : own.idx_q + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
-            elif own.nq == own.nv:
-                q[own.idx_q] = x
+            (first, count), x = joints[name], numbers[at]
+            if count == _CARTESIAN:
+                q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
+            elif count == 1:
+                q[first] = x
             else:  # a turn without limits
-                q[own.idx_q : own.idx_q + 2] = np.cos(x), np.sin(x)
+                q[first : first + 2] = np.cos(x), np.sin(x)
         pin.framesForwardKinematics(model, data, q)
         out[k] = [data.oMf[i].homogeneous for i in ids]
     return out
+
+
+def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
+    """Where each joint's numbers begin in q, and how many there are.
+
+    A body's joints are one to Pinocchio, `Composite_` and the first one's name, with a number for each.
+    """
+    for j, name in list(enumerate(map(str, model.names)))[1:]:
+        joint, first = model.joints[j], name.removeprefix("Composite_")
+        if first != name and first in names:
+            at = names.index(first)
+            for i, part in enumerate(names[at : at + joint.nq]):
+                yield part, (joint.idx_q + i, 1)
+        else:
+            yield name, (joint.idx_q, joint.nq)
 
 
 def _depth(tree: KinematicTree) -> int:

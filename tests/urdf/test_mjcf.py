@@ -1,0 +1,264 @@
+"""MJCF files become the robots that MuJoCo makes of them, and what a tree cannot hold is listed."""
+
+import json
+import math
+import warnings
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as command
+from tests.lint.cases.arm import arm
+from urdfkin.errors import InputError, OracleError
+from urdfkin.model.tree import FloatArray
+from urdfkin.urdf import mjcf
+from urdfkin.urdf.mjcf import is_mjcf, read_mjcf
+
+TWO = """
+<mujoco model="two">
+  <compiler angle="degree"/>
+  <default><default class="x"><joint axis="0 1 0" range="-90 90"/></default></default>
+  <asset><mesh name="nope" file="nope.stl"/></asset>
+  <worldbody>
+    <body name="base" pos="0 0 1" euler="10 20 30">
+      <freejoint name="root"/>
+      <geom type="mesh" mesh="nope"/>
+      <site name="imu" pos="0.1 0 0" quat="1 1 0 0"/>
+      <body name="shoulder" pos="0.1 0.2 0.3" quat="1 2 3 4">
+        <joint name="yaw" axis="0 0 1" pos="0.01 0.02 0.03" range="-100 100"/>
+        <joint name="pitch" class="x" pos="0 0 0.05" ref="30"/>
+        <joint name="out" type="slide" axis="1 1 0" ref="0.2"/>
+        <body name="tip" pos="0.5 0 0">
+          <joint name="f" axis="1 0 0" pos="0 0.1 0"/><site name="tool" pos="0 0 0.2"/>
+        </body>
+        <body pos="0 0.5 0"><joint axis="1 0 0" name="g"/></body>
+      </body>
+    </body>
+  </worldbody>
+  <equality>
+    <joint name="couple" joint1="f" joint2="pitch" polycoef="0.1 2 0 0 0"/>
+    <joint name="curve" joint1="g" joint2="f" polycoef="0 1 0.3 0 0"/>
+    <weld name="glue" body1="tip" body2="base"/>
+  </equality>
+  <tendon><fixed name="t"><joint joint="f" coef="1"/></fixed></tendon>
+  <actuator><motor joint="f"/><position tendon="t"/></actuator>
+</mujoco>
+"""
+
+
+def loaded(source: str | Path, **options: object) -> urdfkin.Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(source, **options)  # type: ignore[arg-type]
+
+
+def one_joint(joint: str, body: str = "") -> str:
+    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    return (
+        f'<mujoco><compiler angle="radian"/><worldbody><body name="b" pos="1 0 0" {body}>{inertial}{joint}'
+        '<site name="s" pos="0 0 0.5"/></body></worldbody></mujoco>'
+    )
+
+
+def test_a_hinge_turns_about_its_anchor() -> None:
+    robot = loaded(one_joint('<joint name="j" axis="0 0 1" pos="0 2 0"/>'))
+    T = robot.placement([math.pi], "b")
+    assert T[:3, 3] == pytest.approx([1.0, 4.0, 0.0])  # half a turn about (1, 2, 0)
+    assert T[:3, :3] == pytest.approx(np.diag([-1.0, -1.0, 1.0]))
+
+
+def test_a_reference_value_is_where_the_file_draws_the_body() -> None:
+    turning = loaded(one_joint('<joint name="j" axis="0 0 1" pos="0 2 0" ref="0.5"/>'))
+    assert turning.placement([0.5], "b")[:3, 3] == pytest.approx([1.0, 0.0, 0.0])
+    sliding = loaded(one_joint('<joint name="j" type="slide" axis="0 0 1" ref="0.5" range="0 1"/>'))
+    assert sliding.placement([0.75], "b")[:3, 3] == pytest.approx([1.0, 0.0, 0.25])
+
+
+def test_joints_of_one_body_move_one_after_the_other() -> None:
+    robot = loaded(
+        one_joint('<joint name="x" type="slide" axis="1 0 0" range="-9 9"/><joint name="turn" axis="0 0 1"/>')
+    )
+    T = robot.placement([3.0, math.pi / 2], "link:s")
+    assert T[:3, 3] == pytest.approx([4.0, 0.0, 0.5])
+    assert T[:3, 0] == pytest.approx([0.0, 1.0, 0.0])
+    assert robot.coordinate_names == ("x", "turn")
+
+
+def test_limits_and_kinds_are_the_files() -> None:
+    robot = loaded(one_joint('<joint name="a" range="-1 2"/><joint name="b" axis="0 1 0"/>'))
+    a, b = (robot.tree.joints[i] for i in (0, 1))
+    assert a.limit is not None
+    assert (a.kind.value, a.limit.lower, a.limit.upper) == ("revolute", -1.0, 2.0)
+    assert (b.kind.value, b.limit) == ("continuous", None)
+
+
+def of_mujoco(text: str, qpos: FloatArray, body: str) -> FloatArray:
+    """MuJoCo's placement of a body, of the file as it is."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    T: FloatArray = np.eye(4)
+    T[:3, :3], T[:3, 3] = data.body(body).xmat.reshape(3, 3), data.body(body).xpos
+    return T
+
+
+def random_mjcf(rng: np.random.Generator) -> tuple[str, list[str]]:
+    """A tree of bodies with up to three joints each, written with angles, anchors and reference values."""
+
+    def vector(size: float = 1.0, n: int = 3) -> str:
+        return " ".join(repr(float(x)) for x in size * rng.normal(size=n))
+
+    names, open_bodies, text = [], 0, []
+    for i in range(int(rng.integers(2, 7))):
+        while open_bodies and rng.random() < 0.3:
+            text.append("</body>")
+            open_bodies -= 1
+        turned = f'quat="{vector(n=4)}"' if rng.random() < 0.5 else f'euler="{vector()}"'
+        text.append(f'<body name="b{i}" pos="{vector()}" {turned}>')
+        text.append('<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>')
+        open_bodies += 1
+        for j in range(int(rng.integers(0, 4))):
+            kind = rng.choice(["hinge", "slide"])
+            anchor = f'pos="{vector()}"' if rng.random() < 0.7 else ""
+            name = f"j{i}_{j}"
+            names.append(name)
+            text.append(
+                f'<joint name="{name}" type="{kind}" axis="{vector()}" {anchor} ref="{rng.normal()!r}"'
+                ' limited="true" range="-3 3"/>'
+            )
+    sequence = rng.choice(["xyz", "ZYX", "zxz"])
+    return (
+        f'<mujoco><compiler angle="radian" eulerseq="{sequence}"/><worldbody>{"".join(text)}'
+        f"{'</body>' * open_bodies}</worldbody></mujoco>",
+        names,
+    )
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_any_tree_of_hinges_and_slides_is_placed_as_mujoco_places_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    text, names = random_mjcf(rng)
+    robot = loaded(text, verify=False)
+    assert sorted(robot.coordinate_names) == sorted(names)
+    value = dict(zip(names, rng.uniform(-3.0, 3.0, len(names)), strict=True))
+    q = [value[name] for name in robot.coordinate_names]
+    for link in robot.link_names:
+        if link.startswith("b"):
+            theirs = of_mujoco(text, np.array(list(value.values())), link)
+            assert robot.placement(q, f"link:{link}") == pytest.approx(theirs, abs=1e-12)
+
+
+def test_a_file_with_everything_is_verified_and_says_what_it_does_not_hold(tmp_path: Path) -> None:
+    path = tmp_path / "two.xml"
+    path.write_text(TWO, "utf-8")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        robot = urdfkin.load(path)
+    assert len(caught) == 3
+    assert all("two.xml" in str(w.message) and "MJCF101" in str(w.message) for w in caught)
+    assert {w.filename for w in caught} == {__file__}
+    assert (robot.nq, robot.nv) == (11, 10)
+    assert {"world", "base", "imu", "tool"} <= set(robot.link_names)
+    said = {f.message for f in robot.findings if f.code == "MJCF101"}
+    assert {
+        "equality curve: a constraint that is no line between two joints",
+        "equality glue: a constraint (weld) that a tree cannot hold",
+        "tendons: tendons move nothing here",
+    } <= said
+    noted = " ".join(f.message for f in robot.findings if f.code == "MJCF102")
+    assert "joint root: qpos0 places it at (0, 0, 1)" in noted
+    assert "joint out: a slide without limits" in noted
+    assert "2 actuators, 1 tendons" in noted
+    assert "1 geoms" in noted
+    robot.placement(robot.sample(3), robot.link_frames)
+    certificate = robot.certificate()
+    assert certificate.verified
+    assert "MuJoCo" in certificate.reading
+    assert "Pinocchio's MJCF reader" in str(certificate)
+
+
+def test_an_equality_between_two_joints_is_obeyed() -> None:
+    robot = loaded(TWO)
+    follower = next(joint for joint in robot.tree.joints if joint.name == "f")
+    assert follower.mimic is not None
+    assert (follower.mimic.leader, follower.mimic.multiplier) == ("pitch", 2.0)
+    # y - 0 = 0.1 + 2 (x - 30 degrees)
+    assert follower.mimic.offset == pytest.approx(0.1 - math.pi / 3)
+    free = loaded(TWO, mimic=False)
+    assert free.nq == robot.nq + 1
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [("_moved", lambda p: np.eye(4)), ("_turned", lambda axis, angle: np.eye(4))],
+    ids=lambda x: x[0],
+)
+def test_a_slip_in_the_reading_is_found_when_it_is_loaded(
+    broken: tuple[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mjcf, *broken)
+    with pytest.raises(OracleError, match="is not the file's"):
+        loaded(TWO)
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        (one_joint('<joint name="j" type="ball"/>'), "joint j: a ball joint cannot be held"),
+        ("<mujoco><worldbody><body/></mujoco>", "MuJoCo does not accept this MJCF"),
+        ("<mujoco><include file='nowhere.xml'/></mujoco>", "MuJoCo does not accept this MJCF"),
+    ],
+)
+def test_what_cannot_be_read_is_one_clear_error(text: str, what: str) -> None:
+    with pytest.raises(InputError, match=what):
+        loaded(text)
+
+
+def test_what_is_mjcf_is_told_by_its_root(tmp_path: Path) -> None:
+    texts = {
+        "a.xml": TWO,
+        "b.xml": arm(),
+        "c.mjcf": f"<?xml version='1.0'?><!-- robot -->{TWO}",
+        "d.urdf": TWO,
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, "utf-8")
+    assert [is_mjcf(tmp_path / name) for name in texts] == [True, False, True, False]
+    assert loaded(tmp_path / "b.xml").nq == 2
+    assert not is_mjcf(tmp_path / "nothing.xml")
+    with pytest.raises(urdfkin.UrdfError, match="with the extra urdfkin\\[mujoco\\]"):
+        urdfkin.load(TWO.encode())
+
+
+@pytest.mark.slow
+def test_a_mjcf_is_a_robot_to_every_command(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(
+        one_joint('<joint name="a" range="-1 2"/><joint name="b" axis="0 1 0" pos="1 1 1"/>'), "utf-8"
+    )
+    report = tmp_path / "report.json"
+    for words in (
+        ["info", str(path)],
+        ["jacobian", str(path), "--q", "random"],
+        ["dh", str(path)],
+        ["validate", str(path), "--samples", "2", "--oracle", "mujoco", "--json", str(report)],
+    ):
+        done = command(*words)
+        assert done.code == 0, (words, done)
+    robot = json.loads(report.read_text("utf-8"))["robots"][0]
+    assert robot["verdict"] == "verified"
+    assert robot["model"]["links"][0] == "world"
+
+
+def test_the_compiled_model_answers_for_the_tree_it_was_made_of() -> None:
+    read = read_mjcf(TWO)
+    assert read.tree.links[0] == "world"
+    q = np.zeros((1, read.tree.nq))
+    q[0, 6] = 1.0
+    # Everything at zero: followers stand at their offsets, the free body at the origin.
+    assert read.qpos(q)[0, read.coordinates["f"]] == pytest.approx(0.1 - math.pi / 3)
+    assert read.placements(q)[0, list(read.frames).index("base"), :3, 3] == pytest.approx([0.0, 0.0, 0.0])
