@@ -53,7 +53,8 @@ def main() -> int:
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
     counts = Counter[str]()
     for path in sorted(options.folder.rglob("*.xml")):
-        if not is_mjcf(path):
+        takes = is_mjcf(path)
+        if not takes:
             continue
         said = said_of(path)
         counts[said] += 1

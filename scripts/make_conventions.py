@@ -1,0 +1,447 @@
+"""Write docs/conventions.md: what urdfkin, Pinocchio and MuJoCo call by the same name, found by asking them.
+
+Nothing here is remembered. Each row puts several readings of a number beside what a library hands out, on a
+robot and a motion drawn at random, and names the one that it is; a test holds the page to it.
+
+    python scripts/make_conventions.py
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+
+import urdfkin
+from urdfkin.model.tree import FloatArray
+
+PAGE = Path(__file__).parents[1] / "docs" / "conventions.md"
+
+_LIMIT = '<limit lower="-2" upper="2" effort="1" velocity="1"/>'
+_BODY = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+
+
+def _joint(name: str, kind: str, parent: str, child: str, more: str = "") -> str:
+    limit = "" if kind in ("floating", "fixed", "continuous") else _LIMIT
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="0.3 -0.2 0.5" rpy="0.4 0.5 0.6"/>{limit}{more}</joint>'
+    )
+
+
+def _robot(*joints: str) -> str:
+    """Links `base`, `l1`, `l2`, ...; MuJoCo keeps each apart, and gives none of them weight."""
+    links = "".join(f'<link name="{name}">{_BODY}</link>' for name in ("base", *(f"l{i}" for i in (1, 2, 3))))
+    compiler = '<mujoco><compiler fusestatic="false"/></mujoco>'
+    return f'<robot name="r">{compiler}{links}{"".join(joints)}</robot>'
+
+
+def _axis(xyz: str) -> str:
+    return f'<axis xyz="{xyz}"/>'
+
+
+#: An arm whose joints stand in the file against the alphabet.
+ARM = _robot(
+    _joint("c", "revolute", "base", "l1", _axis("0 0 1")),
+    _joint("b", "revolute", "l1", "l2", _axis("0 1 0")),
+    _joint("a", "revolute", "l2", "l3", _axis("0.6 0 0.8")),
+)
+#: Two limbs on one base, and another on the first: whose coordinates come first?
+LIMBS = _robot(
+    _joint("z", "revolute", "base", "l1"),
+    _joint("a", "revolute", "base", "l2"),
+    _joint("k", "revolute", "l1", "l3"),
+)
+TURNS = _robot(
+    *(_joint(f"j{i}", "continuous", "base" if i == 1 else f"l{i - 1}", f"l{i}") for i in (1, 2, 3))
+)
+FOLLOWS = _robot(
+    _joint("a", "revolute", "base", "l1"),
+    _joint("b", "revolute", "l1", "l2", '<mimic joint="a" multiplier="2" offset="0.1"/>'),
+    _joint("c", "revolute", "l2", "l3"),
+)
+#: Two kinds of joint, one behind the other.
+UNLIKE = _robot(
+    _joint("a", "revolute", "base", "l1"),
+    _joint("b", "continuous", "l1", "l2", '<mimic joint="a"/>'),
+    _joint("c", "revolute", "l2", "l3"),
+)
+LIBRARIES = ("urdfkin", "pinocchio", "mujoco")
+#: What kinematics does not need.
+LIGHT, NEGATIVE = ARM.replace(_BODY, ""), ARM.replace('value="1"', 'value="-1"')
+#: For MuJoCo a free joint stands on the world.
+FREE = (
+    '<mujoco><worldbody><body name="l1" pos="0 0 0"><freejoint name="f"/>'
+    '<inertial pos="0.1 0.2 0.3" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>'
+)
+FREE_URDF = '<robot name="r"><link name="base"/><link name="l1"/>' + (
+    '<joint name="f" type="floating"><parent link="base"/><child link="l1"/></joint></robot>'
+)
+
+_HEAD = """# Conventions
+
+The same word, three libraries. Nothing below is quoted from a manual: `scripts/make_conventions.py`
+moves a robot, finds its velocity and acceleration by differences of its placements, and tells which of
+several readings each library's number is; a test holds this page to it. So do the checks: with `urdfkin
+validate --oracle mujoco` the three agree to rounding once these readings are made alike
+(`urdfkin/verify/pinocchio.py`, `urdfkin/verify/mujoco.py`).
+
+"""
+_FOOT = """
+Followers differ most, so urdfkin couples them itself before it asks either of the two. Kinematics uses
+no mass, so it gives each link one before MuJoCo reads it; `URDF702` tells what no body can have.
+"""
+
+Readings = Mapping[str, FloatArray]
+
+
+def which(found: FloatArray, readings: Readings) -> str:
+    """The reading that a number is; all others have to be clearly something else.
+
+    Raises:
+        ValueError: none is, or more than one.
+    """
+    named = [
+        name for name, x in readings.items() if found.shape == x.shape and np.allclose(found, x, 1e-6, 1e-6)
+    ]
+    if len(named) != 1:
+        raise ValueError(f"{found} is {named or 'none'} of {list(readings)}")
+    return named[0]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A question, and what each library's own call answers."""
+
+    question: str
+    urdfkin: str
+    pinocchio: str
+    mujoco: str
+
+
+class Asked:
+    """One motion of one robot, by each library's own calls, and by difference quotients."""
+
+    def __init__(self, seed: int = 0) -> None:
+        import mujoco  # noqa: PLC0415  everything here needs it, and nothing else does
+        import pinocchio as pin  # noqa: PLC0415
+
+        self.mj, self.pin, rng = mujoco, pin, np.random.default_rng(seed)
+        self.q, self.v, self.a = rng.uniform(-1.0, 1.0, (3, 3))
+        self.robot = urdfkin.load(ARM)
+        self.model = pin.buildModelFromXML(ARM)
+        self.data = self.model.createData()
+        pin.forwardKinematics(self.model, self.data, self.q, self.v, self.a)
+        pin.updateFramePlacements(self.model, self.data)
+        pin.computeJointJacobians(self.model, self.data, self.q)
+        self.frame = self.model.getFrameId("l3")
+        self.mj_model = mujoco.MjModel.from_xml_string(ARM)
+        self.mj_data = mujoco.MjData(self.mj_model)
+        self.mj_data.qpos[:], self.mj_data.qvel[:] = self.q, self.v
+        mujoco.mj_fwdPosition(self.mj_model, self.mj_data)
+        mujoco.mj_fwdVelocity(self.mj_model, self.mj_data)
+        self.mj_data.qacc[:] = self.a
+        mujoco.mj_rnePostConstraint(self.mj_model, self.mj_data)
+        self.body = self.mj_model.body("l3").id
+
+    # What a number might be, from placements at times around 0 alone: no library's word is taken.
+
+    def path(self, t: float) -> FloatArray:
+        """T_world_frame at a time, q(t) = q + v t + a t^2 / 2."""
+        return self.robot.placement(self.q + self.v * t + self.a * t * t / 2.0, "l3")
+
+    def motion(self) -> tuple[FloatArray, ...]:
+        """R, p, velocity, w, acceleration and alpha of the frame's origin, in world axes."""
+        h = 1e-3
+        ps = {i: self.path(i * h)[:3, 3] for i in (-2, -1, 0, 1, 2)}
+        Rs = {i: self.path(i * h)[:3, :3] for i in (-2, -1, 0, 1, 2)}
+
+        def first(x: Mapping[int, FloatArray]) -> FloatArray:
+            return (x[-2] - 8.0 * x[-1] + 8.0 * x[1] - x[2]) / (12.0 * h)
+
+        def second(x: Mapping[int, FloatArray]) -> FloatArray:
+            return (-x[-2] + 16.0 * x[-1] - 30.0 * x[0] + 16.0 * x[1] - x[2]) / (12.0 * h * h)
+
+        def axial(S: FloatArray) -> FloatArray:
+            return np.array([S[2, 1] - S[1, 2], S[0, 2] - S[2, 0], S[1, 0] - S[0, 1]]) / 2.0
+
+        R, R_rate = Rs[0], first(Rs)
+        return R, ps[0], first(ps), axial(R_rate @ R.T), second(ps), axial(second(Rs) @ R.T)
+
+    def velocity_readings(self) -> dict[str, FloatArray]:
+        """Orders of halves, axes and points of a velocity."""
+        R, p, v, w, _, _ = self.motion()
+        points = {
+            "of the frame's origin, in world axes": (v, w),
+            "of the frame's origin, in its own axes": (R.T @ v, R.T @ w),
+            "of the point at the world's origin, in world axes": (v - np.cross(w, p), w),
+        }
+        found = {}
+        for name, (linear, angular) in points.items():
+            found[f"[linear; angular] {name}"] = np.concatenate((linear, angular))
+            found[f"[angular; linear] {name}"] = np.concatenate((angular, linear))
+        return found
+
+    def acceleration_readings(self, *, flipped: bool) -> dict[str, FloatArray]:
+        """Classical and spatial accelerations, with gravity and without, in world axes."""
+        _, _, v, w, a, alpha = self.motion()
+        up = np.array([0.0, 0.0, 9.81])
+        linear = {
+            "classical: the second derivative of the origin's place": a,
+            "spatial: less than the classical by w x v": a - np.cross(w, v),
+            "classical, with gravity as if all were accelerated upwards": a + up,
+            "spatial, with gravity as if all were accelerated upwards": a - np.cross(w, v) + up,
+        }
+        return {name: np.concatenate((alpha, x) if flipped else (x, alpha)) for name, x in linear.items()}
+
+    def pinocchios_jacobian(self) -> FloatArray:
+        """(6, 3) in LOCAL_WORLD_ALIGNED."""
+        aligned = self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        J: FloatArray = self.pin.getFrameJacobian(self.model, self.data, self.frame, aligned)
+        return J
+
+    def mj_columns(self) -> FloatArray:
+        """(6, 3) `jacp` above `jacr`, at the body's origin."""
+        linear, angular = np.zeros((3, 3)), np.zeros((3, 3))
+        self.mj.mj_jac(self.mj_model, self.mj_data, linear, angular, self.mj_data.xpos[self.body], self.body)
+        return np.vstack((linear, angular))
+
+    def mujocos(self, function: Callable[..., None], local: int) -> FloatArray:
+        """(6,) as MuJoCo hands it out."""
+        six = np.empty(6)
+        function(self.mj_model, self.mj_data, self.mj.mjtObj.mjOBJ_XBODY, self.body, six, local)
+        return six
+
+
+def rows() -> list[Row]:
+    """Every question, asked."""
+    return [*_six_vectors(), *_accelerations(), *_layout(), *_free()]
+
+
+def _six_vectors() -> list[Row]:
+    asked = Asked()
+    pin, R = asked.pin, asked.pin.ReferenceFrame
+    readings = asked.velocity_readings()
+    found = [
+        Row(
+            f"velocity, `{name}`",
+            which(asked.robot.velocity(asked.q, asked.v, "l3", name), readings),
+            which(pin.getFrameVelocity(asked.model, asked.data, asked.frame, reference).vector, readings),
+            "there is none"
+            if local is None
+            else which(asked.mujocos(asked.mj.mj_objectVelocity, local), readings)
+            + f" (`flg_local={local}`)",
+        )
+        for name, reference, local in (
+            ("local_world_aligned", R.LOCAL_WORLD_ALIGNED, 0),
+            ("local", R.LOCAL, 1),
+            ("world", R.WORLD, None),
+        )
+    ]
+    columns = asked.mj_columns() @ asked.v
+    return [
+        *found,
+        Row(
+            "rows of a Jacobian, as J v tells",
+            which(asked.robot.jacobian(asked.q, "l3") @ asked.v, readings),
+            which(asked.pinocchios_jacobian() @ asked.v, readings),
+            f"`mj_jac`, `jacp` above `jacr`: {which(columns, readings)}",
+        ),
+        Row(
+            "velocity that is kept in its workspace",
+            "none is kept",
+            f"`data.v`: {which(asked.data.v[asked.model.frames[asked.frame].parentJoint].vector, readings)}",
+            f"`cvel`: {which(np.array(asked.mj_data.cvel[asked.body]), _about(asked))}",
+        ),
+    ]
+
+
+def _about(asked: Asked) -> dict[str, FloatArray]:
+    """A velocity about other points than the frame's."""
+    _, p, v, w, _, _ = asked.motion()
+    com = asked.mj_data.subtree_com[asked.mj_model.body_rootid[asked.body]]
+    return {
+        "[angular; linear] of the point at the whole tree's centre of mass, in world axes": np.concatenate(
+            (w, v + np.cross(w, com - p))
+        ),
+        "[angular; linear] of the frame's origin, in world axes": np.concatenate((w, v)),
+    }
+
+
+def _accelerations() -> list[Row]:
+    asked = Asked()
+    pin, aligned = asked.pin, asked.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    readings, flipped = asked.acceleration_readings(flipped=False), asked.acceleration_readings(flipped=True)
+    frame = asked.model, asked.data, asked.frame, aligned
+    ours = which(asked.robot.acceleration(asked.q, asked.v, asked.a, "l3"), readings)
+    theirs = which(pin.getFrameAcceleration(*frame).vector, readings)
+    classical = which(pin.getFrameClassicalAcceleration(*frame).vector, readings)
+    mujocos = which(asked.mujocos(asked.mj.mj_objectAcceleration, 0), flipped)
+    return [
+        Row(
+            "acceleration, in world axes",
+            f"`acceleration`: {ours}",
+            f"`getFrameAcceleration`: {theirs}; `getFrameClassicalAcceleration`: {classical}",
+            f"`mj_objectAcceleration`: {mujocos}, [angular; linear]",
+        )
+    ]
+
+
+def _order(names: list[str]) -> str:
+    orders = {
+        "depth first, sibling joints by name": ["a", "z", "k"],
+        "depth first, as the file has them": ["z", "k", "a"],
+        "as the file has them": ["z", "a", "k"],
+        "by name": ["a", "k", "z"],
+    }
+    return next(name for name, order in orders.items() if order == names)
+
+
+def _layout() -> list[Row]:
+    import mujoco  # noqa: PLC0415
+    import pinocchio as pin  # noqa: PLC0415
+
+    def joints(model: Any) -> list[str]:
+        return [model.joint(i).name for i in range(model.njnt)]
+
+    limbs = mujoco.MjModel.from_xml_string(LIMBS)
+    turns = mujoco.MjModel.from_xml_string(TURNS)
+    follows = mujoco.MjModel.from_xml_string(FOLLOWS)
+    data = mujoco.MjData(follows)
+    data.qpos[:] = 0.7, 0.0, 0.0
+    mujoco.mj_kinematics(follows, data)
+    lags = data.qpos[1] == 0.0 and follows.neq == 1
+    free = pin.buildModelFromXML(FOLLOWS)
+    coupled = pin.buildModelFromXML(FOLLOWS, mimic=True)
+    return [
+        Row(
+            "order of coordinates",
+            _order(list(urdfkin.load(LIMBS).coordinate_names)),
+            _order(list(pin.buildModelFromXML(LIMBS).names)[1:]),
+            _order(joints(limbs)),
+        ),
+        Row(
+            "numbers in q for a continuous joint",
+            f"{urdfkin.load(TURNS).nq // 3}, the angle",
+            f"{pin.buildModelFromXML(TURNS).nq // 3}, its cosine and sine",
+            f"{turns.nq // 3}, the angle",
+        ),
+        Row(
+            "a joint with `<mimic>`",
+            f"follows: {urdfkin.load(FOLLOWS).nq} coordinates of 3 joints",
+            f"moves freely, {free.nq} coordinates; follows with `mimic=True`, {coupled.nq}",
+            f"moves freely, {follows.nq} coordinates; {follows.neq} constraint that only the dynamics feels"
+            if lags
+            else "follows",
+        ),
+        Row("a continuous joint with `<mimic>` behind a revolute one", *map(_reads(UNLIKE), LIBRARIES)),
+        Row("a moving link without `<inertial>`", *map(_reads(LIGHT), LIBRARIES)),
+        Row("one of negative mass", *map(_reads(NEGATIVE), LIBRARIES)),
+    ]
+
+
+def _reads(text: str) -> Callable[[str], str]:
+    """Whether each library takes a text."""
+    import mujoco  # noqa: PLC0415
+    import pinocchio as pin  # noqa: PLC0415
+
+    def answer(library: str) -> str:
+        try:
+            if library == "urdfkin":
+                with warnings.catch_warnings(record=True) as caught:
+                    warnings.simplefilter("always")
+                    urdfkin.load(text, verify=False)
+                codes = sorted({code for w in caught for code in re.findall(r"URDF\d+", str(w.message))})
+                return f"read, with {', '.join(codes)}" if codes else "read"
+            if library == "mujoco":
+                mujoco.MjModel.from_xml_string(text)
+                return "read"
+            pin.buildModelFromXML(text)
+        except ValueError:
+            return "refused"
+        try:
+            pin.buildModelFromXML(text, mimic=True)
+        except ValueError:
+            return "read; with `mimic=True` refused"
+        return "read"
+
+    return answer
+
+
+def _free() -> list[Row]:
+    """A body that moves freely: which number is what, and in whose axes its rates are."""
+    import mujoco  # noqa: PLC0415
+    import pinocchio as pin  # noqa: PLC0415
+
+    rng = np.random.default_rng(1)
+    xyzw = rng.normal(size=4)
+    xyzw /= np.linalg.norm(xyzw)
+    p, rates = rng.normal(size=3), rng.normal(size=6)
+    robot = urdfkin.load(FREE_URDF)
+    R = robot.placement([*p, *xyzw], "l1")[:3, :3]
+    model = pin.buildModelFromXML(FREE_URDF)
+    data = model.createData()
+    mj_model = mujoco.MjModel.from_xml_string(FREE)
+    mj_data = mujoco.MjData(mj_model)
+
+    def mujocos(qpos: FloatArray) -> FloatArray:
+        mj_data.qpos[:], mj_data.qvel[:] = qpos, rates
+        mujoco.mj_fwdPosition(mj_model, mj_data)
+        mujoco.mj_fwdVelocity(mj_model, mj_data)
+        return np.array(mj_data.xmat[1].reshape(3, 3))
+
+    orders = {
+        "x, y, z, then qx, qy, qz, qw": [*p, *xyzw],
+        "x, y, z, then qw, qx, qy, qz": [*p, *np.roll(xyzw, 1)],
+    }
+
+    def layout(turned: Callable[[FloatArray], FloatArray]) -> str:
+        return which(R, {name: turned(np.array(q)) for name, q in orders.items()})
+
+    def pinocchios(q: FloatArray) -> FloatArray:
+        pin.framesForwardKinematics(model, data, q)
+        return np.array(data.oMf[model.getFrameId("l1")].rotation)
+
+    written = [layout(f) for f in (lambda q: robot.placement(q, "l1")[:3, :3], pinocchios, mujocos)]
+    axes = {
+        "both in the body's own axes": np.concatenate((R @ rates[:3], R @ rates[3:])),
+        "linear in world axes, angular in the body's own": np.concatenate((rates[:3], R @ rates[3:])),
+        "both in world axes": rates,
+    }
+    six = np.empty(6)
+    mujoco.mj_objectVelocity(mj_model, mj_data, mujoco.mjtObj.mjOBJ_XBODY, 1, six, 0)
+    q = np.array([*p, *xyzw])
+    pin.forwardKinematics(model, data, q, rates)
+    frame = model.getFrameId("l1")
+    theirs = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).vector
+    return [
+        Row("q of a body that moves freely", *written),
+        Row(
+            "its rates",
+            which(robot.velocity(q, rates, "l1"), axes),
+            which(theirs, axes),
+            which(np.roll(six, 3), axes),
+        ),
+    ]
+
+
+def page() -> str:
+    """The page."""
+    import mujoco  # noqa: PLC0415
+    import pinocchio as pin  # noqa: PLC0415
+
+    heads = f"| | urdfkin | Pinocchio {pin.__version__} | MuJoCo {mujoco.__version__} |\n|---|---|---|---|\n"
+    table = [f"| {row.question} | {row.urdfkin} | {row.pinocchio} | {row.mujoco} |\n" for row in rows()]
+    return _HEAD + heads + "".join(table) + _FOOT
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), "utf-8")

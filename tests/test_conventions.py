@@ -1,0 +1,27 @@
+"""The page of conventions says what the libraries do today, found by asking them."""
+
+import numpy as np
+import pytest
+
+from scripts import make_conventions as maker
+
+
+def test_the_page_is_what_the_libraries_answer() -> None:
+    assert maker.PAGE.read_text("utf-8") == maker.page(), "run python scripts/make_conventions.py"
+
+
+def test_a_number_that_is_no_reading_or_two_is_an_error() -> None:
+    readings = {"one": np.ones(3), "two": 2.0 * np.ones(3)}
+    assert maker.which(np.ones(3), readings) == "one"
+    with pytest.raises(ValueError, match="none"):
+        maker.which(np.zeros(3), readings)
+    with pytest.raises(ValueError, match="one"):
+        maker.which(np.ones(3), readings | {"the same": np.ones(3)})
+
+
+def test_readings_are_clearly_apart_on_the_motion_that_is_asked_about() -> None:
+    asked = maker.Asked()
+    for readings in (asked.velocity_readings(), asked.acceleration_readings(flipped=False)):
+        values = list(readings.values())
+        gaps = [np.abs(x - y).max() for i, x in enumerate(values) for y in values[:i]]
+        assert min(gaps) > 0.01
