@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from scripts.fuzzing import robots
 from tests.lint.cases.arm import arm, fixed
 from urdfkin.errors import UnknownNameError
 from urdfkin.model.reference import Reference
@@ -76,6 +77,46 @@ def test_mujoco_agrees_about_every_robot_of_the_catalogue(name: str) -> None:
     robot.jacobian_rate(q, v, robot.link_frames)
     robot.acceleration(q, v, a, robot.link_frames)
     assert robot.certificate().verified
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", robots.FAMILIES)
+def test_mujoco_agrees_about_odd_robots_or_says_why_not(family: str) -> None:
+    agreed = 0
+    for number in range(4):
+        case = robots.robot(7, family, number)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                robot = urdfkin.load(case.data, root_joint=case.root_joint, mimic=case.mimic, oracle="mujoco")
+            except urdfkin.UrdfError:
+                continue
+            ask_everything(robot, 2, None)
+        certificate = robot.certificate()
+        agreed += certificate.verified
+        reasons = " ".join(str(w.message) for w in caught if w.category is NotVerifiedWarning)
+        assert certificate.verified or "MuJoCo does not" in reasons, certificate
+    assert agreed
+
+
+def test_a_lever_that_is_nothing_is_nothing_to_mujoco() -> None:
+    """The rest of a robot, however large, has no part in a frame at the root."""
+    far = fixed("far", "l1", "end").replace("</joint>", '<origin xyz="1e60 0 0"/></joint>')
+    text = arm(origin='<origin rpy="0.1 0.2 0.3"/>', more=f'<link name="end"/>{far}')
+    with pytest.warns(urdfkin.UrdfWarning):
+        robot = urdfkin.load(text, oracle="mujoco")
+    J = robot.jacobian([0.3, 0.4], "link:l1")
+    assert (J[:3] == 0.0).all()
+    assert robot.certificate().verified
+
+
+def test_a_chain_that_is_too_deep_for_mujoco_is_not_handed_to_it() -> None:
+    links = "".join(f'<link name="l{i}"/>' for i in range(1_102))
+    joints = "".join(fixed(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(1_101))
+    text = f'<robot name="r">{links}{joints}</robot>'
+    robot = urdfkin.load(text, oracle="mujoco")
+    with pytest.warns(NotVerifiedWarning, match=r"chains of up to 1,000 links: found 1,101"):
+        robot.placement([], "l9")
 
 
 def test_what_pinocchio_refuses_mujoco_may_check() -> None:

@@ -4,8 +4,8 @@ MuJoCo reads the links' and joints' places and axes from the URDF's text with it
 unit quaternions, and keeps six-vectors about a centre of mass: neither urdfkin nor Pinocchio does either.
 What its kinematics does not need, or what it has no words for, is settled before it reads, on the text:
 
-- meshes and inertials are left out. Each link gets a body of its own; the root's is so much heavier that the
-  centre of mass, about which MuJoCo measures, stays at the root.
+- meshes and inertials are left out. Each link gets a body of its own; only the root's keeps a mass, so that
+  the centre of mass, about which MuJoCo measures, is the root's origin.
 - links and joints are called by numbers, so that no name of MuJoCo's is taken.
 - floating and planar joints are added as slides and a ball or a hinge: a free one stands on the world only.
 - followers are coupled by `rules_of_text`: MuJoCo makes constraints of them that kinematics never feels.
@@ -17,6 +17,7 @@ the followers' factors, and the rotation that takes a floating joint's rates, in
 from __future__ import annotations
 
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -32,12 +33,15 @@ from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
 from urdfkin.urdf.mujoco import library
 from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.verify.followers import rules_of_text
+from urdfkin.verify.pinocchio import depth_of
 from urdfkin.verify.pinocchio_base import BaseNumbers, nearest_quaternion
 
 #: What a root joint, or a base that moves, hangs from.
 WORLD = "universe"
-#: Of the root, and of every other link: kg, and kg m^2.
-_HEAVY, _LIGHT = "1", "1e-12"
+#: Of each link while MuJoCo reads it: kg, and kg m^2.
+_MASS = "1"
+#: Links one behind the other: MuJoCo refuses more than 1,023, after a time that grows with their square.
+_DEEPEST = 1_000
 #: What each kind of joint is in MuJoCo, in the order of its coordinates: slides along the axes, then turns.
 _PARTS = {
     "planar": ("slide x", "slide y", "hinge"),
@@ -96,6 +100,12 @@ class MujocoOracle:
         root_joint: str | None = None,
     ) -> None:
         self._mujoco, self._name, self._moving_base = library(), tree.name, moving_base
+        if (depth := depth_of(tree)) > _DEEPEST:
+            raise OracleError(
+                f"MuJoCo is asked about chains of up to {_DEEPEST:,} links",
+                where=tree.name,
+                found=f"{depth:,}",
+            )
         self._stands_on_world = root_joint is not None
         try:
             joints, self._links = _ordered(text, root_joint)
@@ -121,11 +131,10 @@ class MujocoOracle:
         robot = Element("robot", name="r")
         options = {"fusestatic": "false", "boundmass": "0", "boundinertia": "0"}
         SubElement(SubElement(robot, "mujoco"), "compiler", options)
-        for i, name in enumerate(self._bodies.values()):
+        for name in self._bodies.values():
             inertial = SubElement(SubElement(robot, "link", name=name), "inertial")
-            weight = _HEAVY if i == self._moving_base else _LIGHT
-            SubElement(inertial, "mass", value=weight)
-            moments = {f"i{a}{b}": weight if a == b else "0" for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")}
+            SubElement(inertial, "mass", value=_MASS)
+            moments = {f"i{a}{b}": _MASS if a == b else "0" for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")}
             SubElement(inertial, "inertia", moments)
         for i, joint in enumerate(joints):
             robot.append(self._joint(i, joint))
@@ -138,7 +147,10 @@ class MujocoOracle:
                     kind = getattr(mujoco.mjtJoint, f"mjJNT_{what.upper()}")
                     body = spec.body(self._bodies[joint.child])
                     body.add_joint(name=f"j{i} {part}", type=kind, axis=_AXES[axis or "z"])
-            return spec.compile()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # about dynamics, of which nothing is asked
+                model = spec.compile()
+            return _weighing_its_root(model, self._bodies[self._links[0]])
         except (ValueError, RuntimeError, mujoco.FatalError) as error:
             first = str(error).strip().replace("\n", "; ")
             raise OracleError("MuJoCo does not accept this robot", where=self._name, found=first) from error
@@ -466,6 +478,22 @@ class MujocoOracle:
             return _rotation(_scalar_first(unit)), 3
         c, s = np.cos(own[:, 2]), np.sin(own[:, 2])
         return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2), 2
+
+
+def _weighing_its_root(model: Any, root: str) -> Any:
+    """The model without mass but for its root, where the centre of mass then is, exactly.
+
+    MuJoCo measures from there, and a lever that should be nothing has to be nothing.
+    """
+    body = model.body(root).id
+    for mass in (model.body_mass, model.body_subtreemass):
+        mass[:] = 0.0
+    model.body_mass[body] = 1.0
+    while body:
+        model.body_subtreemass[body] = 1.0
+        body = int(model.body_parentid[body])
+    model.body_subtreemass[0] = 1.0
+    return model
 
 
 def _ordered(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:

@@ -30,7 +30,7 @@ from urdfkin.verify.pinocchio_frames import Frames
 from urdfkin.verify.pinocchio_layout import Layout
 from urdfkin.verify.pinocchio_module import pinocchio, version
 
-__all__ = ["MOST_RATES", "Oracle", "OracleError", "version"]
+__all__ = ["MOST_RATES", "Oracle", "OracleError", "depth_of", "mjcf_placements", "version"]
 
 #: Pinocchio recurses over links: less than 4 kB of stack for each was measured (4.1.0), room for more.
 _STACK_FOR_A_LINK = 16_384
@@ -98,7 +98,7 @@ class Oracle:
                 where=self._tree.name,
                 found=f"{rates}, which would take {64e-9 * rates**3:.0f} GB",
             )
-        depth = _depth(self._tree)
+        depth = depth_of(self._tree)
         if depth < _SHALLOW:
             return self._parse(text)
         return with_stack(depth * _STACK_FOR_A_LINK, lambda: self._parse(text))
@@ -429,7 +429,7 @@ def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int
             yield name, (joint.idx_q, joint.nq)
 
 
-def _depth(tree: KinematicTree) -> int:
+def depth_of(tree: KinematicTree) -> int:
     """How many joints lie one behind the other, at most."""
     depths = [0]
     for joint in tree.joints:

@@ -109,7 +109,7 @@ class _Judge:
         if joint.kind == "continuous":
             self.add(
                 MIMIC_CONTINUOUS,
-                "a continuous joint follows another: Pinocchio by itself takes it behind continuous ones only",
+                "a continuous joint follows another: Pinocchio itself takes it behind continuous ones only",
                 mimic,
                 "joint",
                 'write type="revolute" for it',
