@@ -7,7 +7,8 @@ import warnings
 from collections.abc import Mapping
 
 from urdfkin.dh.doubts import doubts
-from urdfkin.dh.read import is_table_file, read_table
+from urdfkin.dh.read import is_table_file, read_table_or_screws
+from urdfkin.dh.screws import Screws
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.to_tree import to_urdf
 from urdfkin.errors import InputError
@@ -29,6 +30,7 @@ from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.choosing import Verify, checked_choice
 from urdfkin.verify.made_of_mjcf import demand_the_mjcfs
 from urdfkin.verify.made_of_table import demand_the_tables
+from urdfkin.verify.screws import check_screws
 from urdfkin.verify.witnesses import WitnessName, witness_of
 
 #: What concerns those who write a URDF, and nobody whose URDF was made of something else.
@@ -36,7 +38,7 @@ _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
 def load(
-    source: Source | DHTable,
+    source: Source | DHTable | Screws,
     *,
     verify: Verify = True,
     mimic: bool | None = None,
@@ -49,8 +51,9 @@ def load(
     Args:
         source: A path (.urdf, .xacro, or .xml for MJCF, see `docs/mjcf.md`), a name of the catalogue
             (`urdfkin robots` lists them), URDF or MJCF text, bytes, an open file, or `-` for standard input;
-            or a Denavit-Hartenberg table, as it is or as a file (.toml, .json, .csv): its base frame is the
-            root, its tip the leaf.
+            or a Denavit-Hartenberg table, as it is or as a file (.toml, .json, .csv, .tsv, .md, .tex, .txt):
+            its base frame is the root, its tip the leaf; or a product of exponentials
+            (`urdfkin.dh.screws`), as it is or as a file with M and screws.
         verify: Whether every result is held against Pinocchio's; "sample" has 100 configurations of each
             call checked.
         mimic: Whether mimic joints follow their leaders, as the URDF says; False lets each move freely.
@@ -77,7 +80,7 @@ def load(
     >>> float(robot.placement([0.0, 0.0], "tip")[0, 3])
     0.7
     """
-    if isinstance(source, DHTable) or is_table_file(source):
+    if isinstance(source, DHTable | Screws) or is_table_file(source):
         return _load_table(
             source, xacro_args, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle
         )
@@ -90,7 +93,7 @@ def load(
 
 
 def _load_table(
-    source: DHTable | str | os.PathLike[str],
+    source: DHTable | Screws | str | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,
     *,
     verify: Verify,
@@ -100,18 +103,27 @@ def _load_table(
 ) -> Robot:
     if xacro_args:
         raise InputError("xacro_args go with the path of a .xacro file", found="a table")
-    if isinstance(source, DHTable):
+    table: DHTable | Screws
+    if isinstance(source, DHTable | Screws):
         table, name = source, "<table>"
     else:
         path = at_home(source)
-        table, name = read_table(path), as_word(path)
-    for doubt in doubts(table):
-        warnings.warn(f"{name}: {doubt}", UrdfWarning, stacklevel=3)
-    text = Text(to_urdf(table).encode(), name, name)
+        table, name = read_table_or_screws(path), as_word(path)
+    if isinstance(table, Screws):
+        urdf = write_urdf(table.to_tree())
+    else:
+        urdf = to_urdf(table)
+        for doubt in doubts(table):
+            warnings.warn(f"{name}: {doubt}", UrdfWarning, stacklevel=3)
+    text = Text(urdf.encode(), name, name)
     robot = _robot(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, made=True)
     if checked_choice(verify):
         plain = mimic is not False and root_joint is None
-        demand_the_tables((robot if plain else _robot(text)).verifier, table)
+        verifier = (robot if plain else _robot(text)).verifier
+        if isinstance(table, Screws):
+            check_screws(verifier, table)
+        else:
+            demand_the_tables(verifier, table)
     return robot
 
 

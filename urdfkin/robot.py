@@ -17,6 +17,7 @@ from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_join
 from urdfkin.compiled.plan import Plan, make_plan
 from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.dh.make import dh_table
+from urdfkin.dh.screws import Screws, screws_of
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
@@ -49,6 +50,7 @@ from urdfkin.verify.quantities import (
     walked,
 )
 from urdfkin.verify.sampling import sample
+from urdfkin.verify.screws import check_screws
 from urdfkin.verify.singular_values import SingularValues, singular_values
 from urdfkin.verify.verifier import Verifier
 from urdfkin.verify.witnesses import WitnessName
@@ -838,6 +840,31 @@ class Robot:
         if self.verifier.wanted(verify):
             self.verifier.table(table)
         return table
+
+    def screws(
+        self, tip: str | None = None, base: str | None = None, *, verify: bool | None = None
+    ) -> Screws:
+        """The product of exponentials of the path between two frames, checked against Pinocchio.
+
+        Args:
+            tip: A link's or joint's name; the robot's tip when None.
+            base: Likewise; the robot's base frame when None.
+            verify: Whether Pinocchio checks it; None leaves it to the robot.
+
+        Raises:
+            UnknownNameError: a frame that does not exist.
+            InputError: a planar or floating joint on the way.
+            TableError: Pinocchio computes something else.
+
+        Example:
+            >>> import urdfkin
+            >>> urdfkin.load("ur5").screws("tool0", "base").space[0].tolist()
+            [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+        """
+        found = screws_of(self.chain(tip, base))
+        if self.verifier.wanted(verify):
+            check_screws(self.verifier, found)
+        return found
 
     def tree_parameters(self, *, verify: bool | None = None) -> TreeParameters:
         """Khalil and Kleinfinger's parameters of the whole robot as one table, checked against Pinocchio.

@@ -34,6 +34,8 @@ _AFTER: dict[str, tuple[str, str]] = {
     "diff": ("urdfkin.cli.diff", "what changed between two versions of a description, and what that moves"),
     "same": ("urdfkin.cli.same", "whether two models are the same robot, proven"),
     "export": ("urdfkin.cli.export", "kinematics as code in many languages, with its proof"),
+    "screws": ("urdfkin.cli.screws", "product of exponentials: home pose and screws, checked"),
+    "structure": ("urdfkin.cli.structure", "what kind of arm it is, and what can be solved in closed form"),
     "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
     "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),
     "explain": ("urdfkin.cli.explain", "what a finding's code means, or an equation's number"),

@@ -19,7 +19,7 @@ from urdfkin.dh.export.mapping import to_mapping
 from urdfkin.dh.export.tree import as_mapping, write_tree
 from urdfkin.dh.hint import snap_hint
 from urdfkin.dh.printed import printed, printed_tree
-from urdfkin.dh.read import read_mapping, table_of
+from urdfkin.dh.read import read_mapping, read_table_or_screws, table_of
 from urdfkin.dh.references import published, reference_path
 from urdfkin.dh.to_tree import to_urdf
 from urdfkin.dh.tree_parameters import tree_parameters
@@ -134,8 +134,9 @@ def _table(work: Work, tip: str | None) -> tuple[DHTable, TableCheck | None]:
 def _made(work: Work, tip: str | None, snap: float) -> DHTable:
     robot, base = work.robot, work.base
     if work.written is not None:
-        table = read_table(at_home(work.written))
-        return to_convention(table, work.convention or table.convention)
+        table = read_table_or_screws(at_home(work.written))
+        if isinstance(table, DHTable):  # screws are derived like a URDF
+            return to_convention(table, work.convention or table.convention)
     like = None
     if work.like is not None:
         like = read_table(reference_path(work.like))

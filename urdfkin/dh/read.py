@@ -7,14 +7,17 @@ import os
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, TypeGuard, TypeVar
 
 from urdfkin.dh.digits import Literal
 from urdfkin.dh.rows import table_from_mapping
+from urdfkin.dh.screws import Screws, screws_of_mapping
 from urdfkin.dh.sheet import from_sheet
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, SourceError, UrdfkinError
 from urdfkin.system.files import read_text
+
+_T = TypeVar("_T")
 
 
 def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
@@ -40,6 +43,12 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
     return table_of(read_mapping(path), str(path))
 
 
+def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | Screws:
+    """A table, or screws where the file has an M; errors as for `read_table`."""
+    data = read_mapping(path)
+    return _placed(screws_of_mapping, data, str(path)) if "M" in data else table_of(data, str(path))
+
+
 def read_mapping(path: str | os.PathLike[str]) -> Mapping[str, Any]:
     """The plain data of a table's file, its numbers as they are written; errors as for `read_table`."""
     return mapping_from_text(read_text(Path(path)), Path(path).suffix.lower(), where=str(path))
@@ -52,8 +61,12 @@ def table_from_text(text: str, suffix: str, where: str = "table") -> DHTable:
 
 def table_of(data: Mapping[str, Any], where: str) -> DHTable:
     """The table of a file's plain data; errors as for `read_table`."""
+    return _placed(table_from_mapping, data, where)
+
+
+def _placed(make: Callable[[Mapping[str, Any]], _T], data: Mapping[str, Any], where: str) -> _T:
     try:
-        return table_from_mapping(data)
+        return make(data)
     except UrdfkinError as error:
         error.where = f"{where}, {error.where}" if error.where else where
         raise

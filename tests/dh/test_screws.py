@@ -1,0 +1,163 @@
+"""Screws are the robot: the book's example, the matrix exponential, Pinocchio, and back to a URDF."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from scipy.linalg import expm
+
+from tests.cli.test_dh import run_any
+from tests.random_chains import trees
+from urdfkin.dh.export.screws import write_screws
+from urdfkin.dh.screws import Screws, screws_from, screws_of
+from urdfkin.errors import InputError
+from urdfkin.loading import load
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.verify.screws import check_screws
+from urdfkin.verify.tables import TableError
+
+#: Lynch and Park, Modern Robotics, example 4.5: a UR5 with W1 = 109 mm, W2 = 82, L1 = 425, L2 = 392, H1 = 89,
+#: H2 = 95.
+M: list[list[float]] = [[-1, 0, 0, 0.817], [0, 0, 1, 0.191], [0, 1, 0, -0.006], [0, 0, 0, 1]]
+SPACE: list[list[float]] = [
+    [0, 0, 1, 0, 0, 0],
+    [0, 1, 0, -0.089, 0, 0],
+    [0, 1, 0, -0.089, 0, 0.425],
+    [0, 1, 0, -0.089, 0, 0.817],
+    [0, 0, -1, -0.109, 0.817, 0],
+    [0, 1, 0, 0.006, 0, 0.817],
+]
+
+
+def exponential(screws: FloatArray, q: FloatArray) -> FloatArray:
+    """The product of matrix exponentials, by SciPy's expm of the (4, 4) matrices."""
+    T = np.eye(4)
+    for (w1, w2, w3, *v), value in zip(screws, q, strict=True):
+        S = np.zeros((4, 4))
+        S[:3, :3], S[:3, 3] = [[0, -w3, w2], [w3, 0, -w1], [-w2, w1, 0]], v
+        T = T @ expm(S * value)
+    return T
+
+
+def test_the_books_ur5_is_where_the_book_says() -> None:
+    arm = screws_from(SPACE, M)
+    T = arm.placement([0, -np.pi / 2, 0, 0, np.pi / 2, 0])
+    np.testing.assert_allclose(
+        T, np.array([[0, -1, 0, 0.095], [1, 0, 0, 0.109], [0, 0, 1, 0.988], [0, 0, 0, 1.0]]), atol=1e-15
+    )
+    robot = load(arm)
+    np.testing.assert_allclose(robot.placement([0, -np.pi / 2, 0, 0, np.pi / 2, 0], "tip"), T, atol=1e-15)
+
+
+@given(trees(min_joints=1, max_joints=6, tame=True))
+@settings(max_examples=20)
+def test_space_and_body_screws_are_the_chain(tree: KinematicTree) -> None:
+    path = chain(tree, "tip")
+    screws = screws_of(path)
+    q = np.linspace(-1, 1, len(path.joint_names))
+    values = path.coupling.values(q)
+    scale = 1e-13 * max(1.0, path.reach + float(path.lengths[0]))
+    wanted = path.placement(q)
+    np.testing.assert_allclose(screws.placement(q), wanted, atol=scale)
+    np.testing.assert_allclose(exponential(screws.space, values) @ screws.M, wanted, atol=10 * scale)
+    np.testing.assert_allclose(screws.M @ exponential(screws.body, values), wanted, atol=10 * scale)
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda", "kinova", "talos"])
+def test_a_robots_screws_are_checked_and_lead_back(name: str) -> None:
+    robot = load(name)
+    screws = robot.screws()
+    again = load(screws)
+    assert again.tree.links[0] == robot.base_frame
+    q = robot.sample(5, seed=1)
+    values = screws.coupling.values(screws.coupling.select(robot.tree, q))
+    free = Screws(screws.joints, screws.M, screws.space)
+    free = screws_from(free.space, free.M, joints=[joint.name for joint in screws.joints])
+    np.testing.assert_allclose(
+        free.placement(values), screws.placement(screws.coupling.select(robot.tree, q)), atol=1e-14
+    )
+
+
+def test_a_wrong_screw_is_found_by_pinocchio() -> None:
+    robot = load("ur5")
+    screws = robot.screws()
+    wrong = np.array(screws.space)
+    wrong[2, 5] += 1e-12
+    with pytest.raises(TableError, match="product of exponentials disagrees"):
+        check_screws(
+            robot.verifier,
+            Screws(screws.joints, screws.M, wrong, *("ur5", screws.base_frame, screws.tip_frame)),
+        )
+
+
+@pytest.mark.parametrize("form", ["toml", "json"])
+def test_a_written_file_is_a_robot(form: str, tmp_path: Path) -> None:
+    path = tmp_path / f"arm.{form}"
+    assert (
+        run_any(
+            "screws", "ur5", "--base", "base", "--tip", "tool0", "--format", form, "-o", str(path)
+        ).exit_code
+        == 0
+    )
+    robot, ur5 = load(path), load("ur5")
+    q = np.linspace(-1, 1, 6)
+    T = np.linalg.inv(ur5.placement(q, "base")) @ ur5.placement(q, "tool0")
+    np.testing.assert_allclose(robot.placement(q, "tool0"), T, atol=1e-14)
+    shown = run_any("dh", str(path), "--snap", "1e-6", "--base", "base", "--tip", "tool0").stdout
+    assert "q1" in shown
+    assert "agrees within rounding" in shown
+
+
+def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
+    arm = screws_from(SPACE, M)
+    names: dict[str, Any] = {}
+    exec(write_screws(arm, "numpy"), names)
+    np.testing.assert_array_equal(names["Slist"], np.transpose(SPACE))
+    np.testing.assert_allclose(
+        names["M"] @ exponential(names["Blist"].T, np.ones(6)), arm.placement(np.ones(6)), atol=1e-14
+    )
+    assert json.loads(write_screws(arm, "json"))["space"] == SPACE
+    assert r"\end{bmatrix}$.}" in write_screws(arm, "latex")
+    if octave := shutil.which("octave-cli"):
+        (tmp_path / "robot_screws.m").write_text(write_screws(arm, "matlab"))
+        script = "[M, S, B] = robot_screws(); printf('%.17g ', S(:), M(:))"
+        out = subprocess.run(
+            [octave, "-q", "--eval", script], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        assert np.fromstring(out.stdout, sep=" ").tolist() == [
+            *np.array(SPACE).ravel(),
+            *np.array(M).T.ravel(),
+        ]
+
+
+@pytest.mark.parametrize(
+    ("screws", "home", "message"),
+    [
+        ([[0, 0, 2, 0, 0, 0]], M, "screw 1: an axis has length 1: found 2"),
+        ([[0, 0, 1, 0, 0, 0.1]], M, "turns or slides, and does not both: found a pitch of 0.1"),
+        ([[0, 0, 1]], M, r"screws are \(n, 6\)"),
+        ([[0, 0, 1, 0, 0, 0]], np.ones((4, 4)), "M must be a rotation"),
+        ([[0, 0, 1, 0, 0, np.nan]], M, "finite"),
+    ],
+)
+def test_what_is_no_screw_says_why(screws: Any, home: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        screws_from(screws, home)
+
+
+def test_a_file_of_screws_with_a_slip_says_where(tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text("M = [[1,0,0,0],[0,1,0,0],[0,0,1,0]]\nspace = [['x']]\n")
+    with pytest.raises(InputError, match=r"arm.toml, space: screws and M are lists of numbers"):
+        load(path)
+    path.write_text("M = [[1,0,0,0],[0,1,0,0],[0,0,1,0]]\nscrews = []\n")
+    with pytest.raises(InputError, match="unknown key in screws: found 'screws'"):
+        load(path)

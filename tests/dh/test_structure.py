@@ -1,0 +1,116 @@
+"""The kind of an arm is told, with how far it is from it, and a wrist's centre really stays where it is."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from tests.cli.test_dh import run_any
+from tests.dh.arms import arm
+from tests.random_chains import rotation, shift
+from urdfkin.dh import DHTable, table_from_rows, to_tree
+from urdfkin.dh.screws import screws_of
+from urdfkin.dh.structure import Structure, structure
+from urdfkin.loading import load
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import KinematicTree
+
+H = math.pi / 2
+PUMA: list[list[float]] = [
+    [0, H, 0, 0],
+    [0.4318, 0, 0, 0],
+    [0.0203, -H, 0.15005, 0],
+    [0, H, 0.4318, 0],
+    [0, -H, 0, 0],
+    [0, 0, 0, 0],
+]
+
+
+def of_tree(tree: KinematicTree) -> Structure:
+    return structure(screws_of(chain(tree, "tip")))
+
+
+def of_rows(rows: list[list[object]] | list[list[float]]) -> Structure:
+    table: DHTable = table_from_rows(rows, "standard")
+    return of_tree(to_tree(table))
+
+
+def test_a_puma_has_a_spherical_wrist_and_is_what_opw_solves() -> None:
+    found = of_rows(PUMA)
+    assert [(kind.name, kind.is_exact) for kind in found.kinds] == [("spherical wrist", True)]
+    assert found.freedoms == 6
+    assert found.solvers[0].startswith("OPW")
+    assert (
+        found.reached <= found.reach == pytest.approx(0.4318 + math.hypot(0.0203, 0.15005) + 0.4318, abs=0.02)
+    )
+
+
+@pytest.mark.parametrize("offset", [1e-4, 3e-3])
+def test_a_wrist_that_misses_its_point_says_by_how_much(offset: float) -> None:
+    rows = [[*row] for row in PUMA]
+    rows[4][0] = offset  # the last axis passes the other two at this distance
+    kind = of_rows(rows).kinds[0]
+    assert kind.name == "spherical wrist"
+    assert not kind.is_exact
+    assert offset / 3 <= kind.metres <= offset
+    rows[4][0] = 0.08
+    assert of_rows(rows).kinds == ()
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.0066])
+def test_three_parallel_axes_are_told_with_their_tilt(tilt: float) -> None:
+    rows: list[list[float]] = [
+        [0, H, 0.18, 0],
+        [-0.61, tilt, 0, 0],
+        [-0.57, 0, 0, 0],
+        [0, H, 0.17, 0],
+        [0, -H, 0.12, 0],
+        [0, 0, 0.1, 0],
+    ]
+    found = of_rows(rows)
+    assert found.kinds[0].name == "three parallel axes"
+    assert found.kinds[0].radians == pytest.approx(tilt, abs=1e-12)
+    assert found.kinds[0].is_exact == (tilt == 0.0)
+    assert found.solvers == ("Pieper, three axes are parallel, two meet: EAIK, ik-geo",)
+
+
+def test_a_scara_and_a_gantry_are_known() -> None:
+    scara = of_rows([[0.3, 0, 0.2, 0, "R"], [0.25, math.pi, 0, 0, "R"], [0, 0, 0, 0, "P"], [0, 0, 0, 0, "R"]])
+    assert (scara.joints, scara.freedoms, scara.kinds[0].name) == ("RRPR", 4, "SCARA")
+    square = rotation("x", H)
+    gantry = of_tree(arm(np.eye(4), square, rotation("y", H), kinds="PPP", tip=shift(0, 0, 0.1)))
+    assert (gantry.joints, gantry.freedoms, gantry.kinds[0].name) == ("PPP", 3, "gantry")
+
+
+@pytest.mark.parametrize("name", ["kinova", "talos", "panda"])
+def test_a_spherical_joints_centre_stays_where_pinocchio_puts_it(name: str) -> None:
+    robot = load(name)
+    screws = robot.screws()
+    found = structure(screws)
+    assert len(found.joints) - found.freedoms == (1 if name != "kinova" else 0)
+    kind = next(kind for kind in found.kinds if kind.name.startswith("spherical"))
+    assert kind.at is not None
+    # A point of the link beyond the three joints, at their centre: no value of the three moves it.
+    beyond = robot.tree.links[robot.tree.joint_index(kind.joints[-1]) + 1]
+    q = np.zeros((20, robot.nq))
+    columns = [robot.tree.q_index[robot.tree.joint_index(joint)] for joint in kind.joints]
+    q[1:, columns] = np.random.default_rng(0).uniform(-1, 1, (19, 3))
+    base, link = (robot.verifier.oracle().placements(q, [screws.base_frame, beyond])[:, k] for k in (0, 1))
+    T = np.linalg.inv(base) @ link
+    local = np.linalg.solve(T[0], [*kind.at, 1.0])
+    centres = (T @ local)[:, :3]
+    np.testing.assert_allclose(centres, np.broadcast_to(centres[0], (20, 3)), atol=1e-12)
+
+
+def test_the_command_says_it_and_what_it_rests_on() -> None:
+    result = run_any("structure", "ur5", "--tip", "tool0")
+    assert result.exit_code == 0
+    assert "three parallel axes: shoulder_lift_joint, elbow_joint, wrist_1_joint, exactly" in result.stdout
+    assert "agrees within rounding" in result.stdout
+    data = json.loads(run_any("structure", "panda", "--json").stdout)
+    assert data["freedoms"] == 6
+    assert data["joints"] == "RRRRRRR"
+    assert run_any("structure", "ur5", "--no-verify").exit_code == 3

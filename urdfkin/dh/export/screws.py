@@ -1,0 +1,99 @@
+"""A product of exponentials as text, LaTeX, TOML, JSON and code; these last are exact to the last bit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+from urdfkin.dh.export.cells import pose_lines
+from urdfkin.dh.export.code import identifier, numbers, plain
+from urdfkin.dh.export.latex import escaped
+from urdfkin.dh.export.matlab import matrix
+from urdfkin.dh.export.terminal import aligned
+from urdfkin.dh.screws import Screws
+from urdfkin.errors.printable import printable
+from urdfkin.model.tree import FloatArray
+
+FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
+
+
+def write_screws(screws: Screws, form: str, digits: int = 10) -> str:
+    """One of the forms "terminal", "latex", "toml", "json", "numpy" and "matlab"."""
+    return _FORMS[form](screws, digits)
+
+
+def _terminal(screws: Screws, digits: int) -> str:
+    path = f"{screws.robot}: {screws.base_frame} to {screws.tip_frame}"
+    lines = [f"{path}, product of exponentials (metres, angular first)", FORMULA]
+    for what, rows in (("space screws S", screws.space), ("body screws B", screws.body)):
+        body = [["i", "joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z"]]
+        body += [
+            [str(i), joint.name, *(f"{_clean(x):.{digits}g}" for x in row)]
+            for i, (joint, row) in enumerate(zip(screws.joints, rows, strict=True), 1)
+        ]
+        lines += ["", what, *aligned(body)]
+    lines += ["", "M, the tip with every joint at zero (metres):"]
+    lines += ["  " + line for line in pose_lines(screws.M, digits)]
+    return "\n".join(map(printable, lines)) + "\n"
+
+
+def _clean(x: float) -> float:
+    return 0.0 if abs(x) < 1e-15 else float(x)
+
+
+def _latex(screws: Screws, digits: int) -> str:
+    def rows(values: FloatArray) -> str:
+        return r" \\ ".join(" & ".join(f"{_clean(x):.{min(digits, 6)}g}" for x in row) for row in values)
+
+    home = rf"\begin{{bmatrix}}{rows(screws.M)}\end{{bmatrix}}"
+    names = f"{escaped(screws.robot)}, {escaped(screws.base_frame)} to {escaped(screws.tip_frame)}"
+    heads = r"$i$ & joint & $\omega_x$ & $\omega_y$ & $\omega_z$ & $v_x$ & $v_y$ & $v_z$ \\"
+    lines = [r"\begin{table}", r"  \centering"]
+    home = rf"\begin{{bmatrix}}{rows(screws.M)}\end{{bmatrix}}"
+    lines += [rf"  \caption{{Space screws of {names}, metres. $M = {home}$.}}"]
+    lines += [r"  \begin{tabular}{rlrrrrrr}", r"    \toprule", f"    {heads}", r"    \midrule"]
+    for i, (joint, row) in enumerate(zip(screws.joints, screws.space, strict=True), 1):
+        lines.append(
+            f"    {i} & {escaped(joint.name)} & "
+            + rows(row[None]).replace(" & ", "$ & $").join("$$")
+            + r" \\"
+        )
+    return "\n".join([*lines, r"    \bottomrule", r"  \end{tabular}", r"\end{table}"]) + "\n"
+
+
+def _toml(screws: Screws, _digits: int) -> str:
+    return "".join(f"{key} = {json.dumps(value)}\n" for key, value in screws.as_mapping().items())
+
+
+def _json(screws: Screws, _digits: int) -> str:
+    return json.dumps(screws.as_mapping(), indent=2) + "\n"
+
+
+def _numpy(screws: Screws, _digits: int) -> str:
+    lines = [
+        f'"""{plain(screws.robot)}: M, space and body screws as columns (w, v), metres: Modern Robotics."""'
+    ]
+    lines += ["", "import numpy as np", ""]
+    for name, rows in (("M", screws.M), ("Slist", screws.space), ("Blist", screws.body)):
+        lines += [f"{name} = np.array(", "    [", *(f"        [{numbers(row)}]," for row in rows), "    ]"]
+        lines.append(")" if name == "M" else ").reshape(-1, 6).T")
+    return "\n".join(lines) + "\n"
+
+
+def _matlab(screws: Screws, _digits: int) -> str:
+    lines = [f"function [M, Slist, Blist] = {identifier(screws.robot)}_screws()"]
+    lines += [f"% {plain(screws.robot)}: screws are columns (w; v), metres, as Modern Robotics has them"]
+    lines += matrix("M", screws.M, 4)
+    for name, rows in (("Slist", screws.space), ("Blist", screws.body)):
+        lines += [*matrix(name, rows, 6), f"{name} = {name}';"]
+    return "\n".join([*lines, "end"]) + "\n"
+
+
+_FORMS: dict[str, Callable[[Screws, int], str]] = {
+    "terminal": _terminal,
+    "latex": _latex,
+    "toml": _toml,
+    "json": _json,
+    "numpy": _numpy,
+    "matlab": _matlab,
+}

@@ -1,0 +1,281 @@
+"""The product of exponentials: a home pose and a screw for each joint, in Lynch and Park's form.
+
+    T(q) = exp([S_1] q_1) ... exp([S_n] q_n) M = M exp([B_1] q_1) ... exp([B_n] q_n)    (Modern Robotics, 4.1)
+
+M is the tip's pose with every joint at zero. A screw is (w, v), **angular first** as in that book and in its
+code: w the joint's unit axis and v = p x w for a turning joint through p; w = 0 and v the unit direction for
+a sliding one. Space screws S are in the base, body screws B = Ad(M^-1) S in the tip. Nothing is chosen here,
+as frames are in a Denavit-Hartenberg table: who agrees on base, tip and zero has the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.dh.to_tree import UNBOUNDED_SLIDE
+from urdfkin.errors import InputError
+from urdfkin.kinematics.rotation import exp_rotation
+from urdfkin.kinematics.roundings import EPS, ROW
+from urdfkin.model.chain import FrameChain, motion_about_z
+from urdfkin.model.coupling import Coupling, coupling_of
+from urdfkin.model.tree import (
+    FloatArray,
+    Joint,
+    JointKind,
+    KinematicTree,
+    Limit,
+    Mimic,
+    build_tree,
+    frozen,
+)
+
+#: How far a written screw may be from one: the length of its axis from 1, its pitch from 0, metres a radian.
+_WRITTEN = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class ScrewJoint:
+    """One joint: its name, whether it turns, whom it follows, and its bounds."""
+
+    name: str
+    kind: JointKind
+    mimic: Mimic | None = None
+    limit: Limit | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Screws:
+    """A robot's path as a product of exponentials.
+
+    Attributes:
+        joints: Base to tip.
+        M: (4, 4) the tip's pose in the base with every joint at zero, metres.
+        space: (n, 6) screws in the base, (w, v): rad/rad and m/rad, or 0 and m/m.
+        robot: The robot's name.
+        base_frame: What the base is called.
+        tip_frame: What the tip is called.
+
+    Example:
+        >>> M = [[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0]]
+        >>> arm = screws_from([[0, 0, 1, 0, 0, 0], [0, 0, 1, 0, -1, 0]], M)
+        >>> arm.placement([0.0, np.pi / 2])[:3, 3].round(12).tolist()
+        [1.0, 1.0, 0.0]
+    """
+
+    joints: tuple[ScrewJoint, ...]
+    M: FloatArray
+    space: FloatArray
+    robot: str = "robot"
+    base_frame: str = "base"
+    tip_frame: str = "tip"
+
+    @cached_property
+    def body(self) -> FloatArray:
+        """(n, 6) screws in the tip: B = Ad(M^-1) S."""
+        R, p = self.M[:3, :3], self.M[:3, 3]
+        w, v = self.space[:, :3], self.space[:, 3:]
+        return frozen(np.hstack([w @ R, (v - np.cross(p, w)) @ R]))
+
+    @cached_property
+    def coupling(self) -> Coupling:
+        """How the path's coordinates move its joints."""
+        return coupling_of([(joint.name, joint.mimic) for joint in self.joints])
+
+    @property
+    def points(self) -> FloatArray:
+        """(n, 3) of each turning axis the point nearest to the base; of a sliding one the one before."""
+        here, found = np.zeros(3), []
+        for joint, screw in zip(self.joints, self.space, strict=True):
+            here = np.cross(screw[:3], screw[3:]) if joint.kind.turns else here
+            found.append(here)
+        return np.array(found).reshape(-1, 3)
+
+    def placement(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+        """(..., 4, 4) the tip in the base for `q` (..., coordinates), in the order of `coupling.names`.
+
+        Raises:
+            InputError: `q` has the wrong length.
+        """
+        values = self.coupling.values(q)
+        T = np.broadcast_to(np.eye(4), (*values.shape[:-1], 4, 4))
+        for i in range(len(self.joints)):
+            T = T @ exp_screw(self.space[i], values[..., i])
+        return np.ascontiguousarray(T @ self.M)
+
+    def jacobian(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+        """(6, joints) the space Jacobian in the book's order, [angular; linear], of every joint (5.11)."""
+        T, columns = np.eye(4), list[FloatArray]()
+        for screw, value in zip(self.space, self.coupling.values(q), strict=True):
+            w, v = T[:3, :3] @ screw[:3], T[:3, :3] @ screw[3:]
+            columns.append(np.concatenate([w, v + np.cross(T[:3, 3], w)]))
+            T = T @ exp_screw(screw, value)
+        return np.array(columns).reshape(-1, 6).T
+
+    def rounding(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+        """(...,) metres: what rounding may do to `placement(q)`: that of two rows for each exponential."""
+        values = np.abs(self.coupling.values(q))
+        turns = np.array([joint.kind.turns for joint in self.joints], dtype=bool)
+        way = np.vstack([np.zeros(3), self.points, self.M[:3, 3]])
+        length = 2.0 * float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+        lever = length + values[..., ~turns].sum(axis=-1)
+        return np.asarray(
+            EPS * (2.0 * ROW * (len(self.joints) + 1) + values[..., turns].sum(axis=-1)) * lever
+        )
+
+    def to_tree(self) -> KinematicTree:
+        """The robot: with all joints at zero every link frame stands like the base's, on its joint's axis."""
+        links = [self.base_frame, *(f"{joint.name}_link" for joint in self.joints)]
+        joints, here = list[tuple[Joint, str, str]](), np.zeros(3)
+        for i, (joint, screw, point) in enumerate(zip(self.joints, self.space, self.points, strict=True)):
+            limit = joint.limit if joint.kind.turns else joint.limit or UNBOUNDED_SLIDE
+            axis = screw[:3] if joint.kind.turns else screw[3:]
+            T = _moved(point - here)
+            joints.append(
+                (Joint(joint.name, joint.kind, 0, T, axis, limit, joint.mimic), links[i], links[i + 1])
+            )
+            here = point
+        end = Joint(
+            f"{self.tip_frame}_fixed", JointKind.FIXED, 0, _moved(-here) @ self.M, np.array([1.0, 0, 0])
+        )
+        return build_tree(self.robot, self.base_frame, [*joints, (end, links[-1], self.tip_frame)])
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Plain data that `screws_of_mapping` reads back; every joint has a value of its own there."""
+        return {
+            "robot": self.robot,
+            "base_frame": self.base_frame,
+            "tip_frame": self.tip_frame,
+            "joints": [joint.name for joint in self.joints],
+            "M": self.M.tolist(),
+            "space": self.space.tolist(),
+            "body": self.body.tolist(),
+        }
+
+
+def screws_of(path: FrameChain) -> Screws:
+    """The screws of a path of a robot, at zero of every joint."""
+    T, rows = np.eye(4), list[FloatArray]()
+    for joint, A in zip(path.joints, path.constants, strict=False):
+        T = T @ A
+        z, p = T[:3, 2], T[:3, 3]
+        rows.append(np.concatenate([z, np.cross(p, z)] if joint.kind.turns else [np.zeros(3), z]) + 0.0)
+    joints = tuple(ScrewJoint(one.name, one.kind, one.mimic, one.limit) for one in path.joints)
+    ends = path.robot, path.base, path.tip
+    return Screws(joints, frozen(T @ path.T_last_tip), frozen(np.array(rows).reshape(-1, 6)), *ends)
+
+
+def screws_from(
+    screws: ArrayLike,
+    M: ArrayLike,
+    *,
+    frame: str = "space",
+    joints: Sequence[str] = (),
+    robot: str = "robot",
+    base_frame: str = "base",
+    tip_frame: str = "tip",
+) -> Screws:
+    """Screws that somebody wrote; a joint turns where w is not zero.
+
+    Args:
+        screws: (n, 6) rows (w, v), angular first; or Modern Robotics' columns, (6, n), unless n is six.
+        M: (4, 4) or (3, 4) home pose of the tip, metres.
+        frame: "space" or "body".
+        joints: The joints' names; joint_1 ... when not given.
+        robot: The robot's name.
+        base_frame: What the base is called.
+        tip_frame: What the tip is called.
+
+    Raises:
+        InputError: a shape; an axis that has not length 1; a pitch (w . v is not 0), which no URDF has.
+    """
+    S, pose = np.array(screws, dtype=np.float64), np.eye(4)
+    S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S
+    home = np.asarray(M, dtype=np.float64)
+    if S.ndim != 2 or S.shape[1] != 6 or home.shape not in ((4, 4), (3, 4)) or frame not in ("space", "body"):
+        raise InputError(
+            "screws are (n, 6) with a home pose M (4, 4), in space or body",
+            found=f"{S.shape}, {home.shape}, {frame!r}",
+        )
+    if not (np.isfinite(S).all() and np.isfinite(home).all()):
+        raise InputError("screws and M are finite numbers", found="nan or inf")
+    pose[:3] = home[:3]
+    if np.abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max() > _WRITTEN or np.linalg.det(pose[:3, :3]) < 0:
+        raise InputError(
+            "M must be a rotation and a translation", where="M", found=str(pose[:3, :3].tolist())
+        )
+    U, _, Vt = np.linalg.svd(pose[:3, :3])
+    pose[:3, :3] = U @ Vt if np.abs(U @ Vt - pose[:3, :3]).max() > 1e-15 else pose[:3, :3]
+    if frame == "body":
+        w = S[:, :3] @ pose[:3, :3].T
+        S = np.hstack([w, S[:, 3:] @ pose[:3, :3].T + np.cross(pose[:3, 3], w)])
+    names = tuple(joints) or tuple(f"joint_{i + 1}" for i in range(len(S)))
+    if len(names) != len(S):
+        raise InputError("a name for each screw", found=f"{len(names)} names, {len(S)} screws")
+    made = []
+    for i, name in enumerate(names):
+        turns = bool(S[i, :3].any())
+        size = float(np.linalg.norm(S[i, :3] if turns else S[i, 3:]))
+        if abs(size - 1.0) > _WRITTEN:
+            raise InputError(
+                "an axis has length 1",
+                where=f"screw {i + 1}",
+                found=f"{size:.6g}",
+                remedy="(w, v), angular first",
+            )
+        S[i] /= size
+        pitch = float(S[i, :3] @ S[i, 3:])
+        if abs(pitch) > _WRITTEN:
+            raise InputError(
+                "a joint turns or slides, and does not both", where=f"screw {i + 1}",
+                found=f"a pitch of {pitch:.3g} m/rad", remedy="w . v is 0 for a joint that turns",
+            )  # fmt: skip
+        S[i, 3:] -= pitch * S[i, :3]
+        made.append(ScrewJoint(name, JointKind.CONTINUOUS if turns else JointKind.PRISMATIC))
+    return Screws(tuple(made), frozen(pose), frozen(S), robot, base_frame, tip_frame)
+
+
+def screws_of_mapping(data: Mapping[str, Any]) -> Screws:
+    """Screws from a file's plain data: M, and space or body; errors as for `screws_from`.
+
+    Raises:
+        InputError: an unknown key, or neither space nor body.
+    """
+    known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
+    for key in data:
+        if key not in known:
+            raise InputError("unknown key in screws", found=repr(key), remedy=f"keys are {', '.join(known)}")
+    frame = next((one for one in ("space", "body") if one in data), None)
+    if frame is None:
+        raise InputError("no screws", where="space", remedy="write space = [[w, v], ...], or body")
+    named = {key: data[key] for key in known[:4] if key in data}
+    try:
+        return screws_from(data[frame], data["M"], frame=frame, **named)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError("screws and M are lists of numbers", where=frame, found=str(error)[:100]) from None
+
+
+def exp_screw(screw: FloatArray, values: ArrayLike) -> FloatArray:
+    """(..., 4, 4) exp([S] q) of one screw (w, v) at `values` (...), rad or m (Modern Robotics, 3.88)."""
+    w, v, q = screw[:3], screw[3:], np.asarray(values, dtype=np.float64)
+    T = motion_about_z(np.zeros(q.shape), turns=True)
+    if not w.any():
+        T[..., :3, 3] = q[..., None] * v
+        return T
+    T[..., :3, :3] = exp_rotation(q[..., None] * w)
+    p = np.cross(w, v)  # the axis' point nearest to the origin: a turn leaves it where it is
+    T[..., :3, 3] = p - T[..., :3, :3] @ p + q[..., None] * (w @ v) * w
+    return T
+
+
+def _moved(p: FloatArray) -> FloatArray:
+    T = np.eye(4)
+    T[:3, 3] = p
+    return T
