@@ -18,6 +18,7 @@ from tests.random_chains import trees
 from urdfkin.dh.export.screws import write_screws
 from urdfkin.dh.screws import Screws, screws_from, screws_of
 from urdfkin.errors import InputError
+from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.loading import load
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -124,6 +125,14 @@ def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         names["M"] @ exponential(names["Blist"].T, np.ones(6)), arm.placement(np.ones(6)), atol=1e-14
     )
+    # ik-geo's form: positions P between the axes H, turned one after the other.
+    R, p = np.eye(3), names["P"][:, 0]
+    for h, between in zip(names["H"].T, names["P"][:, 1:].T, strict=True):
+        R = R @ exp_rotation(h)
+        p = p + R @ between
+    T = arm.placement(np.ones(6))
+    np.testing.assert_allclose(p, T[:3, 3], atol=1e-14)
+    np.testing.assert_allclose(R @ names["R6T"], T[:3, :3], atol=1e-14)
     assert json.loads(write_screws(arm, "json"))["space"] == SPACE
     assert r"\end{bmatrix}$.}" in write_screws(arm, "latex")
     if octave := shutil.which("octave-cli"):

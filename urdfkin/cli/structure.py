@@ -8,15 +8,24 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.arguments import load_robot, robot_argument, verify_option
+from urdfkin.cli.numbers import Number
 
 if TYPE_CHECKING:
     from urdfkin.dh.structure import Kind, Structure
+    from urdfkin.model.chain import FrameChain
+    from urdfkin.robot import Robot
 
 
 @click.command(epilog="Example: urdfkin structure ur5 --tip tool0")
 @robot_argument
 @click.option("--base", metavar="NAME", help="A link or joint. Default: the robot's base frame.")
 @click.option("--tip", metavar="NAME", help="A link or joint. Default: the robot's tip.")
+@click.option(
+    "--opw",
+    type=Number(),
+    metavar="MM",
+    help="Parameters for OPW solvers, as YAML, if they leave no more than MM (and mrad) at the tip.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Plain data, metres and radians.")
 @verify_option
 @click.pass_context
@@ -27,6 +36,7 @@ def command(
     root_joint: str | None,
     base: str | None,
     tip: str | None,
+    opw: float | None,
     as_json: bool,
     verify: bool,
 ) -> None:
@@ -45,6 +55,8 @@ def command(
     from urdfkin.verify.screws import check_screws  # noqa: PLC0415
 
     loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    if opw is not None:
+        context.exit(_opw(loaded, loaded.chain(tip, base), opw / 1e3, verify=verify))
     screws = loaded.screws(tip, base, verify=False)
     said = check_screws(loaded.verifier, screws) if verify else None
     found = structure(screws)
@@ -55,6 +67,21 @@ def command(
     else:
         click.echo("\n".join([*_lines(found), "", line]))
     context.exit(0 if said else 3)
+
+
+def _opw(robot: Robot, path: FrameChain, tolerance: float, *, verify: bool) -> int:
+    import json  # noqa: PLC0415  keeps --help fast
+
+    from urdfkin.cli.door import say, say_file  # noqa: PLC0415
+    from urdfkin.dh.opw import opw_of  # noqa: PLC0415
+    from urdfkin.verify.pinocchio import version  # noqa: PLC0415
+    from urdfkin.verify.screws import check_opw  # noqa: PLC0415
+
+    found = opw_of(path, tolerance)
+    said = check_opw(robot.verifier, path, found) if verify else None
+    say_file("".join(f"{key}: {json.dumps(value)}\n" for key, value in found.as_mapping().items()))
+    say(f"Pinocchio {version()}: {said}" if said else f"NOT VERIFIED by Pinocchio {version()}", err=True)
+    return 0 if said else 3
 
 
 def _lines(found: Structure) -> list[str]:

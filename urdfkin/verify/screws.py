@@ -5,12 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from urdfkin.dh.noise import left_out
+from urdfkin.dh.opw import Opw
 from urdfkin.dh.screws import Screws
 from urdfkin.kinematics.roundings import EPS, of_joints
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import FrameChain, chain
 from urdfkin.verify.sampling import sample
 from urdfkin.verify.tables import TableError
 from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
+
+
+def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
+    """One line on how far the solver's forward kinematics is off; None where Pinocchio cannot check."""
+    if verifier.cannot() is not None:
+        return None
+    q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
+    base, tip = np.moveaxis(verifier.oracle().placements(q, [path.base, path.tip]), 1, 0)
+    own = path.coupling.values(path.coupling.select(verifier.tree, q))
+    off = np.abs(base @ found.placement(own) - tip)[:, :3]
+    return (
+        f"base . F(sign q - offset) . tool is off by at most {off[..., 3].max():.2e} m"
+        f" and {off[..., :3].max():.2e} rad on {len(q)} samples"
+    )
 
 
 def check_screws(verifier: Verifier, screws: Screws) -> str | None:

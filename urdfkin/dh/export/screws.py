@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
+import numpy as np
+
 from urdfkin.dh.export.cells import pose_lines
 from urdfkin.dh.export.code import identifier, numbers, plain
 from urdfkin.dh.export.latex import escaped
@@ -77,6 +79,21 @@ def _numpy(screws: Screws, _digits: int) -> str:
     for name, rows in (("M", screws.M), ("Slist", screws.space), ("Blist", screws.body)):
         lines += [f"{name} = np.array(", "    [", *(f"        [{numbers(row)}]," for row in rows), "    ]"]
         lines.append(")" if name == "M" else ").reshape(-1, 6).T")
+    if all(joint.kind.turns for joint in screws.joints):
+        way = np.diff(np.vstack([np.zeros(3), screws.points, screws.M[:3, 3]]), axis=0)
+        lines += [
+            "",
+            "# EAIK, ik-geo: T = P0 + R(h1, q1) (P1 + R(h2, q2) (P2 + ...)), its rotation times R6T.",
+        ]
+        for name, rows in (("H", screws.space[:, :3]), ("P", way)):
+            lines += [
+                f"{name} = np.array(",
+                "    [",
+                *(f"        [{numbers(row)}]," for row in rows),
+                "    ]",
+            ]
+            lines.append(").reshape(-1, 3).T")
+        lines.append("R6T = M[:3, :3]")
     return "\n".join(lines) + "\n"
 
 
