@@ -45,6 +45,12 @@ OTHERS: dict[str, list[list[str]]] = {
     "robots": [[], ["--format", "json"], ["--family", FILE]],
     "explain": [["URDF502"], ["7.130"], [FILE]],
     "report": [["REPORT"], ["REPORT", "--cases"], [FILE]],
+    "same": [["ROBOT", "ROBOT"], ["ROBOT", "elbow"], ["ROBOT", "ROBOT", "--format", "json"], ["ROBOT", FILE]],
+    "diff": [
+        ["ROBOT", "elbow", "--no-effects"],
+        ["ROBOT", "elbow", "--no-effects", "--format", "json"],
+        ["ROBOT", FILE],
+    ],
     "compare": [["REPORT", "REPORT"], ["REPORT", "REPORT", "--format", "json"], ["REPORT", FILE]],
     "view": [[FILE]],
 }

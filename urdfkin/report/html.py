@@ -32,6 +32,7 @@ from urdfkin.view.figure import installed
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+    from markupsafe import Markup
 
 #: With no more robots than this they stand open.
 _OPEN = 1
@@ -54,10 +55,15 @@ def environment() -> Environment:
     return environment
 
 
-def as_html(document: Document) -> str:
-    """The page. Names may be anything, `<script>` included: the template escapes them all."""
+def as_is(text: str) -> Markup:
+    """A text of our own, which a template takes as it is."""
     from markupsafe import Markup  # noqa: PLC0415
 
+    return Markup(text)
+
+
+def as_html(document: Document) -> str:
+    """The page. Names may be anything, `<script>` included: the template escapes them all."""
     robots = document["robots"]
     quantities = columns(robots)
     return (
@@ -76,10 +82,10 @@ def as_html(document: Document) -> str:
             robots=[_robot(robot, i, document) for i, robot in enumerate(robots)],
             opened=len(robots) <= _OPEN,
             heat_steps=pages.HEAT_STEPS,
-            style=Markup(asset("report.css")),
-            script=Markup(asset("report.js")),
-            view_script=Markup(asset("view3d.js")),
-            three=Markup(asset("three.min.js")),
+            style=as_is(asset("report.css")),
+            script=as_is(asset("report.js")),
+            view_script=as_is(asset("view3d.js")),
+            three=as_is(asset("three.min.js")),
             three_licence=asset("three.LICENSE.txt"),
         )
     )
@@ -100,8 +106,6 @@ def _totals(document: Document) -> dict[str, Any]:
 
 
 def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
-    from markupsafe import Markup  # noqa: PLC0415
-
     model = robot["model"]
     heads, heat = pages.heat_map(robot, model) if model and robot["checks"] else ([], [])
     return {
@@ -134,7 +138,7 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
         "judged_on": judged_on(robot["judge"]) if robot["judge"] else "",
         "heat_heads": heads,
         "heat": heat,
-        "plot": Markup(_plot(robot, index, document)),
+        "plot": as_is(_plot(robot, index, document)),
     }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from urdfkin.model.chain import inverse
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.document import asset
-from urdfkin.report.html import environment
+from urdfkin.report.html import as_is, environment
 from urdfkin.report.sameness import HEADS, as_written, far_frames, headline, renamed, rows, where
 from urdfkin.robot import Robot
 from urdfkin.sameness.mechanism import Mechanism
@@ -25,8 +25,6 @@ VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.3
 
 def as_html(found: Sameness, robots: tuple[Robot, Robot]) -> str:
     """The page. Names may be anything: the template escapes them all."""
-    from markupsafe import Markup  # noqa: PLC0415
-
     frames = far_frames(found)
     worst = frames[0] if frames and frames[0].q_a else None
     return (
@@ -43,7 +41,7 @@ def as_html(found: Sameness, robots: tuple[Robot, Robot]) -> str:
             pictures=pictures(found, robots, worst),
             worst=worst,
             off=length(worst.lower) if worst else "",
-            style=Markup(asset("report.css")),
+            style=as_is(asset("report.css")),
         )
     )
 

@@ -81,7 +81,7 @@ class FramePair:
         end: (4, 4) L, put in behind the last joint, at A's home.
         tilt: Radians by which B's is turned on its body.
         shift: Metres by which it is moved on it.
-        tool: (4, 4) B's in A's frame, where that is taken for another tool and put right.
+        tool: (4, 4) B's in A's frame, where it is taken for another tool on the same body.
     """
 
     a: int
@@ -256,7 +256,10 @@ class _Walk:
         return found
 
     def _frames(self, place: _Place, found: Alignment) -> None:
-        for link_a, link_b in self._all_links(place):
+        pairs = self._all_links(place)
+        if (other := self._tool_on(place, pairs)) is not None:
+            found.frames.append(other)
+        for link_a, link_b in pairs:
             home = self.a.homes[link_a]
             at, seen = place.G @ home, place.XC @ self.b.homes[link_b]
             angle, way = apart(at, seen)
@@ -268,6 +271,17 @@ class _Walk:
                 end = inverse(place.G) @ seen @ inverse(home)
                 found.worst = max(found.worst, angle * self.size + way)
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, way))
+
+    def _tool_on(self, place: _Place, taken: list[tuple[int, int]]) -> FramePair | None:
+        """Where no link of two bodies is the other's: any of either, as another tool on the same body."""
+        names_a, names_b = self.a.tree.links, self.b.tree.links
+        ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
+        theirs = [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
+        if taken or not ours or not theirs:
+            return None
+        home = self.a.homes[ours[0]]
+        tool = inverse(place.G @ home) @ place.XC @ self.b.homes[theirs[0]]
+        return FramePair(ours[0], theirs[0], place.previous, home, IDENTITY, 0.0, 0.0, tool)
 
     def _all_links(self, place: _Place) -> list[tuple[int, int]]:
         """Links of one name, then those that stand in one place under names that the other has not."""
