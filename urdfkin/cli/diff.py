@@ -11,7 +11,7 @@ from urdfkin.cli.output import compiling, console, write_file
 from urdfkin.cli.reports import check_writable
 from urdfkin.errors.printable import json_text
 
-EXAMPLE = "urdfkin diff old.urdf new.urdf --markdown comment.md"
+EXAMPLE = "urdfkin diff arm.urdf my.urdf --markdown comment.md"
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.sameness.result import Sameness
 
-EXAMPLE = "urdfkin same old.urdf new.urdf --certificate same.json"
+EXAMPLE = "urdfkin same ur5 ur5_limited --certificate same.json"
 _PATH = click.Path(path_type=Path, dir_okay=False)
 
 

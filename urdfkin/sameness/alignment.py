@@ -212,12 +212,18 @@ class _Walk:
             yield base, self.gauge.X
             return
         for base in self._bases():
-            yield base, IDENTITY
-            for link_a, link_b in self.pairing.links(*base):
-                X = self.a.homes[link_a] @ inverse(self.b.homes[link_b])
-                if not self.tolerance.holds(*apart(IDENTITY, X)):
+            tried = list[FloatArray]()
+            for X in self._places(base):
+                if not any(self.tolerance.holds(*apart(known, X)) for known in tried):
+                    tried.append(X)
                     yield base, X
-            yield from ((base, X) for X in self._by_axes(base))
+
+    def _places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
+        """Where B's root may stand: where A's does, where links of one name meet, where axes do."""
+        yield IDENTITY
+        for link_a, link_b in self.pairing.links(*base):
+            yield self.a.homes[link_a] @ inverse(self.b.homes[link_b])
+        yield from self._by_axes(base)
 
     def _bodies_of(self, link_a: str, link_b: str) -> tuple[int, int]:
         a, b = self.a, self.b

@@ -153,7 +153,7 @@ class Judge:
         uppers = [upper_bounds(found, variables, frame) for frame in frames]
         off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
         fine = set[int]()
-        while off and (widest := max(off, key=lambda k: uppers[k])) not in fine:
+        while len(fine) < FARTHEST and off and (widest := max(off, key=lambda k: uppers[k])) not in fine:
             uppers[widest] = upper_bounds(found, variables, frames[widest], FINE)
             fine.add(widest)
         search = self.search(found, variables)

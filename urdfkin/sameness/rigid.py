@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from urdfkin.kinematics.rotation.aligning import axis_aligning
-from urdfkin.kinematics.rotation.axis_angle import exp_rotation, log_rotation, rotation_about
+from urdfkin.kinematics.rotation.axis_angle import exp_rotation, rotation_about
 from urdfkin.model.tree import FloatArray
 from urdfkin.sameness.mechanism import Screw
 
@@ -53,8 +53,10 @@ def shortest_turn(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
 
 def apart(T: FloatArray, other: FloatArray) -> tuple[float, float]:
     """By what angle (rad) and way (m) two poses differ."""
-    turn = log_rotation(other[:3, :3] @ T[:3, :3].T)
-    return float(np.linalg.norm(turn)), float(np.linalg.norm(other[:3, 3] - T[:3, 3]))
+    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # a walk asks this thousands of times: plain numbers
+    sine = math.hypot(R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
+    angle = math.atan2(sine, R[0][0] + R[1][1] + R[2][2] - 1.0)
+    return angle, math.dist(other[:3, 3].tolist(), T[:3, 3].tolist())
 
 
 def turn_about(u: FloatArray, R: FloatArray) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from urdfkin.dh.elements import nearest_twelfth
 from urdfkin.dh.units import units_of
 from urdfkin.kinematics.rotation.euler import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
@@ -29,9 +30,13 @@ def put_right(found: Alignment, rounding: Tolerance) -> tuple[str, ...]:
         if step.sense < 0 or step.offset:
             sign = "-" if step.sense < 0 else ""
             least = rounding.angle if step.kind == "turns" else rounding.way
-            unit = units_of(digits=17).angle if step.kind == "turns" else units_of(digits=17).length
             offset = _rounded(step.offset, least)
-            constant = f" {'-' if offset < 0 else '+'} {unit(abs(offset))}" if offset else ""
+            twelfth = nearest_twelfth(offset)
+            if step.kind == "turns" and abs(offset - twelfth) <= 2.0 * least:
+                size = units_of().angle(abs(twelfth))
+            else:
+                size = repr(abs(offset))
+            constant = f" {'-' if offset < 0 else '+'} {size}" if offset else ""
             lines.append(f"q[{tree_b.joints[step.b].name}] = {sign}q[{tree_a.joints[step.a].name}]{constant}")
     for k, frame in enumerate(found.frames):
         if not frame.differs or not _is_tool(found, frame):
