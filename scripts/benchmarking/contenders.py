@@ -24,6 +24,7 @@ ONE = "urdfkin, 1 thread"
 FRESH = "urdfkin, 1 thread, no out="
 FLOOR = "output written once (fill)"
 PROCESSORS = len(os.sched_getaffinity(0))
+COMPILED = "urdfkin, compiled for this robot, 1 thread"
 SEVERAL = f"urdfkin, {PROCESSORS} threads"
 LOOP = "Pinocchio, Python loop"
 PROCESSES = f"Pinocchio, {PROCESSORS} processes"
@@ -97,6 +98,8 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
     if PROCESSORS > 1:
         yield Work(SEVERAL, subject.n, into(PROCESSORS), lambda: out)
     yield Work(FRESH, subject.n, fresh, lambda: last[0])
+    fast, own = getattr(subject.robot.compiled(subject.frame), quantity), np.empty_like(out)
+    yield Work(COMPILED, subject.n, lambda: fast(*inputs, out=own, threads=1), lambda: own)
     floor = np.empty_like(out)
     yield Work(FLOOR, subject.n, lambda: floor.fill(1.0))
 
@@ -109,13 +112,15 @@ def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
         "frame": subject.frame,
         "out": np.empty(subject.width(quantity)),
         "fast": robot.prepare(subject.frame),
+        "own": robot.compiled(subject.frame),
     }
     for line in (
         f"robot.{quantity}({arguments}, frame, verify=False)",
         f"fast.{quantity}({arguments})",
         f"fast.{quantity}({arguments}, out=out)",
+        f"own.{quantity}({arguments}, out=out)",
     ):
-        who, _, given = line.replace("fast", "prepared").partition("(")
+        who, _, given = line.replace("fast", "prepared").replace("own", "compiled").partition("(")
         shown = [word for word in ("verify=False", "out=") if word in given]
         yield Calls(f"urdfkin, {who}({', '.join(shown)})", names, (line,))
 

@@ -243,6 +243,12 @@ def _check(code: Code, function: Function, frame: str) -> str:
             f"            for (int i = 0; i < {max(1, width)}; ++i) {x}[k][i] = R(given_{x}[k % {n}][i]);"
             for x, width in widths.items()
         ),
+        fill_one="\n".join(
+            f"            for (int i = 0; i < {max(1, width)}; ++i) {x}[i] = R(given_{x}[k][i]);"
+            for x, width in widths.items()
+        ),
+        passed=", ".join(widths),
         all=", ".join(f"&{x}[0][0]" for x in widths),
+        each_array=", ".join(f"{x}[{max(1, width)}]" for x, width in widths.items()),
         each=", ".join(f"{x}[k]" for x in widths),
     )

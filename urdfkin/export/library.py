@@ -17,7 +17,7 @@ from itertools import count
 from pathlib import Path
 
 from urdfkin.compiled.task import Task
-from urdfkin.export.c import framed, unit
+from urdfkin.export.c import Layout, framed, unit
 from urdfkin.export.code import Code
 from urdfkin.system.keeping import kept_folder
 from urdfkin.system.sealed import keep, kept
@@ -54,7 +54,11 @@ def library(code: Code) -> ctypes.CDLL:
 
 def _entrance(code: Code) -> str:
     (function,) = code.functions
-    widths = code.widths(function)
+    widths, layout = code.widths(function), Layout(function)
+    spread = (
+        f"    for (int k = 0; k < LANES; ++k) in[{at} * LANES + k] = {x.op}[{x.of[0]}];"
+        for at, x in enumerate(layout.inputs)
+    )
     lines = {
         "inputs": "    const double *{x} = (const double *)(uintptr_t)places[{place}];",
         "look": "        bad |= not_finite(m * {width}, {x});",
@@ -73,6 +77,9 @@ def _entrance(code: Code) -> str:
         title=code.name,
         name=function.name,
         passed=", ".join(widths),
+        given=", ".join(f"const double *{x}" for x in widths),
+        room=layout.room + len(layout.made),
+        spread="\n".join([*(f"    (void){x};" for x in widths), *spread]),
         count=len(function.results),
         **parts,
     )

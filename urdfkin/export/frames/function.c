@@ -16,14 +16,20 @@ void @title@_@name@@given@
     line_@name@(in, out, 1);
 }
 
+/* From the inputs of LANES configurations, which stand before the sines. */
+static void all_lanes_@name@(real *restrict in, real *restrict results)
+{
+@lane_sines@
+    for (int k = 0; k < LANES; ++k)
+        line_@name@(in + k, results + k, (size_t)LANES);
+}
+
 static void lanes_@name@@given@
 {
     ALIGNED real in[@lane_room@ * LANES];
     ALIGNED real results[@count@ * LANES];
 @reads@
-@lane_sines@
-    for (int k = 0; k < LANES; ++k)
-        line_@name@(in + k, results + k, (size_t)LANES);
+    all_lanes_@name@(in, results);
     write_rows(results, @count@, out);
 }
 

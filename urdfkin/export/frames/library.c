@@ -9,6 +9,16 @@ static int not_finite(size_t n, const double *x)
     return bad != 0;
 }
 
+/* One configuration in every lane: the same machine code as a batch's, and so the same bits. */
+static void one(@given@, double *out)
+{
+    ALIGNED double in[@room@ * LANES];
+    ALIGNED double results[@count@ * LANES];
+@spread@
+    all_lanes_@name@(in, results);
+    for (int i = 0; i < @count@; ++i) out[i] = results[i * LANES];
+}
+
 int64_t task(const int64_t *places)
 {
     size_t n = (size_t)places[@N@];
@@ -18,7 +28,10 @@ int64_t task(const int64_t *places)
     while (n) {
         const size_t m = n < 2048 ? n : 2048;
 @look@
-        @title@_@name@_batch(m, @passed@, out);
+        if (m == 1)
+            one(@passed@, out);
+        else
+            @title@_@name@_batch(m, @passed@, out);
         n -= m;
         out += m * @count@;
 @advance@

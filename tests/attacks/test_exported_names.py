@@ -1,0 +1,153 @@
+"""Nothing that a URDF calls a link, a joint or itself becomes code in any language that is exported."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shutil
+import subprocess
+import warnings
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import urdfkin
+from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
+from tests.export.writing import code, file
+from urdfkin.export import LANGUAGES, write
+from urdfkin.export.naming import all_safe, safe, shown, title
+from urdfkin.robot import Robot
+
+_PYTHON = [to for to, (_, ending, _) in LANGUAGES.items() if ending.endswith(".py")]
+#: What would be a keyword, a function or a name of ours in one of the languages.
+_WORDS = (
+    *("int", "double", "for", "end", "function", "template", "class", "lambda", "def", "out", "in", "L"),
+    *(
+        "q",
+        "v",
+        "a",
+        "sin",
+        "cos",
+        "sqrt",
+        "R",
+        "T",
+        "real",
+        "np",
+        "main",
+        "eye",
+        "pi",
+        "i",
+        "None",
+        "_",
+        "__",
+    ),
+    *(
+        "t1",
+        "R1_00",
+        "1",
+        "2dof",
+        "\u00e9",
+        "\u202e",
+        "a" * 300,
+        "x" * 41,
+        "*/",
+        "??/",
+        "%{",
+        "%}",
+        "...",
+        "\\",
+    ),
+)
+
+
+def loaded(text: str) -> Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(text, verify=False)
+
+
+ROBOTS = {
+    "every name at once": lambda: loaded(chain_of_all()),
+    **{
+        kind: lambda kind=kind: loaded(urdf(IN_XML[kind]))
+        for kind in ("c comment", "python", "matlab", "latex", "line")
+    },
+    **{word: lambda word=word: loaded(urdf(word)) for word in ("int", "end", "class", "\u00e9", "1")},
+}
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def robot(request: pytest.FixtureRequest) -> Robot:
+    made: Robot = ROBOTS[request.param]()
+    return made
+
+
+def test_every_language_holds_the_same_code_under_any_names(robot: Robot) -> None:
+    written = code(robot, quantities=("placement",))
+    words = set(re.findall(r"\w+", written.name)) | {x for row in written.words.values() for x in row}
+    assert all(re.fullmatch(r"[A-Za-z0-9_]+", word) for word in words)
+    for to in LANGUAGES:
+        text = write(written, to)
+        assert text.isascii()
+        assert all(c.isprintable() or c == "\n" for c in text)
+        assert "hacked = 1" not in _code_alone(text, to)
+
+
+def _code_alone(text: str, to: str) -> str:
+    """Without comments."""
+    if to in ("c", "cpp"):
+        return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    if to in ("matlab", "latex"):
+        return re.sub(r"(?<!\\)%.*", "", text)
+    return re.sub(r'""".*?"""|#.*', "", text, flags=re.DOTALL if to == "" else 0)
+
+
+@pytest.mark.parametrize("to", _PYTHON)
+def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) -> None:
+    module = ast.parse(write(code(robot, quantities=("placement",)), to))
+    kinds = [type(node) for node in module.body]
+    allowed = {ast.Expr, ast.Import, ast.ImportFrom, ast.FunctionDef, ast.Assign, ast.If}
+    assert set(kinds) <= allowed
+    assert kinds.count(ast.Expr) == 1, "the docstring"
+    assert [node.name for node in module.body if isinstance(node, ast.FunctionDef)] == [
+        "placement",
+        "_values",
+        "check",
+    ]
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+def test_c_says_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None:
+    written = code(robot, quantities=("placement",))
+    path = file(written, "c", tmp_path)
+    strict = ["-std=c99", "-trigraphs", "-O0", "-Wall", "-Wextra", "-pedantic", "-Werror"]
+    subprocess.run(["gcc", *strict, "-c", str(path), "-o", str(tmp_path / "x.o")], check=True)
+    symbols = subprocess.run(
+        ["nm", "-g", "--defined-only", str(tmp_path / "x.o")], capture_output=True, text=True
+    )
+    assert {line.split()[-1] for line in symbols.stdout.splitlines()} == {
+        f"{written.name}_placement",
+        f"{written.name}_placement_batch",
+    }
+
+
+@given(st.lists(st.one_of(st.text(max_size=60), st.sampled_from([*_WORDS, *NAMES.values()])), max_size=20))
+def test_identifiers_are_words_no_two_alike(names: list[str]) -> None:
+    found = all_safe(names)
+    assert len({word.lower() for word in found}) == len(names)
+    for word in found:
+        assert re.fullmatch(r"[A-Za-z0-9_]{1,60}", word)
+        assert not word.startswith("_")
+
+
+@given(st.text(max_size=60) | st.sampled_from([*_WORDS, *NAMES.values()]))
+def test_words_of_a_comment_end_none(name: str) -> None:
+    for text in (shown(name), shown(name * 50)):
+        assert text.isascii()
+        assert text == "" or text.isprintable()
+        assert not set("*\"'\\%\n") & set(text)
+        assert len(text) < 100
+    assert title(name, name)[0].isalpha()
+    assert re.fullmatch(r"\w+", safe(name), re.ASCII)

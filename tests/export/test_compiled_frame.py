@@ -1,0 +1,125 @@
+"""One frame compiled for its robot: Robot's results within the bound, its errors, its account."""
+
+from __future__ import annotations
+
+import pickle
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.laws.subjects import state
+from tests.robots.odd_urdfs import urdf_of
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.export import c, compiled_frame
+from urdfkin.export.library import NoCompilerError, library
+from urdfkin.robot import Robot
+from urdfkin.verify.certificate import VerificationError
+from urdfkin.verify.quantities import walked
+
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+
+
+@pytest.mark.slow
+@needs_compiler
+@pytest.mark.filterwarnings("ignore::urdfkin.lint.finding.UrdfWarning")
+@pytest.mark.parametrize("name", ["panda", "planar_and_floating_in_the_middle", "mimic_hand_40_sliding"])
+@pytest.mark.parametrize("reference", ["local_world_aligned"])
+def test_what_it_computes_is_pinocchios_and_one_alone_is_as_in_a_batch(name: str, reference: str) -> None:
+    robot = urdfkin.load("panda" if name == "panda" else urdf_of(name))
+    fast = robot.compiled(robot.tip_frame, reference)
+    inputs = state(robot, 37, 5)
+    for row in walked()[:: 1 if name == "panda" else 2]:
+        given = inputs[: len(row.inputs)]
+        found = getattr(fast, row.method)(*given)
+        by_two = getattr(fast, row.method)(*given, threads=2)
+        one_by_one = np.array([getattr(fast, row.method)(*(x[k] for x in given)) for k in range(37)])
+        assert found.tobytes() == by_two.tobytes() == one_by_one.tobytes()
+    certificate = robot.certificate()
+    checked = [line for line in certificate.lines if line.checked]
+    assert len(checked) == len(walked()[:: 1 if name == "panda" else 2])
+    assert all(line.checked == 103 and line.share < 1.0 for line in checked)
+    assert all(line.unchecked == 3 * 37 for line in certificate.lines)
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    return urdfkin.load("planar_two_link", verify=False)
+
+
+def test_it_takes_any_batch_and_writes_where_it_is_told(arm: Robot) -> None:
+    fast, frame = arm.compiled(arm.tip_frame), arm.tip_frame
+    q = np.linspace(-1.0, 1.0, 24).reshape(3, 4, 2)
+    expected = arm.jacobian(q, frame)
+    assert np.abs(fast.jacobian(q) - expected).max() < 1e-15
+    assert np.abs(fast.jacobian(q.tolist()) - expected).max() < 1e-15
+    out = np.empty((3, 4, 6, 2))
+    assert fast.jacobian(q, out=out) is out
+    assert np.abs(out - expected).max() < 1e-15
+    one = np.empty((6, 2))
+    assert fast.jacobian(q[1, 2].copy(), out=one) is one
+    assert one.tobytes() == out[1, 2].tobytes()
+    v = np.ones(2)
+    assert np.abs(fast.velocity(q, v) - arm.velocity(q, v, frame)).max() < 1e-15
+    assert fast.jacobian(np.empty((0, 2))).shape == (0, 6, 2)
+
+
+def test_angles_of_any_size_are_those_of_the_library_for_one_lane_alone(arm: Robot) -> None:
+    fast, q = arm.compiled(arm.tip_frame), np.tile([0.3, -0.4], (11, 1))
+    before = fast.placement(q)
+    q[5] = 1e9, -3e15
+    after = fast.placement(q)
+    assert np.delete(after, 5, axis=0).tobytes() == np.delete(before, 5, axis=0).tobytes()
+    assert np.abs(after[5] - arm.placement(q[5], arm.tip_frame)).max() < 1e-15
+
+
+def test_what_is_no_configuration_is_refused_as_everywhere(arm: Robot) -> None:
+    fast = arm.compiled(arm.tip_frame)
+    for bad in ([np.nan, 0.0], np.full((20, 2), np.inf)):
+        with pytest.raises(InputError, match="finite"):
+            fast.jacobian(np.array(bad))
+    with pytest.raises(InputError, match="needs 2 numbers"):
+        fast.jacobian(np.zeros(3))
+    with pytest.raises(InputError, match="out must be"):
+        fast.jacobian(np.zeros(2), out=np.empty(3))
+    with pytest.raises(UnknownNameError):
+        arm.compiled("nowhere")
+
+
+def test_it_is_made_once_and_a_copy_makes_its_own(arm: Robot) -> None:
+    fast = arm.compiled(arm.tip_frame)
+    assert arm.compiled(arm.tip_frame) is fast
+    assert arm.compiled(arm.tip_frame, "local") is not fast
+    copy = pickle.loads(pickle.dumps(fast))
+    assert copy.jacobian(np.zeros(2)).tobytes() == fast.jacobian(np.zeros(2)).tobytes()
+
+
+def test_without_a_compiler_the_walk_computes(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(code: object) -> object:
+        raise NoCompilerError("cc is not installed")
+
+    monkeypatch.setattr(compiled_frame, "library", none)
+    robot = urdfkin.load("planar_two_link", verify=False)
+    fast, q = robot.compiled(robot.tip_frame), np.array([0.3, -0.4])
+    assert fast.jacobian(q).tobytes() == robot.jacobian(q, robot.tip_frame).tobytes()
+    assert fast.jacobian(np.tile(q, (3, 1)))[2].tobytes() == fast.jacobian(q).tobytes()
+
+
+@needs_compiler
+def test_machine_code_that_computes_something_else_is_not_used(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    made = library
+
+    def wrong(code: object) -> object:
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+        literal = c.literal
+        monkeypatch.setattr(c, "literal", lambda x: literal(x * (1.0 + 1e-12)))
+        return made(code)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(compiled_frame, "library", wrong)
+    robot = urdfkin.load("planar_two_link")
+    with pytest.raises(VerificationError, match="jacobian"):
+        robot.compiled(robot.tip_frame).jacobian([0.3, -0.4])

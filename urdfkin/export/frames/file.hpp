@@ -1,0 +1,23 @@
+@head@
+#ifndef @UP@_HPP
+#define @UP@_HPP
+#include <cmath>
+
+namespace @title@_kinematics {
+@functions@
+} // namespace @title@_kinematics
+
+#ifdef @UP@_MAIN
+#include <cfloat>
+#include <cstdio>
+#ifndef @UP@_REAL
+#define @UP@_REAL double
+#endif
+using namespace @title@_kinematics;
+using std::fabs;
+using std::printf;
+typedef @UP@_REAL real;
+#define R(x) (static_cast<real>(x))
+@main@
+#endif
+#endif

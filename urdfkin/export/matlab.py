@@ -1,0 +1,92 @@
+"""MATLAB and Octave: a function that hands out the functions, its check among them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from urdfkin.export.code import Code, Writer
+from urdfkin.export.function import Function
+
+_CHECK = """
+function check()
+% For each function the largest error as a share of what it may be off by: at most 1.
+{given}
+{functions}
+end
+
+function told(name, found, right, within)
+off = abs(found(:) - right(:));
+share = off ./ (within(:) * 2^-52);
+share(off == 0) = 0;
+worst = max([0; share]);
+word = 'WRONG';
+if all(share <= 1)
+    word = 'good';
+end
+fprintf('%s %s: %d test vectors, worst error %.3g of the bound\\n', word, name, {n}, worst);
+end
+"""
+
+
+def write(code: Code, to: str = "matlab") -> str:
+    """A file `NAME_kinematics.m`."""
+    name = f"{code.name}_kinematics"
+    head = [
+        *code.head,
+        "",
+        f"f = {name}();  J = f.jacobian(q);  f.check() runs the test vectors. q, v and a count from 1.",
+    ]
+    lines = [f"function f = {name}()", *(f"% {line}".rstrip() for line in head)]
+    lines += [f"f.{function.name} = @{function.name};" for function in code.functions]
+    lines += ["f.check = @check;", "end"]
+    for function in code.functions:
+        lines += ["", *_function(code, function)]
+    return "\n".join(lines) + "\n" + _check(code)
+
+
+def _function(code: Code, function: Function) -> Iterator[str]:
+    writer = Writer(code, function)
+    rows, columns = (*function.shape, 1)[:2]
+    yield f"function out = {function.name}({', '.join(function.inputs)})"
+    numbers = ", ".join(function.quantity.equations)
+    yield f"% {rows} x {columns}, eq. {numbers}; {function.operations} operations."
+    for node in writer.given:
+        yield f"{writer.words[node]} = {node.op}({node.of[0] + 1});"
+    for head, lines in writer.statements():
+        yield f"% {head}"
+        yield from (f"{word} = {value};" for word, value in lines)
+    yield f"out = zeros({rows}, {columns});"
+    for k, value in enumerate(writer.results()):
+        yield f"out({k // columns + 1}, {k % columns + 1}) = {value};"
+    yield "end"
+
+
+def _check(code: Code) -> str:
+    found = code.proof.vectors
+    most = max((function.inputs for function in code.functions), key=len)
+    given = [
+        f"{letter} = {_matrix([list(map(repr, v.inputs[k])) for v in found])}"
+        for k, letter in enumerate(most)
+    ]
+    checks = []
+    for function in code.functions:
+        name = function.name
+        rows = [v.results[name] for v in found]
+        allowed = [v.within[name] for v in found]
+        inputs = ", ".join(f"{letter}(k, :)" for letter in function.inputs)
+        checks += [
+            f"right = {_matrix(rows)}",
+            f"within = {_matrix(allowed)}",
+            "found = zeros(size(right));",
+            f"for k = 1:{len(found)}",
+            f"    found(k, :) = reshape({name}({inputs}).', 1, []);",
+            "end",
+            f"told('{name}', found, right, within);",
+        ]
+    return _CHECK.format(given="\n".join(given), functions="\n".join(checks), n=len(found))
+
+
+def _matrix(rows: Sequence[Sequence[str]]) -> str:
+    if not rows[0]:
+        return f"zeros({len(rows)}, 0);"
+    return "[\n" + "\n".join("    " + ", ...\n    ".join(row) + ";" for row in rows) + "\n];"
