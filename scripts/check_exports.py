@@ -1,0 +1,127 @@
+"""Export the catalogue's leaves to C and NumPy, compile the C without a warning, and run the test vectors.
+
+    python scripts/check_exports.py                  # every leaf of every robot; an hour or more
+    python scripts/check_exports.py --tips           # the leaf of each robot that most joints lie before
+    python scripts/check_exports.py --sizes          # how large the code is, and how long it takes to write
+
+Each function is held against Pinocchio as it is written, and against fifty digits as it runs: by GCC and by
+Clang, where they are installed, one configuration and in batches, and by NumPy. Exit 1 if any number is
+outside the derived bound or any compiler warns.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+
+import urdfkin
+from scripts.benchmarking.subject import chain_urdf
+from urdfkin.export import QUANTITIES, write
+from urdfkin.export.code import Code, code_of
+from urdfkin.robot import Robot
+from urdfkin.urdf.catalogue import examples
+
+_STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror")
+_SHARE = re.compile(r"worst error (\S+) of the bound")
+
+
+def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> Code:
+    """A frame's, verified."""
+    return code_of(
+        robot.verifier, robot.plan, frame, quantities, "local_world_aligned", name=None, verify=True
+    )
+
+
+def shares(written: Code, folder: Path) -> Iterator[tuple[str, float]]:
+    """For each way to run the code, the largest error as a share of its bound."""
+    source, name = folder / "robot.c", written.name.upper()
+    source.write_text(write(written, "c"), encoding="utf-8")
+    for compiler in filter(shutil.which, ("gcc", "clang")):
+        program = folder / compiler
+        command = [compiler, *_STRICT, f"-D{name}_MAIN", str(source), "-o", str(program), "-lm"]
+        subprocess.run(command, check=True)
+        done = subprocess.run([str(program)], capture_output=True, text=True, check=False)
+        found = [float(share) for share in _SHARE.findall(done.stdout)]
+        yield compiler, max(found) if len(found) == len(written.functions) else float("nan")
+    scope: dict[str, Any] = {"__name__": "robot"}
+    exec(compile(write(written, "numpy"), "robot.py", "exec"), scope)
+    yield "numpy", max(scope["check"]().values())
+
+
+def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
+    """Robots and frames: the tips first, so that what is cut short has seen every robot."""
+    robots = {name: urdfkin.load(name) for name in examples()}
+    for name, robot in robots.items():
+        yield name, robot, robot.tip_frame
+    for name, robot in robots.items() if not tips else ():
+        for leaf in robot.tree.leaves():
+            if (frame := robot.tree.frame_name(leaf)) != robot.tip_frame:
+                yield name, robot, frame
+
+
+def check(tips: bool) -> int:
+    """Every leaf, or every tip."""
+    count, wrong, worst = 0, 0, 0.0
+    for name, robot, frame in subjects(tips):
+        wanted = QUANTITIES if robot.nv else ("placement",)
+        with tempfile.TemporaryDirectory() as folder:
+            written = code(robot, frame, wanted)
+            found = dict(shares(written, Path(folder)))
+        good = all(share <= 1.0 for share in found.values()) and written.proof.certificate.verified
+        count, wrong = count + 1, wrong + (not good)
+        worst = max(worst, *found.values())
+        line = ", ".join(f"{way} {share:.2g}" for way, share in found.items())
+        print(f"{'good' if good else 'WRONG'} {name} {frame}: {line}", flush=True)
+    print(f"{count} leaves, {wrong} outside the bound or unverified; worst error {worst:.2g} of the bound")
+    return int(wrong > 0)
+
+
+def sizes() -> int:
+    """A row of Markdown for each of three robots."""
+    print("| robot, frame | quantity | operations | lines of C | kB | written in s | with its proof in s |")
+    print("|---|---|---:|---:|---:|---:|---:|")
+    chain = urdfkin.load(chain_urdf(100))
+    for robot, frame in (
+        (urdfkin.load("panda"), "panda_hand"),
+        (urdfkin.load("talos"), "gripper_left_base_link"),
+        (chain, "tip"),
+    ):
+        for quantity in QUANTITIES:
+            begin = time.process_time()
+            written = code(robot, frame, (quantity,))
+            proven = time.process_time()
+            text = write(written, "c")
+            end = time.process_time()
+            (function,) = written.functions
+            lines = text.partition("#ifdef " + written.name.upper() + "_MAIN")[0]
+            print(
+                f"| {robot.name}, {frame} | {quantity} | {function.operations:,} | {lines.count(chr(10)):,} |"
+                f" {len(lines) / 1000:.0f} | {end - proven:.2f} | {end - begin:.1f} |",
+                flush=True,
+            )
+    return 0
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Exit 1 where something is wrong."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("--tips", action="store_true", help="one leaf a robot")
+    parser.add_argument("--sizes", action="store_true", help="sizes and times of three robots")
+    arguments = parser.parse_args(words)
+    warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+    return sizes() if arguments.sizes else check(arguments.tips)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
