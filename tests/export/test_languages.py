@@ -91,6 +91,15 @@ def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None
     assert any(line.startswith("good acceleration") for line in found.lines)
 
 
+@pytest.mark.parametrize("to", ["c", "numpy", "matlab"])
+def test_a_frame_that_nothing_moves_has_code_too(to: str, tmp_path: Path) -> None:
+    need(to)
+    robot = urdfkin.load("planar_two_link")
+    assert check(file(code(robot, robot.link_names[0]), to, tmp_path)).good
+    still = robot_of("single_link")
+    assert check(file(code(still, quantities=("placement",)), to, tmp_path)).good
+
+
 def test_a_file_can_say_so_without_urdfkin(tmp_path: Path) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "numpy", tmp_path)
     assert "urdfkin" not in "".join(

@@ -106,6 +106,7 @@ def _function(code: Code, function: Function) -> str:
         room=layout.room,
         lane_room=layout.room + len(layout.made),
         inputs=", ".join(f"{x.op}[{x.of[0]}]" for x in layout.inputs) or "R(0.0)",
+        unasked="\n".join(f"    (void){x};" for x in widths),
         lines="\n".join(f"    {line}" for line in _lines(writer, layout)),
         sines="\n".join(f"    {line}" for line in _sines(writer, layout)),
         reads="\n".join(f"    {line}" for line in _reads(layout, widths)),

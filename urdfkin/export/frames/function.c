@@ -12,6 +12,7 @@ INLINE void line_@name@(const real *in, real *out, const size_t L)
 void @title@_@name@@given@
 {
     real in[@room@] = {@inputs@};
+@unasked@
 @sines@
     line_@name@(in, out, 1);
 }
