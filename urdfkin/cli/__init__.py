@@ -42,6 +42,7 @@ _AFTER: dict[str, tuple[str, str]] = {
     "report": ("urdfkin.cli.report", "show or write the report of an earlier validation"),
     "plot": ("urdfkin.cli.plot", "a frame's motion along a trajectory, as a picture"),
     "view": ("urdfkin.cli.view", "a robot in a browser tab, with sliders and arrows"),
+    "warm": ("urdfkin.cli.warm", "compile everything now: for container images and CI"),
     "compare": ("urdfkin.cli.compare", "what changed between two validations"),
 }
 #: The module that makes a command of a row of the quantities' table.

@@ -12,6 +12,7 @@ from urdfkin.cli.endings import form_of
 from urdfkin.cli.idle import refuse_idle, typed
 from urdfkin.cli.numbers import Number, Whole
 from urdfkin.cli.output import compiling, output_option
+from urdfkin.cli.reports import check_writable
 
 #: Forms of a table. They repeat `urdfkin.dh.export.FORMATS`, whose import --help does not need.
 FORMATS = (
@@ -176,6 +177,7 @@ def command(
     is_table = is_table_file(robot)
     options["format_"] = form_of(context, output, ENDINGS, "terminal")
     _refuse_idle(context, is_table, options)
+    check_writable(output)
     loaded = load_robot(robot, mimic, root_joint, verify=verify)
     written = robot if is_table and not any(typed(context, name) for name in _DERIVED) else None
     if (written or options["like"]) and not typed(context, "convention"):

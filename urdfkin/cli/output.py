@@ -56,11 +56,19 @@ output_option = click.option(
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Say what takes so long when the recursion is compiled, once on a machine."""
-    from urdfkin.compiled.announcing import announced  # noqa: PLC0415  keeps --help fast
+    """Say what takes so long when a kernel is compiled, once on a machine, and how long it took."""
+    from urdfkin.compiled.telling import listening  # noqa: PLC0415  keeps --help fast
 
-    message = "urdfkin: compiling the recursion for this machine, once; some ten seconds ..."
-    with announced(lambda: say(message, err=True)):
+    hints = ["; kept from now on, 'urdfkin warm' compiles all kernels at once"]
+
+    def tell(name: str, seconds: float | None) -> None:
+        if seconds is None:
+            hint = hints.pop() if hints else ""
+            say(f"urdfkin: compiling {name} for this machine{hint} ...", err=True)
+        else:
+            say(f"urdfkin: compiled {name} in {seconds:.1f} s", err=True)
+
+    with listening(tell):
         yield
 
 

@@ -23,6 +23,7 @@ from urdfkin.cli.arguments import (
 from urdfkin.cli.breakdown import emit_breakdown
 from urdfkin.cli.endings import form_of
 from urdfkin.cli.output import ENDINGS, compiling, emit, exit_code, format_option, output_option
+from urdfkin.cli.reports import check_writable
 from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
 from urdfkin.verify.witnesses import WitnessName
 
@@ -59,6 +60,7 @@ def command_of(quantity: Quantity) -> click.Command:
         explain: bool = False,
     ) -> None:
         format_ = form_of(context, output, ENDINGS, "csv")
+        check_writable(output)
         loaded = load_robot(robot, mimic, root_joint, verify=verify, oracle=oracle)
         x = read_inputs(loaded, frame, seed, q, v, a)
         if explain:

@@ -35,7 +35,7 @@ def check_writable(*paths: Path | None) -> None:
         SourceError: no permission or no such folder.
     """
     for path in paths:
-        if path is None:
+        if path is None or (path.exists() and not path.is_file()):  # a device or a pipe is not replaced
             continue
         try:
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):

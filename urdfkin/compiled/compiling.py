@@ -20,6 +20,7 @@ from numba.core.ccallback import CFunc
 
 from urdfkin.compiled.kept_kernels import KeptKernel
 from urdfkin.compiled.parts import PartCompiler
+from urdfkin.compiled.telling import told
 from urdfkin.kinematics import equations
 from urdfkin.system.forking import lock_over_forks
 from urdfkin.system.keeping import kept_folder
@@ -97,12 +98,18 @@ class Kernel:
 
     def _compile(self) -> Any:
         dispatcher = jitted(nogil=self._nogil)(self._function)
-        if (folder := cache_folder()) is not None:
-            dispatcher._cache = KeptKernel(self._function, folder)
-        with compiling_allowed():
-            dispatcher.compile(types.int64(*self._arguments))
+        self._make(dispatcher, lambda: dispatcher.compile(types.int64(*self._arguments)))
         dispatcher.disable_compile()
         return dispatcher
+
+    def _make(self, made: Any, make: Callable[[], object]) -> None:
+        """Compile, or read from disk; whoever listens is told which takes so long."""
+        with told(self.__name__.strip("_").replace("_", " ")) as missed, compiling_allowed():
+            if (folder := cache_folder()) is None:
+                missed()
+            else:
+                made._cache = KeptKernel(self._function, folder, missed)
+            make()
 
     def __call__(self, *arguments: Any) -> int:
         """Compute."""
@@ -120,10 +127,7 @@ class Core(Kernel):
 
     def _compile(self) -> Any:
         core: Any = CFunc(self._function, (self._arguments, types.int64), {}, COMPILED)
-        if (folder := cache_folder()) is not None:
-            core._cache = KeptKernel(self._function, folder)
-        with compiling_allowed():
-            core.compile()
+        self._make(core, core.compile)
         return core
 
     @property

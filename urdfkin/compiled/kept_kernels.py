@@ -26,22 +26,23 @@ class KeptKernel(_Null):  # type: ignore[misc]
     """Where Numba looks for one function before it compiles it, and leaves it afterwards.
 
     The folder stands for the sources; a file's name for the function, its arguments and the processor.
+    `missed` is called where there is nothing of use.
     """
 
-    def __init__(self, function: Callable[..., int], folder: Path) -> None:
-        self._folder, self._name = folder, function_name(function)
+    def __init__(self, function: Callable[..., int], folder: Path, missed: Callable[[], None]) -> None:
+        self._folder, self._name, self._missed = folder, function_name(function), missed
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was kept for these arguments; None where there is nothing of use."""
         target_context.refresh()
         place = self._place(sig, target_context.codegen())
-        if (content := kept(place)) is None:
-            return None
-        try:
-            return _Result._rebuild(target_context, *pickle.loads(content))
-        except Exception as error:  # whole, but of another time: it may fail in any way
-            damaged(place, f"{type(error).__name__}: {error}")
-            return None
+        if (content := kept(place)) is not None:
+            try:
+                return _Result._rebuild(target_context, *pickle.loads(content))
+            except Exception as error:  # whole, but of another time: it may fail in any way
+                damaged(place, f"{type(error).__name__}: {error}")
+        self._missed()
+        return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
         """Keep what was compiled."""

@@ -11,7 +11,7 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
 
-from urdfkin.compiled.announcing import load_kernels
+from urdfkin.compiled.ahead import load_kernels
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.demands import switch, whole_number
@@ -29,6 +29,7 @@ from urdfkin.validation.results import ValidationReport
 from urdfkin.validation.workers import Processes
 from urdfkin.verify.pinocchio_module import pinocchio
 from urdfkin.verify.witnesses import PINOCCHIO, WitnessName, witness_of
+from urdfkin.verify.worst import load_kernel
 
 
 def validate(
@@ -78,7 +79,7 @@ def validate(
     samples, seed = whole_number(samples, "samples", 0), whole_number(seed, "seed", 0)
     jobs, isolate = whole_number(jobs, "jobs", 1), switch(isolate, "isolate")
     many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
-    started, begin = datetime.datetime.now(datetime.UTC), time.perf_counter()
+    started = datetime.datetime.now(datetime.UTC)
     pinocchio()  # before the work, not robot by robot
     subjects, unread = _subjects(many, mimic, root_joint, xacro_args)
     if witness_of(oracle) is not PINOCCHIO:
@@ -87,12 +88,15 @@ def validate(
     tasks = [
         Task(i, chunk) for i, subject in enumerate(subjects) for chunk in chunks(subject, samples, seed, most)
     ]
-    gathering, interrupted = Gathering(subjects, tasks, progress), False
+    gathering, interrupted, begin = Gathering(subjects, tasks, progress), False, time.perf_counter()
     for task in tasks:
         if task.robot in unread and task.chunk.index == 0:
             gathering.enter(task, unread[task.robot])
     try:
-        load_kernels()  # once, here, so that no worker has to compile
+        if isolate or any(_is_robot(subject) for i, subject in enumerate(subjects) if i not in unread):
+            load_kernels()  # once, here, so that no worker has to compile, nor any robot's seconds hold it
+            load_kernel()
+            begin = time.perf_counter()
         engine = _engine(jobs, isolate, executor)
         engine.run([task for task in tasks if task.robot not in unread], gathering.enter)
     except KeyboardInterrupt:
@@ -108,6 +112,15 @@ def validate(
         seconds=time.perf_counter() - begin,
         interrupted=interrupted,
     )
+
+
+def _is_robot(subject: Subject) -> bool:
+    """Whether there is something to compute with; what is wrong with it, its chunk reports."""
+    try:
+        subject.load()
+    except Exception:
+        return False
+    return True
 
 
 def _engine(jobs: int, isolate: bool, executor: Executor | None) -> Engine:

@@ -63,3 +63,8 @@ def _worst(ours, theirs, scale, worst):
         good = _finite(ours, i) and _finite(theirs, i) and _finite(scale, i)
         worst[i] = _largest(ours, theirs, scale, i) if good else math.inf
     return 0
+
+
+def load_kernel() -> None:
+    """Have it compiled, or read from disk, before it is needed."""
+    _ = _worst.compiled

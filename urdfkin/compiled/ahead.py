@@ -1,42 +1,12 @@
-"""Know when a kernel is compiled, which takes seconds, and not found on disk, which takes none."""
+"""Have kernels compiled before they are needed, by two processors."""
 
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any
-
-from numba.core import event
+from collections.abc import Sequence
 
 from urdfkin.compiled.compiling import cache_folder
 from urdfkin.system.interpreter import own_python
-
-_Listener: Any = event.Listener  # numba has no types
-
-
-class _Once(_Listener):  # type: ignore[misc]
-    """Calls a function at the first compilation, and at no later one."""
-
-    def __init__(self, tell: Callable[[], None]) -> None:
-        super().__init__()
-        self._tell: Callable[[], None] | None = tell
-
-    def on_start(self, event: Any) -> None:
-        tell, self._tell = self._tell, None
-        if tell is not None:
-            tell()
-
-    def on_end(self, event: Any) -> None:
-        pass
-
-
-@contextmanager
-def announced(tell: Callable[[], None]) -> Iterator[None]:
-    """While open, `tell` is called once, when the first kernel begins to be compiled."""
-    with event.install_listener("numba:compile", _Once(tell)):
-        yield
-
 
 #: The cores: half of the work each.
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
@@ -71,7 +41,7 @@ def _on_disk(name: str) -> bool:
 
 def _compile_elsewhere(names: Sequence[str]) -> subprocess.Popen[bytes]:
     """Another interpreter that does nothing but compile; what it fails to do is done here after all."""
-    code = f"from urdfkin.compiled import announcing; announcing._compile({tuple(names)!r})"
+    code = f"from urdfkin.compiled import ahead; ahead._compile({tuple(names)!r})"
     return subprocess.Popen(
         own_python(code),
         stdin=subprocess.DEVNULL,

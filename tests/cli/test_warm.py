@@ -1,0 +1,74 @@
+"""What is compiled is said, once and by its name, and nothing is compiled for input that cannot be used."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+import urdfkin as library
+from tests.cli.running import process, urdfkin
+from urdfkin.compiled import telling
+from urdfkin.validation import campaign
+
+
+def kernels(cache: Path) -> list[str]:
+    return sorted(path.name.split(".")[1] for path in cache.rglob("*.kernel"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    [
+        "validate no.urdf", "jacobian no.urdf", "jacobian elbow --frame no", "jacobian elbow --q 1",
+        "jacobian elbow -o no/J.csv", "dh no.urdf", "validate BAD",
+    ],
+)  # fmt: skip
+def test_bad_input_is_told_before_anything_is_compiled(words: str, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.urdf"
+    bad.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
+    done = process(*words.replace("BAD", str(bad)).split(), XDG_CACHE_HOME=str(tmp_path / "cache"))
+    assert done.code == 2
+    assert "compiling" not in done.err
+    assert kernels(tmp_path) == []
+
+
+@pytest.mark.slow
+def test_only_what_is_needed_is_compiled_and_it_is_said_once(tmp_path: Path) -> None:
+    words = ("placement", "elbow", "--no-verify")
+    first = process(*words, XDG_CACHE_HOME=str(tmp_path))
+    assert kernels(tmp_path) == ["placements"]
+    assert first.err.count("urdfkin: compiling placements for this machine; kept from now on") == 1
+    assert first.err.count("'urdfkin warm'") == 1
+    assert first.err.count("urdfkin: compiled placements in ") == 1
+    assert "compil" not in process(*words, XDG_CACHE_HOME=str(tmp_path)).err
+
+
+def test_warm_compiles_everything_and_then_nothing() -> None:
+    assert urdfkin("warm").code == 0
+    done = urdfkin("warm")
+    assert (done.code, done.err) == (0, "")
+    assert done.text.startswith("all ")
+    assert "kernels are compiled: " in done.text
+
+
+def test_programs_are_told_by_one_warning_of_a_logger(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(telling, "_logged", [])
+    for name in ("placements", "jacobians"):
+        with telling.told(name) as missed:
+            missed()
+    with telling.told("velocities"):
+        pass  # read from disk
+    (record,) = caplog.records
+    assert (record.name, record.levelname) == ("urdfkin", "WARNING")
+    assert "compiling placements" in record.getMessage()
+
+
+def test_no_seconds_of_a_report_hold_what_was_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(campaign, "load_kernels", lambda: time.sleep(1.0))
+    begin = time.perf_counter()
+    report = library.validate("elbow", samples=1)
+    assert report.seconds < time.perf_counter() - begin - 1.0
