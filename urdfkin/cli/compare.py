@@ -34,9 +34,10 @@ def command(
 
     A regression is a run that passed and does not, a robot that is gone or worse off, results outside their
     bound that were inside, something that is compared no more or on fewer samples, a wider bound, or a worst
-    disagreement that grew by more than the factor and above 2 eps*scale. A report that contradicts itself is
+    disagreement that grew by more than the factor and above 2 eps*scale. A robot whose model changed is told,
+    with how far its tip is from where it was; that alone is none. A report that contradicts itself is
     refused.
-    Exit 0: none. 1: a regression. 2: a file that cannot be used.
+    Exit 0: no regression. 1: a regression. 2: a file that cannot be used.
     """
     from urdfkin.report.compare import compare  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.comparison import markdown_of, print_comparison  # noqa: PLC0415

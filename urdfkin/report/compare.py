@@ -15,6 +15,7 @@ from typing import Any
 
 from urdfkin.report.document import Check, Document, Robot, Units, outcome_of
 from urdfkin.report.model_changes import model_changes
+from urdfkin.report.tip_motion import tip_motion
 from urdfkin.report.words import VERDICTS, check_name, percent, units, worst
 
 #: A worst disagreement may grow by this factor before it counts: the largest of many samples is a lottery.
@@ -143,6 +144,8 @@ def _robot(source: str, old: Robot, new: Robot, factor: float) -> Iterator[Chang
             yield Change(source, what, str(n_old), str(n_new))
     for what, was, now in model_changes(old["model"], new["model"]):
         yield Change(source, what, was, now)
+    if (moved := tip_motion(old["model"], new["model"])) is not None:
+        yield Change(source, f"{moved.tip} from {moved.base}", "where it was", str(moved))
     yield from _tables(source, old, new)
     yield from _findings(source, old, new)
     same = old["joints"] == new["joints"]

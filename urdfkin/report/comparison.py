@@ -25,7 +25,7 @@ def print_comparison(old: Document, new: Document, found: Comparison, out: Conso
     for change in sorted(found.changes, key=lambda change: not change.regression):
         mark = "REGRESSION " if change.regression else ""
         out.print(f"{mark}{change}", style="bold red" if change.regression else "")
-    out.print(verdict(found), style="bold red" if found.regressions else "bold green")
+    out.print(f"{verdict(found)} ({_exit(found)})", style="bold red" if found.regressions else "bold green")
 
 
 def verdict(found: Comparison) -> str:
@@ -33,6 +33,13 @@ def verdict(found: Comparison) -> str:
     if found.regressions:
         return f"{counted(len(found.regressions), 'regression')}, {counted(len(found.changes), 'change')}"
     return f"no regression, {counted(len(found.changes), 'change')}"
+
+
+def _exit(found: Comparison) -> str:
+    """What the command's exit code means."""
+    if found.regressions:
+        return "exit 1: a regression"
+    return "exit 0: changes alone do not fail, a regression would (1)" if found.changes else "exit 0"
 
 
 def markdown_of(old: Document, new: Document, found: Comparison, limit: int = LIMIT) -> str:
