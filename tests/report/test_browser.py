@@ -68,6 +68,47 @@ def test_a_slider_moves_the_robot_and_neutral_brings_it_back(browser: Browser) -
     assert browser.probe("pixels") == before
 
 
+def test_every_slider_has_its_joints_name_and_limits(browser: Browser) -> None:
+    found = browser.js(
+        "return [...document.querySelectorAll('.robot[open] .sliders input')]"
+        ".map((s) => [s.ariaLabel, s.labels[0].control === s, +s.min, +s.max, +s.value])"
+    )
+    robot = urdfkin.load("panda")
+    moving = [joint for joint in robot.tree.joints if joint.nq]
+    assert [name for name, *_ in found] == [joint.name for joint in moving]
+    for joint, (_, labelled, lower, upper, value) in zip(moving, found, strict=True):
+        assert labelled
+        assert joint.limit is not None
+        assert (lower, upper) == pytest.approx((joint.limit.lower, joint.limit.upper), abs=1e-6)
+        assert value == pytest.approx(min(max(0.0, lower), upper), abs=1e-6)
+    q = browser.js("return document.querySelector('[data-view]').view.robot.q")
+    assert q[3] == pytest.approx(-0.0698, abs=1e-6), "the robot stands where the sliders say"
+
+
+def test_paper_folds_neither_worst_cases_nor_findings(browser: Browser) -> None:
+    folded = "return document.querySelectorAll('.robot[open] details.fold:not([open])').length"
+    before = browser.js(folded)
+    assert before > 0
+    browser.js("dispatchEvent(new Event('beforeprint'))")
+    assert browser.js(folded) == 0
+    browser.js("dispatchEvent(new Event('afterprint'))")
+    assert browser.js(folded) == before
+
+
+def test_a_phone_shows_verdict_and_share_of_the_bound_beside_the_name(
+    tmp_path: Path, pages: dict[str, Path]
+) -> None:
+    with opened(tmp_path, width=390, height=844) as phone:
+        phone.open(pages["failing"])
+        edges = phone.js(
+            "return [...document.querySelectorAll('#overview tbody tr')]"
+            ".map((row) => [1, 2].map((k) => row.cells[k].getBoundingClientRect().right))"
+        )
+        assert edges
+        assert all(edge <= 390 for row in edges for edge in row)
+        phone.screenshot("report-390")
+
+
 def test_the_keyboard_turns_the_view(browser: Browser) -> None:
     before = browser.probe("pixels")
     browser.probe("press", "ArrowLeft")

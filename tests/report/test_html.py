@@ -14,9 +14,11 @@ import pytest
 
 from tests.report.documents import HOSTILE_JOINT, HOSTILE_LINK, HOSTILE_ROBOT, arms, failing, hostile
 from urdfkin.report import html as html_module
+from urdfkin.report import pages
 from urdfkin.report.document import Document
 from urdfkin.report.html import as_html
 from urdfkin.report.pages import angle
+from urdfkin.report.words import VERDICTS
 from urdfkin.urdf.catalogue import examples
 from urdfkin.validation.campaign import validate
 
@@ -175,3 +177,46 @@ def test_the_bundled_library_is_the_one_that_was_built() -> None:
     named = json.loads((Path(__file__).parents[2] / "scripts" / "three" / "package.json").read_text())
     head = (ASSETS / "three.min.js").read_text(encoding="utf-8")[:200]
     assert f"three.js {named['dependencies']['three']}, MIT licence" in head
+
+
+def test_what_failed_comes_first_and_stands_open() -> None:
+    document = failing()
+    page = as_html(document)
+    heads = re.findall(r'<details class="robot" id="robot-(\d+)" data-verdict="([^"]*)"[^>]*?( open)?>', page)
+    order = [VERDICTS.index(verdict) for _, verdict, _ in heads]
+    assert order == sorted(order)
+    assert order[0] < order[-1]
+    assert all(bool(opened) == (verdict != "verified") for _, verdict, opened in heads)
+    rows = re.findall(r'<tr data-verdict="([^"]*)"', page)
+    assert rows == [verdict for _, verdict, _ in heads]
+
+
+def test_errors_are_not_counted_as_warnings() -> None:
+    document = failing()
+    robot = next(robot for robot in document["robots"] if robot["findings"])
+    first = robot["findings"][0]
+    robot["findings"] = [{**first, "severity": "error"}, {**first, "severity": "warning"}]
+    assert pages.overview(robot, [])["findings"] == "1 error, 1 warning"
+
+
+def test_joints_that_move_are_counted_in_a_robot_that_was_not_compared() -> None:
+    document = arms()
+    robot = document["robots"][1]
+    robot["verdict"], robot["checks"], robot["joints"], robot["results"] = "not verified", [], [], 0
+    assert "6 of them move" in as_html(document)
+
+
+def test_the_heat_maps_colour_is_the_share_of_the_bound() -> None:
+    robot = arms()["robots"][1]
+    model = robot["model"]
+    assert model is not None
+    _, rows = pages.heat_map(robot, model)
+    edges = (0.0, *pages.HEAT_STEPS)
+    largest = max(check["share_of_bound"] or 0.0 for check in robot["checks"])
+    steps = [cell.step for _, cells in rows for cell in cells if cell.text]
+    assert max(steps) == sum(largest > edge for edge in edges)
+    for check in robot["checks"]:
+        check["worst_by_subject"] = [0.5 * (check["bound"][0] or 0.0) for _ in check["worst_by_subject"]]
+        check["share_of_bound"] = 0.5
+    _, rows = pages.heat_map(robot, model)
+    assert {cell.step for _, cells in rows for cell in cells if cell.text} == {sum(e < 0.5 for e in edges)}

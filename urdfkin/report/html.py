@@ -11,6 +11,7 @@ from urdfkin.report.distributions import distributions
 from urdfkin.report.document import Document, Robot, asset, outcome_of
 from urdfkin.report.scene import scene
 from urdfkin.report.words import (
+    VERDICTS,
     check_name,
     columns,
     counted,
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 
 #: With no more robots than this they stand open.
 _OPEN = 1
+#: So many of those that failed stand open, which come first.
+_FAILURES_OPEN = 20
 
 
 @cache
@@ -59,12 +62,16 @@ def as_is(text: str) -> Markup:
     """A text of our own, which a template takes as it is."""
     from markupsafe import Markup  # noqa: PLC0415
 
+<<<<<<< HEAD
     return Markup(text)
 
 
 def as_html(document: Document) -> str:
     """The page. Names may be anything, `<script>` included: the template escapes them all."""
     robots = document["robots"]
+=======
+    robots = sorted(document["robots"], key=lambda robot: VERDICTS.index(robot["verdict"]))  # the worst first
+>>>>>>> 69645e3 (Show on the report's page what failed first, and tell figures by their share of the bound)
     quantities = columns(robots)
     return (
         environment()
@@ -110,6 +117,8 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
     heads, heat = pages.heat_map(robot, model) if model and robot["checks"] else ([], [])
     return {
         "index": index,
+        "opened": robot["verdict"] != "verified" and index < _FAILURES_OPEN,
+        "moving": sum(joint["kind"] != "fixed" for joint in model["joints"]) if model else 0,
         "data": robot,
         "summary": pages.overview(robot, []),
         "scene": scene(model, robot["chains"]) if model else None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +13,7 @@ from urdfkin.report.words import (
     SIDES,
     column,
     columns,
+    counted,
     in_order,
     nearer,
     percent,
@@ -24,8 +26,8 @@ from urdfkin.report.words import (
 
 _READABLE = DisplayUnits(digits=6)
 
-#: Upper edges of the heat map's steps, eps * scale; what is above the last has a step of its own.
-HEAT_STEPS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+#: Upper edges of the heat map's steps, shares of the bound; what is above the last lies outside.
+HEAT_STEPS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +54,16 @@ def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, 
         "worst_key": _sortable(largest) if checks else -1.0,
         "share": percent(share) if checks else "",
         "share_key": _sortable(share) if checks else -1.0,
-        "findings": sum(finding["severity"] != "note" for finding in robot["findings"]),
+        "findings": ", ".join(
+            counted(count, word) for word in ("error", "warning") if (count := _findings(robot, word))
+        ),
+        "findings_key": 1e6 * _findings(robot, "error") + _findings(robot, "warning"),
         "seconds": robot["seconds"],
     }
+
+
+def _findings(robot: Robot, severity: str) -> int:
+    return sum(finding["severity"] == severity for finding in robot["findings"])
 
 
 def _key(robot: Robot, names: Sequence[str]) -> float:
@@ -150,7 +159,16 @@ def _cell(checks: Sequence[Check], where: dict[str, list[int]]) -> Cell:
     largest = worst(found)
     if largest is None:
         return Cell("inf", len(HEAT_STEPS) + 1)
-    return Cell(units(largest), sum(largest > edge for edge in HEAT_STEPS) + (largest > 0.0))
+    share = max(_share(check, i) for check in checks for i in where[check["subjects"]])
+    return Cell(units(largest), sum(share > edge for edge in HEAT_STEPS) + (share > 0.0))
+
+
+def _share(check: Check, subject: int) -> float:
+    """At most which share of its bound a subject's worst was: of the tightest, never above any's."""
+    value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
+    if value is None or most is None or not tightest:
+        return math.inf
+    return min(value / tightest, most)
 
 
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:

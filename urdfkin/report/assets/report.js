@@ -23,6 +23,14 @@
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => document.dispatchEvent(new Event("themechange")));
 
+  // -- paper folds nothing: what is folded of an open robot is opened, and folded again ------------
+  let opened = [];
+  addEventListener("beforeprint", () => {
+    opened = $$("details.robot[open] details.fold:not([open])");
+    for (const details of opened) details.open = true;
+  });
+  addEventListener("afterprint", () => { for (const details of opened) details.open = false; });
+
   // -- tables sort by the head that is pressed ---------------------------------------------------------
   const key = (row, column, isText) => {
     const cell = row.cells[column];

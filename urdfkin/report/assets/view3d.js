@@ -336,7 +336,7 @@
       for (const choice of section.querySelectorAll("[data-chain], [data-convention]")) {
         choice.addEventListener("change", () => { this.buildDh(); this.update(); });
       }
-      section.querySelector("[data-do=neutral]").addEventListener("click", () => { this.robot.neutral(); this.setSliders(); });
+      section.querySelector("[data-do=neutral]").addEventListener("click", () => this.neutral());
       section.querySelector("[data-do=random]").addEventListener("click", () => this.random());
       section.querySelector("[data-do=view]").addEventListener("click", () => this.look());
       document.addEventListener("themechange", () => this.theme());
@@ -402,24 +402,32 @@
           ["x", "y", "angle"].forEach((part, k) => this.slider(box, joint, `${joint.name} ${part}`, joint.at + k, k < 2 ? [-1, 1] : [-Math.PI, Math.PI], k === 2));
         } else {
           const whole = turns(joint.kind) ? Math.PI : 1, bounds = joint.kind === KIND.CONTINUOUS ? [null, null] : [joint.lower, joint.upper];
-          this.slider(box, joint, joint.name, joint.at, [Math.min(0, bounds[0] ?? -whole), Math.max(0, bounds[1] ?? whole)], turns(joint.kind));
+          this.slider(box, joint, joint.name, joint.at, [bounds[0] ?? -whole, bounds[1] ?? whole], turns(joint.kind));
         }
       }
       if (!this.sliders.length) box.textContent = "No joint moves.";
-      this.setSliders();
+      this.neutral();
     }
     slider(box, joint, name, at, [min, max], isAngle) {
       const label = document.createElement("label"), words = document.createElement("span"), output = document.createElement("output");
       const input = Object.assign(document.createElement("input"), { type: "range", min, max, step: "any", value: 0 });
       words.textContent = words.title = name;
-      label.append(words, output, input);
+      // An output can be labelled, too: the first of the two in a label is what it names.
+      label.append(words, input, output);
+      input.ariaLabel = name;
       box.append(label);
-      const tell = () => { output.textContent = isAngle ? `${((this.robot.q[at] * 180) / Math.PI).toFixed(1)}°` : `${this.robot.q[at].toFixed(4)} m`; };
+      const tell = () => { output.textContent = isAngle ? `${((this.robot.q[at] * 180) / Math.PI).toFixed(1)}°` : `${this.robot.q[at].toFixed(4)} m`; input.ariaValueText = output.textContent; };
       input.addEventListener("input", () => { this.robot.q[at] = Number(input.value); tell(); this.update(); });
       for (const [event, on] of [["focus", true], ["pointerenter", true], ["blur", false], ["pointerleave", false]]) {
         input.addEventListener(event, () => this.pick(on ? joint : null));
       }
       this.sliders.push({ at, min, max, set: () => { input.value = this.robot.q[at]; tell(); } });
+    }
+    // Zero, or what is nearest to it within a joint's own limits: the sliders then say where the robot is.
+    neutral() {
+      this.robot.neutral();
+      for (const { at, min, max } of this.sliders) this.robot.q[at] = Math.min(Math.max(this.robot.q[at], min), max);
+      this.setSliders();
     }
     setSliders() {
       for (const slider of this.sliders) slider.set();
