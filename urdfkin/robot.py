@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Collection, Sequence
 from copy import copy
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +36,7 @@ from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.frame_names import LinkFrame
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.origin import Origin
 from urdfkin.verify.bounds import nearest_singularity
 from urdfkin.verify.call import Call
@@ -134,6 +137,18 @@ class Robot:
     def source(self) -> str:
         """Where it comes from: a path, a catalogue name, `-`, `<text>`."""
         return self.origin.source
+
+    @property
+    def sha256(self) -> str:
+        """The digest of the URDF's text as UTF-8: which file it was, whatever became of it since."""
+        return hashlib.sha256(self.verifier.text.encode()).hexdigest()
+
+    @property
+    def path(self) -> str | None:
+        """Where the file stands; None for what was given as text."""
+        entry = catalogue().get(self.source)
+        path = entry.path if entry is not None else Path(self.source)
+        return str(path.resolve()) if not self.source.startswith(("<", "-")) and path.is_file() else None
 
     @property
     def root_joint(self) -> str | None:

@@ -260,7 +260,7 @@ def test_what_is_printed_goes_through_the_door() -> None:
         "check.py": ("click.echo(as_json(", "click.echo(as_sarif(", "click.echo(summary(", "click.echo(f\"'"),
         "report.py": ("click.echo(asset(",), "compare.py": ("click.echo(json.dumps(",),
         "dh_work.py": ("click.echo(text, nl=False)",),
-        "__init__.py": ('click.echo(f"urdfkin {own}, Pinocchio {version()',),
+        "__init__.py": ('click.echo(f"urdfkin {own_version()}, Pinocchio {version()',),
         "crash.py": ('click.echo("urdfkin: interrupted', 'click.echo("".join(traceback.', "click.echo("),
     }  # fmt: skip
     folder = Path(__file__).parents[2] / "urdfkin" / "cli"

@@ -1,10 +1,14 @@
 """The certificate counts what was handed out: no result more, no result less, from any number of threads."""
 
 import copy
+import hashlib
+import json
 import pickle
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from importlib import metadata
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -143,3 +147,21 @@ def test_eight_threads_are_counted_as_one_is_and_get_what_one_gets(robot: Robot)
         "jacobian": (0, before + 8 * (2 * rounds + few * 16)),
         "acceleration": (0, 8 * rounds),
     }
+
+
+def test_a_certificate_says_which_file_it_was_and_can_be_saved(tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(urdfkin.load("elbow").urdf)
+    robot = urdfkin.load(file)
+    robot.placement(robot.neutral(), "tool")
+    certificate = robot.certificate()
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    assert (certificate.sha256, certificate.source) == (digest, str(file))
+    assert digest in str(certificate)
+    assert f"computed by urdfkin {metadata.version('urdfkin')}" in str(certificate)
+    assert (robot.sha256, robot.path) == (digest, str(file))
+    certificate.save(tmp_path / "certificate.json")
+    data = json.loads((tmp_path / "certificate.json").read_text())
+    assert data == certificate.as_dict()
+    assert (data["verified"], data["sha256"], data["lines"][0]["checked"]) == (True, digest, 1)
+    assert urdfkin.load(file.read_text()).path is None

@@ -86,15 +86,9 @@ class LazyGroup(click.Group):
 def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
     if not wanted:
         return
-    from importlib import metadata  # noqa: PLC0415  not needed for --help
+    from urdfkin.verify.pinocchio_module import own_version, pinocchio, version  # noqa: PLC0415
 
-    from urdfkin.verify.pinocchio_module import pinocchio, version  # noqa: PLC0415
-
-    try:
-        own = metadata.version("urdfkin")
-    except metadata.PackageNotFoundError:
-        own = "of a checkout"
-    click.echo(f"urdfkin {own}, Pinocchio {version()}")
+    click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
     pinocchio()  # says why there is none, and what cures it
     ctx.exit()
 

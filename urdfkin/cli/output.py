@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import csv
-import errno
 import io
 import os
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,10 +15,12 @@ import click
 
 from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.door import say
-from urdfkin.errors import SourceError
 from urdfkin.errors.numerals import whole
 from urdfkin.errors.printable import csv_cell, json_text
 from urdfkin.report.listing import NOISE, make_table, print_named
+from urdfkin.system.files import write_file
+
+__all__ = ["write_file"]
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -86,40 +86,6 @@ def _columns() -> int:
     return min(wanted, _WIDEST) if wanted > 0 else _WIDEST
 
 
-def write_file(path: Path, data: bytes) -> None:
-    """Write beside the target and rename, so that a file is there whole or not at all.
-
-    A link is followed; what is no file (`/dev/null`, a pipe) is written to, never replaced.
-
-    Raises:
-        SourceError: no permission, no such folder, no room.
-    """
-    name = ""
-    try:
-        if path.exists() and not path.is_file():
-            path.write_bytes(data)
-            return
-        path = path.resolve()
-        if path.exists() and not os.access(path, os.W_OK):  # renaming would not ask
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-        mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as stream:
-            name = stream.name
-            stream.write(data)
-        Path(name).chmod(mode)
-        Path(name).replace(path)
-    except OSError as error:
-        if name:
-            Path(name).unlink(missing_ok=True)
-        raise SourceError("cannot be written", where=str(path), found=error.strerror or str(error)) from error
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
 def emit(
     inputs: Inputs,
     quantity: Quantity,
@@ -172,6 +138,9 @@ def _as_json(
     document: dict[str, Any] = {
         "robot": inputs.robot.name,
         "source": inputs.robot.source,
+        "path": inputs.robot.path,
+        "sha256": inputs.robot.sha256,
+        "urdfkin": certificate.urdfkin,
         "quantity": quantity.name,
         "frame": inputs.frame,
         "reference": reference,

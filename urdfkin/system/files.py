@@ -11,6 +11,7 @@ import os
 import select
 import stat
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -125,3 +126,37 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
         found=f"nothing in {PATIENCE:g} s",
         remedy="write the text into a file, or give it on standard input as -",
     )
+
+
+def write_file(path: Path, data: bytes) -> None:
+    """Write beside the target and rename, so that a file is there whole or not at all.
+
+    A link is followed; what is no file (`/dev/null`, a pipe) is written to, never replaced.
+
+    Raises:
+        SourceError: no permission, no such folder, no room.
+    """
+    name = ""
+    try:
+        if path.exists() and not path.is_file():
+            path.write_bytes(data)
+            return
+        path = path.resolve()
+        if path.exists() and not os.access(path, os.W_OK):  # renaming would not ask
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as stream:
+            name = stream.name
+            stream.write(data)
+        Path(name).chmod(mode)
+        Path(name).replace(path)
+    except OSError as error:
+        if name:
+            Path(name).unlink(missing_ok=True)
+        raise SourceError("cannot be written", where=str(path), found=error.strerror or str(error)) from error
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

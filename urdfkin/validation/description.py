@@ -22,6 +22,8 @@ def describe(robot: Robot) -> dict[str, Any]:
     return {
         "name": robot.name,
         "source": robot.source,
+        "path": robot.path,
+        "sha256": robot.sha256,
         "mimic": robot.origin.mimic if robot.verifier.mimic else False,
         "root_joint": robot.root_joint,
         "nq": robot.nq,

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+import os
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
 from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import UrdfkinError
+from urdfkin.errors.printable import json_text
 from urdfkin.model.tree import FloatArray
+from urdfkin.system.files import at_home, write_file
 from urdfkin.system.forking import lock_over_forks
 from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.quantities import QUANTITIES
@@ -146,6 +151,9 @@ class Certificate:
         lines: One for each quantity that was computed.
         not_verified: Why results were not checked, in words; empty where all were.
         reading: Who vouches for the way from another format to the URDF that is checked; empty for a URDF.
+        source: Where the robot came from.
+        sha256: The digest of its URDF's text as UTF-8.
+        urdfkin: The version that computed.
     """
 
     robot: str
@@ -153,6 +161,9 @@ class Certificate:
     lines: tuple[Line, ...]
     not_verified: tuple[str, ...]
     reading: str = ""
+    source: str = ""
+    sha256: str = ""
+    urdfkin: str = ""
 
     @property
     def verified(self) -> bool:
@@ -161,8 +172,31 @@ class Certificate:
             line.unchecked or not line.share <= 1.0 for line in self.lines
         )
 
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; a figure beyond all numbers is null."""
+        lines = [asdict(line) for line in self.lines]
+        for line in lines:
+            line |= {key: None for key in ("worst", "share") if not math.isfinite(line[key])}
+        return {
+            "schema": "urdfkin-certificate/1",
+            **{name: getattr(self, name) for name in ("robot", "source", "reading", "sha256", "urdfkin", "oracle")},
+            "verified": self.verified,
+            "lines": lines,
+            "not_verified": list(self.not_verified),
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write it as JSON, whole or not at all.
+
+        Raises:
+            SourceError: no permission, no such folder, no room.
+        """
+        write_file(at_home(path), (json_text(self.as_dict()) + "\n").encode())
+
     def __str__(self) -> str:
         head = f"{self.robot}, checked by {self.oracle}"
+        if self.sha256:
+            head += f", computed by urdfkin {self.urdfkin} from {self.source} (sha256 {self.sha256})"
         rows = [head] + [
             f"  {line.quantity}: {line.checked} checked, worst {line.worst:.2g} eps*scale"
             f" ({line.share:.1%} of the bound)"

@@ -5,6 +5,7 @@ A result is held against the oracle's for the user's own arguments, in the shape
 
 from __future__ import annotations
 
+import hashlib
 import sys
 import warnings
 from dataclasses import replace
@@ -28,7 +29,7 @@ from urdfkin.verify.certificate import Certificate, Comparison, Ledger, Verifica
 from urdfkin.verify.choosing import SAMPLE, Verify, checked_choice, parts
 from urdfkin.verify.magnitudes import magnitudes
 from urdfkin.verify.pinocchio import Oracle, OracleError
-from urdfkin.verify.pinocchio_module import pinocchio, version
+from urdfkin.verify.pinocchio_module import own_version, pinocchio, version
 from urdfkin.verify.quantities import Quantity
 from urdfkin.verify.replay import replay_line
 from urdfkin.verify.sampling import draw
@@ -125,8 +126,13 @@ class Verifier:
 
     def certificate(self) -> Certificate:
         """What was checked so far, how closely it agreed, by whom, and what was not checked."""
-        found = self.ledger.certificate(self.tree.name, self.witness.words)
-        return replace(found, reading=self.reading)
+        return replace(
+            self.ledger.certificate(self.tree.name, self.witness.words),
+            reading=self.reading,
+            source=self.origin.source,
+            sha256=hashlib.sha256(self.text.encode()).hexdigest(),
+            urdfkin=own_version(),
+        )
 
     # -- quantities ----------------------------------------------------------------------------------
 
