@@ -28,10 +28,12 @@ class Check:
     Attributes:
         units: (n,) the largest disagreement of each sample, eps * scale.
         share: (n,) the same as a share of its bound; above 1 is a failure.
+        bound: (n,) what rounding can do at most, eps * scale.
     """
 
     units: FloatArray
     share: FloatArray
+    bound: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,4 +130,5 @@ def frame_motion(
 def _check(row: Quantity, robot: Robot, call: Call, ours: FloatArray) -> Check:
     theirs, bound = held_against(row, robot.verifier.oracle(), call.part(slice(0, call.n)), ours)
     units = worst_of_each(ours, theirs, bound.scale, 2)
-    return Check(units[:, 0], (units / result_k(bound, units.shape))[:, 0])
+    k = np.broadcast_to(result_k(bound, units.shape), units.shape)
+    return Check(units[:, 0], (units / k)[:, 0], k[:, 0])

@@ -44,6 +44,23 @@ def test_the_lines_are_the_numbers(case: Case) -> None:
     np.testing.assert_array_equal(together.get_ydata(), np.linalg.norm(x.acceleration[:, :3], axis=1))
 
 
+def test_the_bound_is_drawn_beside_what_it_bounds(case: Case) -> None:
+    robot, x, trajectory = case
+    (axes,) = sheet(robot, x, trajectory, ["disagreement"]).axes
+    for check in x.checks.values():
+        assert (check.bound > 0.0).all()
+        np.testing.assert_allclose(check.units, check.share * check.bound, rtol=1e-12)
+        assert any(np.array_equal(drawn.get_ydata(), check.bound) for drawn in axes.lines)
+    assert axes.get_ylim()[1] > max(check.bound.max() for check in x.checks.values())
+
+
+def test_the_title_says_from_where_to_where_and_how_long(case: Case) -> None:
+    robot, x, trajectory = case
+    title = sheet(robot, x, trajectory, ["position"]).get_suptitle()
+    start, end = (", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9)) for k in (0, -1))
+    assert title.endswith(f"from ({start}) to ({end}) m in 1 s")
+
+
 @pytest.mark.slow
 def test_every_panel_is_on_the_sheet_and_the_foot_says_what_was_checked(case: Case, tmp_path: Path) -> None:
     robot, x, trajectory = case

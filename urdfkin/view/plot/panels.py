@@ -96,16 +96,21 @@ def manipulability(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 
 def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """With Pinocchio at the same q, v and a, in eps * scale; a cross where it lies outside the bound."""
+    """With Pinocchio at the same q, v and a, in eps * scale; thin, the bound; a cross where it is outside."""
     axes.set_ylabel("disagreement [eps·scale]")
     if x.not_verified is not None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
         return
     for k, (quantity, check) in enumerate(x.checks.items()):
         axes.plot(t, check.units, color=COLOURS[k % 7], linestyle=STYLES[k % 7], label=quantity)
+        bound = "bounds" if k == 0 else None
+        axes.plot(t, check.bound, color=COLOURS[k % 7], linewidth=0.6, linestyle=STYLES[k % 7], label=bound)
         outside = check.share > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color="#B00020", label="outside the bound")
+    # Bounds are a hundred times what is usual: below 1, which a rounding gives, the scale is plain.
+    axes.set_yscale("symlog", linthresh=1.0)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
 
 

@@ -58,10 +58,18 @@ def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence
             axes.tick_params(labelbottom=True)
         for axes in grid[-1]:
             axes.set_xlabel("time [s]")
-        figure.suptitle(label(f"{robot.name}: {x.frame}, {x.reference.name}"), fontsize=11)
+        figure.suptitle(
+            f"{label(f'{robot.name}: {x.frame}, {x.reference.name}')}\n{way(x, trajectory)}", fontsize=11
+        )
         words = textwrap.wrap(label(foot(x, trajectory)), width=int(_LETTERS * _PANEL[0] * columns))
         figure.supxlabel("\n".join(words), fontsize=8, color="#444444")
     return figure
+
+
+def way(x: FrameMotion, trajectory: Trajectory) -> str:
+    """From where to where the frame goes, and in which time."""
+    ends = ["({})".format(", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9))) for k in (0, -1)]
+    return f"from {ends[0]} to {ends[1]} m in {trajectory.t[-1] - trajectory.t[0]:.4g} s"
 
 
 def foot(x: FrameMotion, trajectory: Trajectory) -> str:
