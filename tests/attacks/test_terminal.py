@@ -53,6 +53,7 @@ OTHERS: dict[str, list[list[str]]] = {
     ],
     "compare": [["REPORT", "REPORT"], ["REPORT", "REPORT", "--format", "json"], ["REPORT", FILE]],
     "view": [[FILE]],
+    "warm": [[], [FILE]],
 }
 
 

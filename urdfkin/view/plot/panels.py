@@ -97,14 +97,13 @@ def manipulability(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     """With Pinocchio at the same q, v and a, in eps * scale; thin, the bound; a cross where it is outside."""
-    axes.set_ylabel("disagreement [eps·scale]")
+    axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
     if x.not_verified is not None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
         return
     for k, (quantity, check) in enumerate(x.checks.items()):
         axes.plot(t, check.units, color=COLOURS[k % 7], linestyle=STYLES[k % 7], label=quantity)
-        bound = "bounds" if k == 0 else None
-        axes.plot(t, check.bound, color=COLOURS[k % 7], linewidth=0.6, linestyle=STYLES[k % 7], label=bound)
+        axes.plot(t, check.bound, color=COLOURS[k % 7], linewidth=0.6, linestyle=STYLES[k % 7])
         outside = check.share > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color="#B00020", label="outside the bound")
