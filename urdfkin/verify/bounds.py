@@ -199,20 +199,17 @@ def hessian_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatAr
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     (near, near_mixed), (far, far_mixed) = _PAIR_TERMS[reference]
     step, rate = plan.columns[:, Column.STEP], plan.columns[:, Column.V]
-    turns = plan.columns[:, Column.TURNS] == 1
+    turns, size_of = plan.columns[:, Column.TURNS] == 1, np.abs(plan.multipliers)
     for f, (_, place) in enumerate(plan.frames):
         own = np.flatnonzero(plan.leaders[f] >= 0)
         i, j = own[:, np.newaxis], own[np.newaxis, :]
         before = step[j] <= step[i]
-        both, one, size_2 = (
-            turns[i] & turns[j],
-            turns[i] ^ turns[j],
-            np.abs(plan.multipliers[i] * plan.multipliers[j]),
-        )
+        sizes = product(size_of[i], size_of[j])
+        both, one = sizes * (turns[i] & turns[j]), sizes * (turns[i] ^ turns[j])
         pair = place, rate[i], rate[j]
-        np.add.at(turning, pair, size_2 * both * np.where(before, near, far))
-        np.add.at(mixed, pair, size_2 * one * np.where(before, near_mixed, far_mixed))
-        np.add.at(angular, pair, size_2 * both * (before != (reference is Reference.LOCAL)))
+        np.add.at(turning, pair, both * np.where(before, near, far))
+        np.add.at(mixed, pair, one * np.where(before, near_mixed, far_mixed))
+        np.add.at(angular, pair, both * (before != (reference is Reference.LOCAL)))
     linear = product(turning, size.p[..., np.newaxis, np.newaxis]) + mixed
     scale = np.empty((*linear.shape[:2], 6, *shape[1:]))
     scale[..., :3, :, :] = linear[..., np.newaxis, :, :]
