@@ -28,6 +28,9 @@ ROBOT = {
     "velocity": [[], ["--q", "random:3"], ["--q", "\x1b[31mx"]],
     "jacobian": [[], ["--format", "json"], ["--format", "csv"], ["--frame", FILE]],
     "jacobian-rate": [[], ["--format", "csv"]],
+    "hessian": [[], ["--format", "csv"]],
+    "imu": [[], ["--format", "csv"], *(["--trajectory", file] for file in (FILE, f"{FILE}.npz"))],
+    "manipulability": [[], ["--format", "csv"], ["--format", "json"], ["--frame", FILE]],
     "acceleration": [[], ["--explain", "--v", "random"], ["--explain", "--v", "random", "--format", "csv"]],
     "dh": [
         *(["--format", form, "--no-mimic"] for form in (*FORMATS, "urdf", "svg")),

@@ -13,6 +13,7 @@ from urdfkin.cli.arguments import (
     a_option,
     frame_option,
     load_robot,
+    oracle_option,
     q_option,
     read_inputs,
     robot_argument,
@@ -21,9 +22,11 @@ from urdfkin.cli.arguments import (
     verify_option,
 )
 from urdfkin.cli.door import say
+from urdfkin.cli.endings import form_of
 from urdfkin.cli.idle import refuse_idle
-from urdfkin.cli.output import compiling, emit, exit_code, format_option, output_option
+from urdfkin.cli.output import ENDINGS, compiling, emit, exit_code, format_option, output_option
 from urdfkin.verify.quantities import IMU
+from urdfkin.verify.witnesses import WitnessName
 
 if TYPE_CHECKING:
     from urdfkin.model.base_motion import BaseMotion
@@ -44,6 +47,7 @@ _TRAJECTORY = f"{TRAJECTORY_HELP[:-1]}, base_placement, base_velocity, base_acce
 @a_option
 @seed_option
 @verify_option
+@oracle_option
 @format_option
 @output_option
 @click.pass_context
@@ -60,6 +64,7 @@ def command(
     a: str,
     seed: int,
     verify: bool,
+    oracle: WitnessName,
     format_: str,
     output: Path | None,
 ) -> None:
@@ -72,7 +77,8 @@ def command(
     """
     from urdfkin.motion.columns import numbers  # noqa: PLC0415  keeps --help fast
 
-    loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    format_ = form_of(context, output, ENDINGS, "csv")
+    loaded = load_robot(robot, mimic, root_joint, verify=verify, oracle=oracle)
     base = None
     if trajectory is None:
         x = read_inputs(loaded, frame, seed, q, v, a)

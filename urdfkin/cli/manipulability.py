@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,14 +21,18 @@ from urdfkin.cli.arguments import (
     verify_option,
 )
 from urdfkin.cli.door import say
-from urdfkin.cli.output import check_line, compiling, console, exit_code, output_option, write_file
+from urdfkin.cli.endings import form_of
+from urdfkin.cli.output import check_line, compiling, console, exit_code, hand_out, output_option
 from urdfkin.errors.printable import csv_cell, json_text
 from urdfkin.report.listing import print_named
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from urdfkin.model.tree import FloatArray
     from urdfkin.verify.singular_values import SingularValues
 
+_ENDINGS = {".json": ("json",), ".csv": ("csv",)}
 #: How many samples of a batch a table shows.
 _SHOWN = 5
 
@@ -72,36 +75,30 @@ def command(
     sqrt(det J J^T); its derivatives by the rates come from the Hessian, and are nan where the smallest
     singular value cannot be told from 0.
     """
+    format_ = form_of(context, output, _ENDINGS, "csv")
     loaded = load_robot(robot, mimic, root_joint, verify=verify)
     x = read_inputs(loaded, frame, seed, q)
     with compiling():
         found = loaded.singular_values(x.q, x.frame, rows)
         gradient = found.manipulability_gradient(loaded.hessian(x.q, x.frame))
     check = check_line(certificate := loaded.certificate())
-    if format_ == "table" and output in (None, Path("-")):
-        _print(x, rows, found, gradient)
-        console().print(check, style="green" if certificate.verified else "bold yellow")
+    if format_ == "table" and output is None:
+        out = console()
+        _print(out, x, rows, found, gradient)
+        out.print(check, style="green" if certificate.verified else "bold yellow")
     else:
         form = _as_json if format_ == "json" else _as_csv
-        _write(form(x, rows, found, gradient, check), output)
+        hand_out(form(x, rows, found, gradient, check).encode(), output)
         if format_ != "json":
             say(check, err=True)
     context.exit(exit_code(certificate))
-
-
-def _write(text: str, output: Path | None) -> None:
-    if output in (None, Path("-")):
-        sys.stdout.write(text)
-    else:
-        write_file(output, text.encode())
 
 
 def _names(found: SingularValues) -> list[str]:
     return [f"sigma_{k + 1}" for k in range(found.values.value.shape[-1])]
 
 
-def _print(x: Inputs, rows: str, found: SingularValues, gradient: FloatArray) -> None:
-    out = console()
+def _print(out: Console, x: Inputs, rows: str, found: SingularValues, gradient: FloatArray) -> None:
     out.print(f"{x.robot.name}: singular values of {x.frame}, {rows} rows", style="bold")
     for k in range(min(len(gradient), _SHOWN)):
         if len(gradient) > 1:

@@ -102,13 +102,18 @@ def emit(
     data = {
         "table": _as_csv, "csv": _as_csv, "json": _as_json, "npy": _as_npy,
     }[format_](inputs, quantity, reference, result, certificate)  # fmt: skip
+    hand_out(data, output)
+    if format_ != "json":
+        say(check_line(certificate), err=True)
+
+
+def hand_out(data: bytes, output: Path | None) -> None:
+    """Write to a file, or to standard output as it is."""
     if output is not None:
         write_file(output, data)
     else:
         sys.stdout.buffer.write(data)
         sys.stdout.buffer.flush()
-    if format_ != "json":
-        say(check_line(certificate), err=True)
 
 
 def check_line(certificate: Certificate) -> str:
