@@ -13,7 +13,10 @@ import pytest
 from urdfkin.cli import cli
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("docs/reports.md", "docs/ci.md", "docs/dh-at-work.md", "docs/examples/robots.yml", "README.md")
+PAGES = (
+    *("docs/reports.md", "docs/ci.md", "docs/dh-at-work.md", "docs/accelerations.md"),
+    *("docs/examples/robots.yml", "README.md"),
+)
 
 
 def script(name: str) -> ModuleType:

@@ -28,11 +28,18 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: A sliding joint's rates, and the length of a normal, where the same letters stand for these.
+#: A sliding joint's rates, the length of a normal, columns of the Jacobian, where letters stand for these.
 _OWN = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},
     "interorigin_vector": {"a": "a_i", "d": "d_i"},
+    "turned_along": {"w": "z_j", "linear": "v_i", "angular": r"\omega_i"},
+    "end_moved": {"z": "z_i", "linear": "v_j"},
+    "motion_product": {
+        f"{name}_{i}": f"{symbol}_{i}"
+        for name, symbol in (("linear", "v"), ("angular", r"\omega"))
+        for i in (1, 2)
+    },
     "moving_point_velocity": {"u": r"\dot{p}"},
     "moving_point_acceleration": {"u": r"\dot{p}", "b": r"\ddot{p}"},
 }

@@ -62,16 +62,12 @@ def as_is(text: str) -> Markup:
     """A text of our own, which a template takes as it is."""
     from markupsafe import Markup  # noqa: PLC0415
 
-<<<<<<< HEAD
     return Markup(text)
 
 
 def as_html(document: Document) -> str:
     """The page. Names may be anything, `<script>` included: the template escapes them all."""
-    robots = document["robots"]
-=======
     robots = sorted(document["robots"], key=lambda robot: VERDICTS.index(robot["verdict"]))  # the worst first
->>>>>>> 69645e3 (Show on the report's page what failed first, and tell figures by their share of the bound)
     quantities = columns(robots)
     return (
         environment()

@@ -141,6 +141,10 @@ class Line:
     unchecked: int
 
 
+#: What its JSON begins with.
+_HEAD = ("robot", "source", "reading", "sha256", "urdfkin", "oracle")
+
+
 @dataclass(frozen=True, slots=True)
 class Certificate:
     """What a robot's results so far are worth.
@@ -179,7 +183,7 @@ class Certificate:
             line |= {key: None for key in ("worst", "share") if not math.isfinite(line[key])}
         return {
             "schema": "urdfkin-certificate/1",
-            **{name: getattr(self, name) for name in ("robot", "source", "reading", "sha256", "urdfkin", "oracle")},
+            **{name: getattr(self, name) for name in _HEAD},
             "verified": self.verified,
             "lines": lines,
             "not_verified": list(self.not_verified),
