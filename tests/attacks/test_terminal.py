@@ -17,6 +17,7 @@ from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
 from tests.cli.running import Done, urdfkin
 from urdfkin.cli import commands
 from urdfkin.cli.door import Door
+from urdfkin.cli.screws import FORMS as SCREWS
 from urdfkin.dh.export import FORMATS
 
 #: A file may be called so.
@@ -37,6 +38,8 @@ ROBOT = {
         *(["--tree", "--format", form] for form in ("terminal", "markdown", "csv", "json")),
         ["--flip", FILE], ["--near-parallel", "strict"], ["--compare", "TABLE"],
     ],
+    "screws": [["--no-mimic", "--format", form] for form in SCREWS] + [["--base", FILE]],
+    "structure": [[], ["--json"], ["--opw", "1"]],
     "check": [["--format", form] for form in ("terminal", "json", "sarif", "github")] + [["--each"]],
     "validate": [["--samples", "2", "--cases"], ["--samples", "1", "--isolate"]],
     "plot": [
