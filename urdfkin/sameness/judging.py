@@ -25,7 +25,7 @@ from urdfkin.sameness.variables import Variables, variables_of
 from urdfkin.sameness.wording import differences, put_right, remarks
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.choosing import checked_choice
-from urdfkin.verify.pinocchio import version
+from urdfkin.verify.pinocchio_module import version
 
 #: Configurations at which Pinocchio confirms both robots.
 CONFIRMED = 8
