@@ -121,7 +121,7 @@ class Verifier:
         Raises:
             InstallationError: it is to check results and is missing, or another project goes by its name.
         """
-        if self.wanted(verify) is not False and self.unverifiable is None:
+        if self.wanted(verify) is not False and self.unverifiable is None and self.witness is PINOCCHIO:
             pinocchio()
 
     def certificate(self) -> Certificate:
