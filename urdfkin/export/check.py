@@ -80,7 +80,7 @@ def _compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
         macros = [f"-D{found[1]}_MAIN", f"-D{found[1]}_REAL={real}"]
         built = folder / real
         _run(
-            [compiler, *language, "-O2", *_STRICT, *macros, str(file.resolve()), "-o", str(built), "-lm"],
+            [compiler, *language, "-O1", *_STRICT, *macros, str(file.resolve()), "-o", str(built), "-lm"],
             file,
         )
         yield [f"{line} ({real})" for line in _run([str(built)], file)]

@@ -13,7 +13,7 @@
 #error "-ffast-math takes apart the reduction of angles; -O3 -ffp-contract=fast -fno-math-errno is as fast"
 #endif
 #ifdef __GNUC__
-#define INLINE static inline __attribute__((always_inline))
+#define INLINE static inline __attribute__((always_inline, unused))
 #define ALIGNED __attribute__((aligned(64)))
 #else
 #define INLINE static inline
