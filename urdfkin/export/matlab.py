@@ -36,7 +36,7 @@ def write(code: Code, to: str = "matlab") -> str:
         "",
         f"f = {name}();  J = f.jacobian(q);  f.check() runs the test vectors. q, v and a count from 1.",
     ]
-    lines = [f"function f = {name}()", *(f"% {line}".rstrip() for line in head)]
+    lines = [*(f"% {line}".rstrip() for line in head), f"function f = {name}()"]
     lines += [f"f.{function.name} = @{function.name};" for function in code.functions]
     lines += ["f.check = @check;", "end"]
     for function in code.functions:
