@@ -10,12 +10,13 @@ import pytest
 import urdfkin
 from scripts.benchmarking.operations import operations
 from tests.laws.subjects import robot_of
+from urdfkin.export.code import exported
 from urdfkin.export.expression import Node
 from urdfkin.export.function import function_of
 from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.verify.call import Call
-from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, validated
+from urdfkin.verify.quantities import ACCELERATION, JACOBIAN
 from urdfkin.verify.sampling import draw
 
 ODD = (
@@ -37,7 +38,7 @@ def test_every_quantity_is_pinocchios_within_the_bound(name: str, reference: Ref
     frame = robot.tip_frame
     drawn = draw(robot.tree, 20, np.random.default_rng(3), with_special=True)
     checker = copy(robot.verifier)
-    for row in validated():
+    for row in exported():
         inputs = (drawn.q, drawn.v, drawn.a)[: len(row.inputs)]
         call = Call(robot.tree, robot.plan, frame, reference, None, inputs)
         found = function_of(call.plan, row, reference).evaluated((call.q, *call.rates))
@@ -53,7 +54,7 @@ def test_each_joints_sine_and_cosine_stand_there_once_and_no_more_than_are_neede
     robot = arm()
     plan = robot.plan([robot.tree.frame_link("panda_hand")])
     place, jacobian = (
-        function_of(plan, row, Reference.LOCAL_WORLD_ALIGNED) for row in (validated()[0], JACOBIAN)
+        function_of(plan, row, Reference.LOCAL_WORLD_ALIGNED) for row in (exported()[0], JACOBIAN)
     )
     assert sum(node.op == "sin" for node in place.nodes) == 7
     assert sum(node.op == "cos" for node in place.nodes) == 7
@@ -85,7 +86,7 @@ def test_statements_are_in_an_order_in_which_they_can_be_computed() -> None:
 def test_a_robot_with_huge_and_tiny_links_keeps_its_tiny_ones() -> None:
     robot = robot_of("sizes")
     plan = robot.plan([robot.tree.frame_link(robot.tip_frame)])
-    function = function_of(plan, validated()[0], Reference.LOCAL)
+    function = function_of(plan, exported()[0], Reference.LOCAL)
     lengths = {x for node in function.nodes for x in node.of if isinstance(x, float)}
     assert any(0.0 < x < 1e-5 for x in lengths)
     assert any(x > 100.0 for x in lengths)

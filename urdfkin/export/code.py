@@ -9,6 +9,7 @@ from itertools import groupby
 from urdfkin.compiled.plan import Plan, Step
 from urdfkin.errors import InputError
 from urdfkin.errors.demands import words
+from urdfkin.export import walk
 from urdfkin.export.expression import Node, Number
 from urdfkin.export.function import Function, function_of
 from urdfkin.export.naming import all_safe, shown, title
@@ -16,7 +17,7 @@ from urdfkin.export.proof import Proof, prove
 from urdfkin.model.configuration import coordinate_names, rate_names
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import KinematicTree
-from urdfkin.verify.quantities import Quantity, quantity, validated
+from urdfkin.verify.quantities import Quantity, quantity, walked
 from urdfkin.verify.verifier import Verifier
 
 #: Of a sum, a product, and what needs no brackets.
@@ -148,17 +149,22 @@ def bare(
     )
 
 
+def exported() -> list[Quantity]:
+    """The quantities that can be written as code."""
+    return [row for row in walked() if row.name in walk.QUANTITIES]
+
+
 def _rows(names: Collection[str]) -> list[Quantity]:
     rows = [quantity(name.replace("_", " ")) for name in dict.fromkeys(words(names, "quantities"))]
     if not rows:
         raise InputError(
-            "no quantity to export", remedy=f"name some of {', '.join(x.method for x in validated())}"
+            "no quantity to export", remedy=f"name some of {', '.join(x.method for x in exported())}"
         )
     for row in rows:
-        if row not in validated():
+        if row not in exported():
             raise InputError(
                 f"the {row.name} cannot be exported",
-                remedy=f"choose among {', '.join(x.method for x in validated())}",
+                remedy=f"choose among {', '.join(x.method for x in exported())}",
             )
     return rows
 

@@ -71,7 +71,7 @@ class Proof:
     @property
     def lines(self) -> list[str]:
         """In words."""
-        oracle = self.certificate.oracle
+        oracle = quiet(self.certificate.oracle)
         if not self.certificate.verified:
             reasons = quiet("; ".join(self.certificate.not_verified)) or "nothing was checked"
             verdict = [f"UNVERIFIED by {oracle}: {reasons}"]
