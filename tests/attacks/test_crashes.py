@@ -84,7 +84,7 @@ def test_when_one_form_fails_the_others_are_written_and_the_report_is_printed(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     if broken == "render":
-        monkeypatch.setattr(html, "as_html", _raising(RuntimeError("odd")))
+        monkeypatch.setattr(html, "as_files", _raising(RuntimeError("odd")))
     else:
         right = Path.replace
         monkeypatch.setattr(

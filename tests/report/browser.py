@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from selenium import webdriver
+from selenium.webdriver.support.ui import WebDriverWait
 
 ARTEFACTS = Path(__file__).parents[2] / "artefacts"
 _PROBES = (Path(__file__).parent / "probes.js").read_text()
@@ -88,6 +89,10 @@ class Browser:
             "const done = arguments[0], next = requestAnimationFrame;"
             "next(() => next(() => setTimeout(done, 50)))"
         )
+
+    def wait(self, code: str) -> None:
+        """Until a function's body returns something true."""
+        WebDriverWait(self.chrome, 60).until(lambda _: self.js(code))
 
     def screenshot(self, name: str) -> None:
         """Keep a picture among the artefacts."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ import pytest
 import urdfkin
 from tests.report.browser import Browser, opened
 from tests.report.documents import arms, failing, hostile
+from urdfkin.report import html
+from urdfkin.report.document import Document, Robot
 from urdfkin.report.html import as_html
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser]
@@ -216,3 +219,96 @@ def test_it_reads_well_in_both_themes_at_both_widths(
             browser.settle()
             browser.screenshot(f"{name}-{part[1:]}")
         assert browser.errors() == []
+
+
+# -- a page of thousands: details in files beside it ---------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """2,000 robots, one of them called as an attack, whose details lie beside the page."""
+    document, (dangerous, plain) = hostile(), hostile()["robots"]
+    document["robots"] = [plain | {"source": f"fleet/{i:04}.urdf"} for i in range(2000)]
+    document["robots"][7] = dangerous
+    document["asked"] = 2000
+    folder = tmp_path_factory.mktemp("fleet")
+    (folder / "fleet-robots").mkdir()
+    made = dict[bool, dict[str, Any]]()
+    with pytest.MonkeyPatch.context() as patch:
+        # Two kinds of robots: drawing the same one 2,000 times proves nothing and takes minutes.
+        patch.setattr(html, "MOST", 100_000)
+        right = html._robot
+
+        def once(robot: Robot, index: int, whole: Document) -> dict[str, Any]:
+            kind = robot["source"] == dangerous["source"]
+            if kind not in made:
+                made[kind] = right(robot, index, whole)
+            return made[kind]
+
+        patch.setattr(html, "_robot", once)
+        for place, text in html.as_files(document, "fleet.html"):
+            (folder / place).write_text(text, encoding="utf-8")
+    return folder / "fleet.html"
+
+
+def test_two_thousand_robots_are_on_the_screen_soon_and_are_found(desk: Browser, fleet: Path) -> None:
+    desk.requests()
+    desk.errors()
+    desk.open(fleet)
+    painted = desk.js("return performance.getEntriesByName('first-contentful-paint')[0].startTime")
+    assert fleet.stat().st_size < 5_000_000
+    assert painted < 20_000  # generous: docs/campaigns.md has what it takes on a machine that is not shared
+    assert desk.requests()[:1] == [fleet.as_uri()]
+    took = desk.js(
+        "const t = performance.now(), find = document.querySelector('#find'); find.value = '1234';"
+        "find.dispatchEvent(new Event('input')); document.body.offsetHeight; return performance.now() - t"
+    )
+    assert desk.js("return document.querySelector('#shown').textContent") == "1 of 2000"
+    assert took < 5_000
+    assert desk.errors() == []
+
+
+def test_a_robots_details_come_from_its_file_when_it_is_unfolded(desk: Browser, fleet: Path) -> None:
+    desk.requests()
+    desk.open(fleet)
+    desk.js("location.hash = '#robot-1234'")
+    desk.wait("return !!document.querySelector('#robot-1234 table.checks')")
+    asked = [Path(url).name for url in desk.requests() if url.startswith("file:")]
+    assert asked == ["fleet.html", "1234.js"]
+    desk.js("document.querySelector('#robot-1234 .stage').scrollIntoView({block: 'center'})")
+    desk.wait("return !!document.querySelector('#robot-1234 canvas').dataset.drawn")
+    heads = "[...document.querySelectorAll('#robot-1234 .checks tbody th')].map((x) => x.textContent)"
+    before = desk.js(f"return {heads}")
+    desk.js("document.querySelectorAll('#robot-1234 .checks thead button')[4].click()")
+    assert sorted(before) == sorted(desk.js(f"return {heads}"))
+    assert before != desk.js(f"return {heads}")
+
+
+def test_a_hostile_name_in_a_file_beside_the_page_does_nothing(desk: Browser, fleet: Path) -> None:
+    desk.open(fleet)
+    desk.js("document.querySelector('#robot-7').open = true")
+    desk.wait("return !!document.querySelector('#robot-7 table.checks')")
+    assert desk.js("return window.hacked") is None
+    assert desk.js("return document.querySelectorAll('img').length") == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"), [("gone", "is not there"), ("other", "belongs to another report")]
+)
+def test_a_file_that_is_gone_or_another_reports_is_said(
+    change: str, said: str, desk: Browser, fleet: Path
+) -> None:
+    file = fleet.parent / "fleet-robots" / "5.js"
+    text = file.read_text("utf-8")
+    try:
+        if change == "gone":
+            file.unlink()
+        else:
+            file.write_text('urdfkinRobot(["0", 5, "<p>other</p>"]);', encoding="utf-8")
+        desk.open(fleet)
+        desk.js("document.querySelector('#robot-5').open = true")
+        desk.wait("return !!document.querySelector('#robot-5 .reason')")
+        assert said in desk.js("return document.querySelector('#robot-5 .reason').textContent")
+    finally:
+        file.write_text(text, encoding="utf-8")
+    desk.errors()

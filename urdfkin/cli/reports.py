@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,10 +19,13 @@ from urdfkin.errors import SourceError, UrdfkinError
 if TYPE_CHECKING:
     from urdfkin.report.document import Document
 
+#: The files of a form, each with its place: one, or a page and what lies beside it.
+Files = Iterator[tuple[Path, bytes]]
+
 _PATH = click.Path(path_type=Path, dir_okay=False)
 
 report_options = together(
-    click.option("--html", type=_PATH, help="Write the report as one page for a browser, offline."),
+    click.option("--html", type=_PATH, help="Write the report as a page for a browser, offline."),
     click.option("--junit", type=_PATH, help="Write JUnit XML, a test case for each robot and quantity."),
     click.option("--markdown", type=_PATH, help="Write Markdown that fits a pull request's comment."),
 )
@@ -69,33 +72,38 @@ def say_written(*paths: Path | None) -> None:
         say(f"wrote {', '.join(named)}")
 
 
-def _written(path: Path, form: Callable[[Document], bytes], document: Document) -> int:
+def _written(path: Path, form: Callable[[Document, Path], Files], document: Document) -> int:
     try:
-        write_file(path, form(document))
+        for place, data in form(document, path):
+            if place.parent != path.parent:
+                place.parent.mkdir(exist_ok=True)
+            write_file(place, data)
     except UrdfkinError as error:
         return refuse(error)
+    except OSError as error:
+        return refuse(SourceError("cannot be written", where=str(path), found=error.strerror or str(error)))
     except Exception as error:
         return crash(error)
     return 0
 
 
-def _json(document: Document) -> bytes:
-    return (json.dumps(document, allow_nan=False) + "\n").encode()
+def _json(document: Document, path: Path) -> Files:
+    yield path, (json.dumps(document, allow_nan=False) + "\n").encode()
 
 
-def _html(document: Document) -> bytes:
-    from urdfkin.report.html import as_html  # noqa: PLC0415  draws plots
+def _html(document: Document, path: Path) -> Files:
+    from urdfkin.report.html import as_files  # noqa: PLC0415  draws plots
 
-    return as_html(document).encode()
+    return ((path.parent / place, text.encode()) for place, text in as_files(document, path.name))
 
 
-def _junit(document: Document) -> bytes:
+def _junit(document: Document, path: Path) -> Files:
     from urdfkin.report.junit import as_junit  # noqa: PLC0415
 
-    return as_junit(document)
+    yield path, as_junit(document)
 
 
-def _markdown(document: Document) -> bytes:
+def _markdown(document: Document, path: Path) -> Files:
     from urdfkin.report.markdown import as_markdown  # noqa: PLC0415
 
-    return as_markdown(document).encode()
+    yield path, as_markdown(document).encode()

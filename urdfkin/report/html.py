@@ -1,7 +1,14 @@
-"""The report as one HTML file: it opens offline, asks no network for anything, and escapes every name."""
+"""The report as an HTML page: it opens offline, asks no network for anything, and escapes every name.
+
+A page that would become too large to open at once holds the summary, and beside it lies a file for each
+robot, which is loaded when the robot is unfolded: as a script, since a page from a disc may read no other.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
+from collections.abc import Iterator
 from datetime import datetime
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -39,6 +46,10 @@ if TYPE_CHECKING:
 _OPEN = 1
 #: So many of those that failed stand open, which come first.
 _FAILURES_OPEN = 20
+#: With more robots than this, distributions are drawn for those alone that are not verified: a second each.
+_DRAWN = 100
+#: Letters of all robots' details from which on they lie in files of their own.
+MOST = 5_000_000
 
 
 @cache
@@ -66,9 +77,55 @@ def as_is(text: str) -> Markup:
 
 
 def as_html(document: Document) -> str:
-    """The page. Names may be anything, `<script>` included: the template escapes them all."""
-    robots = sorted(document["robots"], key=lambda robot: VERDICTS.index(robot["verdict"]))  # the worst first
-    quantities = columns(robots)
+    """One page with everything. Names may be anything, `<script>` included: the template escapes them all."""
+    document = _worst_first(document)
+    return _page(
+        document,
+        [_summary(robot, i) | _robot(robot, i, document) for i, robot in enumerate(document["robots"])],
+    )
+
+
+def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
+    """The files of a report, the page itself last.
+
+    Args:
+        document: The report's data.
+        name: What the page is called; what lies beside it is in a folder called after it.
+
+    Yields:
+        The place of each file, seen from the page, and its text: the page alone, or beside it a file for each
+        robot where they are more than `MOST` letters together.
+    """
+    document = _worst_first(document)
+    robots, folder = document["robots"], f"{name.removesuffix('.html')}-robots"
+    token = hashlib.sha256(f"{document['started']} {document['command']}".encode()).hexdigest()[:16]
+    waiting, size = list[tuple[str, str]](), 0
+    for i, robot in enumerate(robots):
+        details = _details(_robot(robot, i, document), document)
+        size += len(details)
+        waiting.append((f"{folder}/{i}.js", f"urdfkinRobot({json.dumps([token, i, details])});\n"))
+        if size > MOST:
+            yield from waiting
+            waiting.clear()
+    if size <= MOST:
+        yield name, as_html(document)
+        return
+    beside = ({"file": f"{folder}/{i}.js", "opened": False} for i in range(len(robots)))
+    shells = [_summary(robot, i) | file for i, (robot, file) in enumerate(zip(robots, beside, strict=True))]
+    yield name, _page(document, shells, token=token, folder=folder)
+
+
+def _worst_first(document: Document) -> Document:
+    return document | {"robots": sorted(document["robots"], key=lambda one: VERDICTS.index(one["verdict"]))}
+
+
+def _details(robot: dict[str, Any], document: Document) -> str:
+    template = environment().get_template("details.html.j2")
+    return template.render(robot=robot, document=document, heat_steps=pages.HEAT_STEPS)
+
+
+def _page(document: Document, robots: list[dict[str, Any]], token: str = "", folder: str = "") -> str:
+    quantities = columns(document["robots"])
     return (
         environment()
         .get_template("report.html.j2")
@@ -81,10 +138,12 @@ def as_html(document: Document) -> str:
             totals=_totals(document),
             verdicts=verdict_counts(document),
             quantities=list(quantities),
-            overview=[pages.overview(robot, list(quantities.values())) for robot in robots],
-            robots=[_robot(robot, i, document) for i, robot in enumerate(robots)],
+            overview=[pages.overview(robot, list(quantities.values())) for robot in document["robots"]],
+            robots=robots,
             opened=len(robots) <= _OPEN,
             heat_steps=pages.HEAT_STEPS,
+            token=token,
+            folder=folder,
             style=as_is(asset("report.css")),
             script=as_is(asset("report.js")),
             view_script=as_is(asset("view3d.js")),
@@ -92,6 +151,18 @@ def as_html(document: Document) -> str:
             three_licence=asset("three.LICENSE.txt"),
         )
     )
+
+
+def _summary(robot: Robot, index: int) -> dict[str, Any]:
+    """What stands of a robot while it is folded."""
+    opened = robot["verdict"] != "verified" and index < _FAILURES_OPEN
+    return {
+        "index": index,
+        "data": robot,
+        "summary": pages.overview(robot, []),
+        "file": "",
+        "opened": opened,
+    }
 
 
 def _totals(document: Document) -> dict[str, Any]:
@@ -113,10 +184,8 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
     heads, heat = pages.heat_map(robot, model) if model and robot["checks"] else ([], [])
     return {
         "index": index,
-        "opened": robot["verdict"] != "verified" and index < _FAILURES_OPEN,
         "moving": sum(joint["kind"] != "fixed" for joint in model["joints"]) if model else 0,
         "data": robot,
-        "summary": pages.overview(robot, []),
         "scene": scene(model, robot["chains"]) if model else None,
         "joints": pages.joint_rows(model) if model else [],
         "chains": [
@@ -141,6 +210,7 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
         ],
         "judged": pages.judged_rows(robot["judge"]) if robot["judge"] else [],
         "judged_on": judged_on(robot["judge"]) if robot["judge"] else "",
+        "many": installed(),
         "heat_heads": heads,
         "heat": heat,
         "plot": as_is(_plot(robot, index, document)),
@@ -148,8 +218,8 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
 
 
 def _plot(robot: Robot, index: int, document: Document) -> str:
-    """Empty where matplotlib is not installed: the tables say the same."""
-    if not installed():
+    """Empty where matplotlib is not installed, or where it would take too long: the tables say the same."""
+    if not installed() or (len(document["robots"]) > _DRAWN and robot["verdict"] == "verified"):
         return ""
     return distributions(robot, document["histogram_edges"], f"p{index}-")
 

@@ -49,12 +49,10 @@
     rows.sort((a, b) => (down ? compare(b[0], a[0]) : compare(a[0], b[0])) || a[1] - b[1]);
     table.tBodies[0].append(...rows.map((entry) => entry[2]));
   };
-  for (const table of $$("table.sortable")) {
-    table.tHead.addEventListener("click", (event) => {
-      const head = event.target.closest("th");
-      if (head) sort(table, head.cellIndex);
-    });
-  }
+  document.addEventListener("click", (event) => {
+    const head = event.target.closest?.("table.sortable > thead th");
+    if (head) sort(head.closest("table"), head.cellIndex);
+  });
 
   // -- the overview filters ----------------------------------------------------------------------------
   const find = $("#find"), verdict = $("#verdict");
@@ -90,9 +88,9 @@
   goTo();
 
   // -- Denavit-Hartenberg tables: the chain and the convention are chosen once for view and table ---------
-  for (const robot of $$("details.robot")) {
+  const connect = (robot) => {
     const chains = $$(".chain", robot), chain = $("select[data-chain]", robot), convention = $("select[data-convention]", robot);
-    if (!chain) continue;
+    if (!chain) return;
     const show = () => chains.forEach((part) => { part.hidden = part.dataset.chain !== chain.value; });
     const radios = $$(".switch input", robot);
     chain.addEventListener("change", show);
@@ -102,6 +100,36 @@
       convention.dispatchEvent(new Event("change"));
     }));
     show();
+  };
+  $$("details.robot").forEach(connect);
+
+  // -- details that lie in a file beside the page: loaded when a robot is unfolded --------------------------
+  const waiting = new Map();
+  const missing = (robot, why) => {
+    $(".body", robot).innerHTML = '<p class="reason" role="note"></p>';
+    $(".reason", robot).textContent = `The details cannot be shown: the file ${robot.dataset.file} beside this page ${why}.`;
+  };
+  globalThis.urdfkinRobot = ([token, index, details]) => {
+    const robot = waiting.get(index);
+    if (!robot) return;
+    waiting.delete(index);
+    if (token !== root.dataset.token) return void missing(robot, "belongs to another report");
+    $(".body", robot).innerHTML = details;  // made by the same template as the page, every name escaped
+    connect(robot);
+    document.dispatchEvent(new CustomEvent("robotloaded", { detail: robot }));
+  };
+  const load = (robot) => {
+    if (!robot.open || robot.dataset.asked) return;
+    robot.dataset.asked = "yes";
+    waiting.set(Number(robot.id.slice("robot-".length)), robot);
+    const script = Object.assign(document.createElement("script"), { src: robot.dataset.file });
+    script.addEventListener("error", () => { delete robot.dataset.asked; missing(robot, "is not there"); });
+    script.addEventListener("load", () => script.remove());
+    document.head.append(script);
+  };
+  for (const robot of $$("details.robot[data-file]")) {
+    robot.addEventListener("toggle", () => load(robot));
+    load(robot);
   }
 
   // -- copying -----------------------------------------------------------------------------------------

@@ -473,5 +473,7 @@
       }
     }
   }, { rootMargin: "200px" });
-  document.querySelectorAll("[data-view]").forEach((section) => watcher.observe(section));
+  const watch = (part) => part.querySelectorAll("[data-view]").forEach((section) => watcher.observe(section));
+  watch(document);
+  document.addEventListener("robotloaded", (event) => watch(event.detail));
 })();
