@@ -89,7 +89,7 @@ def load(
             source, xacro_args, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle
         )
     text = read_source(source, xacro_args=xacro_args)
-    return _robot(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle)
+    return robot_of(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle)
 
 
 def _load_table(
@@ -116,10 +116,10 @@ def _load_table(
         for doubt in doubts(table):
             warnings.warn(f"{name}: {doubt}", UrdfWarning, stacklevel=3)
     text = Text(urdf.encode(), name, name)
-    robot = _robot(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, made=True)
+    robot = robot_of(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, made=True)
     if checked_choice(verify):
         plain = mimic is not False and root_joint is None
-        verifier = (robot if plain else _robot(text)).verifier
+        verifier = (robot if plain else robot_of(text)).verifier
         if isinstance(table, Screws):
             check_screws(verifier, table)
         else:
@@ -143,12 +143,12 @@ def _load_mjcf(
     name = "<text>" if path is None else as_word(path)
     text = Text(write_urdf(read.tree).encode(), f"{name} (as a URDF)", name)
     listed = tuple(_listed(one, name) for one in read.listed)
-    robot = _robot(
+    robot = robot_of(
         text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, listed=listed, made=True
     )
     if checked_choice(verify):
         plain = mimic is not False and root_joint is None
-        verifier = (robot if plain else _robot(text, listed=listed, made=True)).verifier
+        verifier = (robot if plain else robot_of(text, listed=listed, made=True)).verifier
         robot.verifier.reading = demand_the_mjcfs(verifier, read, None if path is None else str(path))
     return robot
 
@@ -160,7 +160,7 @@ def _listed(one: Listed, file: str) -> Finding:
     return Finding(code, severity, message, file=file)
 
 
-def _robot(
+def robot_of(
     text: Text,
     *,
     verify: Verify = True,
@@ -170,6 +170,17 @@ def _robot(
     listed: tuple[Finding, ...] = (),
     made: bool = False,
 ) -> Robot:
+    """As `load`, of a text that was read already.
+
+    Args:
+        text: The text.
+        verify: As in `load`, and so the next three.
+        mimic: See there.
+        root_joint: See there.
+        oracle: See there.
+        listed: What was said of the text that this one was made of.
+        made: Whether it was made of something else, so that nobody has it as a file.
+    """
     witness_of(oracle)
     other = None if oracle == "pinocchio" else oracle
     origin = Origin(text.source, mimic, root_joint, text.xacro_args, other)

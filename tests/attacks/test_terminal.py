@@ -58,6 +58,7 @@ OTHERS: dict[str, list[list[str]]] = {
         ["ROBOT", FILE],
     ],
     "compare": [["REPORT", "REPORT"], ["REPORT", "REPORT", "--format", "json"], ["REPORT", FILE]],
+    "campaign": [["status", FILE], ["merge", FILE, FILE]],
     "view": [[FILE]],
     "warm": [[], [FILE]],
 }

@@ -17,9 +17,10 @@ from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import make_plan
 from urdfkin.validation import chunk as chunk_module
 from urdfkin.validation import comparing, memory
-from urdfkin.validation.campaign import _subject, validate
+from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import chunks, run_chunk
 from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.subject import subject
 from urdfkin.verify.pinocchio import Oracle, OracleError
 
 GB = 10**9
@@ -52,7 +53,7 @@ def test_blocks_cover_everything_once_and_keep_to_their_size(monkeypatch: pytest
 def test_comparing_in_blocks_changes_no_number(
     source: str, root_joint: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (chunk,) = chunks(_subject(source, None, root_joint), 5, 3)
+    (chunk,) = chunks(subject(source, None, root_joint), 5, 3)
     whole = run_chunk(chunk)
     monkeypatch.setattr(comparing, "BLOCK_BYTES", 2 * comparing.frame_bytes(8, len(whole.joints)))
     parts = run_chunk(chunk)
@@ -79,7 +80,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
     for name in ("joint_jacobians", "joint_jacobian_rates"):
         monkeypatch.setattr(Oracle, name, seen(getattr(Oracle, name)))
     monkeypatch.setattr(comparing, "BLOCK_BYTES", 100_000)
-    (chunk,) = chunks(_subject("talos", None, None), 5, 3)
+    (chunk,) = chunks(subject("talos"), 5, 3)
     run_chunk(chunk)
     assert len(sizes) > 100
     assert 50_000 < max(sizes) <= 100_000

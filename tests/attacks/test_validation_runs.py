@@ -16,12 +16,13 @@ import pytest
 
 from tests.validation import raising_worker
 from urdfkin.errors import UrdfkinError
-from urdfkin.validation import answer, campaign, engine, workers
+from urdfkin.validation import answer, child, engine
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, chunks, run_chunk
 from urdfkin.validation.engine import Here, OnExecutor, Task
 from urdfkin.validation.outcome import Verdict, outcome
 from urdfkin.validation.results import ValidationReport
+from urdfkin.validation.subject import subject
 
 ROBOTS = ["double_pendulum", "ur5", "planar_two_link"]
 ROOT = Path(__file__).parents[2]
@@ -44,7 +45,7 @@ def test_whatever_a_robot_raises_is_its_result_and_the_others_are_verified(
     way: str, error: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("URDFKIN_TEST_ERROR", error)
-    monkeypatch.setattr(workers, "WORKER", "tests.validation.raising_worker")
+    monkeypatch.setattr(child, "WORKER", "tests.validation.raising_worker")
     monkeypatch.setattr(answer, "run_chunk", raising_worker.raising)
     report = validate(ROBOTS, samples=60, **WAYS[way][0]())
     assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "verified"]
@@ -163,8 +164,8 @@ def test_what_the_machinery_itself_raises_is_every_unfinished_robots_result(
 ) -> None:
     right = Here.run
 
-    def breaks(self: Here, tasks: Sequence[Task], enter: engine.Enter) -> None:
-        right(self, [task for task in tasks if task.robot == 0], enter)
+    def breaks(self: Here, work: engine.Work, enter: engine.Enter) -> None:
+        right(self, list(work)[:1], enter)
         raise OSError("no more of anything")
 
     monkeypatch.setattr(Here, "run", breaks)
@@ -251,9 +252,9 @@ def test_an_executors_waiting_chunks_are_cancelled_on_an_interrupt() -> None:
                 raise KeyboardInterrupt
             return made[-1]
 
-    tasks = [Task(0, chunk) for chunk in chunks(campaign._subject("ur5", None, None), 100, 0)]
+    tasks = [Task(0, chunk) for chunk in chunks(subject("ur5"), 100, 0)]
     with pytest.raises(KeyboardInterrupt):
-        OnExecutor(Never()).run(tasks, lambda *_: None)
+        OnExecutor(Never()).run([tasks], lambda *_: None)
     assert [future.cancelled() for future in made] == [True, True, False]
 
 

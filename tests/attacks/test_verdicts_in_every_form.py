@@ -20,6 +20,7 @@ from urdfkin.report.markdown import as_markdown
 from urdfkin.report.terminal import print_report
 from urdfkin.validation import chains as chains_module
 from urdfkin.validation.campaign import validate
+from urdfkin.validation.standing import Standing
 from urdfkin.verify.tables import TableCheck
 
 
@@ -67,8 +68,8 @@ def _crashed(monkeypatch: pytest.MonkeyPatch) -> Document:
 
 
 def _interrupted(_: pytest.MonkeyPatch) -> Document:
-    def stop(done: int, *_: object) -> None:
-        if done == 3:
+    def stop(standing: Standing) -> None:
+        if standing.chunks_done == 3:
             raise KeyboardInterrupt
 
     return _made(["planar_two_link", "double_pendulum", "ur5"], samples=50, progress=stop)

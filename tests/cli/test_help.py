@@ -61,7 +61,7 @@ def test_every_command_has_help_with_an_example_of_itself(command: str) -> None:
     assert urdfkin(command, "-h").out == done.out
 
 
-AFTER_WORK = ("validate", "report", "compare")
+AFTER_WORK = ("validate", "report", "compare", "campaign")
 #: Serves until it is stopped; tests/view looks at what it serves.
 ENDLESS = ("view",)
 
@@ -87,6 +87,7 @@ def test_the_examples_of_validation_run_one_after_the_other(
     (tmp_path / "my.urdf").write_text(urdf_of("tree_1"))
     for name in ("results", "main", "branch"):
         assert urdfkin("validate", "ur5", "--samples", "10", "--json", f"{name}.json").code == 0
+    assert urdfkin("validate", "ur5", "--samples", "10", "--store", "nightly").code == 0
     for command in AFTER_WORK:
         run_examples(command)
 

@@ -12,7 +12,7 @@ from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 
 def _deadly(chunk: Chunk) -> ChunkResult:
     path = Path(os.environ["URDFKIN_TEST_DEATHS"])
-    if chunk.subject.source == "ur5" and (left := int(path.read_text())):
+    if chunk.subject.label == "ur5" and (left := int(path.read_text())):
         path.write_text(str(left - 1))
         os.kill(os.getpid(), signal.SIGSEGV)
     return run_chunk(chunk)

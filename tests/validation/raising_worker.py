@@ -49,7 +49,7 @@ WORDS = {
 
 def raising(chunk: Chunk) -> ChunkResult:
     """As `run_chunk`, but for one robot."""
-    if chunk.subject.source == "ur5":
+    if chunk.subject.label == "ur5":
         ERRORS[os.environ["URDFKIN_TEST_ERROR"]]()
     return run_chunk(chunk)
 

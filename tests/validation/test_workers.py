@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import os
+import pickle
+import signal
+import time
+from multiprocessing.reduction import ForkingPickler
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from urdfkin.validation import workers
+from tests.attacks.test_validation_signals import children
+from tests.validation import canned_worker
+from urdfkin.validation import answer, child, engine, memory
+from urdfkin.validation.answer import Answer
 from urdfkin.validation.campaign import validate
+from urdfkin.validation.chunk import Chunk
 from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.standing import Standing
 
 DEADLY = "ur5"
 ROBOTS = ["double_pendulum", DEADLY, "iris_simple"]
@@ -19,7 +30,7 @@ HOW: list[dict[str, Any]] = [{"jobs": 2}, {"jobs": 2, "isolate": True}, {"isolat
 @pytest.fixture
 def deaths(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Workers that die over a robot: as often as the file says."""
-    monkeypatch.setattr(workers, "WORKER", "tests.validation.deadly_worker")
+    monkeypatch.setattr(child, "WORKER", "tests.validation.deadly_worker")
     path = tmp_path / "deaths"
     monkeypatch.setenv("URDFKIN_TEST_DEATHS", str(path))
     return path
@@ -83,9 +94,9 @@ def test_what_cannot_be_read_is_reported_as_without_processes() -> None:
 @pytest.mark.slow
 def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pytest.MonkeyPatch) -> None:
     """A library's process lives on after an interrupt; what hangs in compiled code must not."""
-    monkeypatch.setattr(workers, "WORKER", "tests.validation.sleeping_worker")
+    monkeypatch.setattr(child, "WORKER", "tests.validation.sleeping_worker")
     started: list[Any] = []
-    right = workers._interpreter
+    right = child._interpreter
 
     def kept(pipe: int) -> Any:
         started.append(right(pipe))
@@ -93,7 +104,7 @@ def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pyte
             raise KeyboardInterrupt
         return started[-1]
 
-    monkeypatch.setattr(workers, "_interpreter", kept)
+    monkeypatch.setattr(child, "_interpreter", kept)
     try:
         report = validate(["ur5", "panda"], samples=0, isolate=True, jobs=2)
         assert report.interrupted
@@ -108,7 +119,7 @@ def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch
     def none(_: int) -> None:
         raise OSError(24, "Too many open files")
 
-    monkeypatch.setattr(workers, "_interpreter", none)
+    monkeypatch.setattr(child, "_interpreter", none)
     for how in HOW:
         report = validate(["ur5", "planar_two_link"], samples=60, **how)
         assert [robot.verdict for robot in report.robots] == [Verdict.NOT_VERIFIED] * 2
@@ -121,7 +132,7 @@ def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch
 def test_what_does_not_start_any_more_is_done_by_those_that_are_there(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    right, asked = workers._interpreter, 0
+    right, asked = child._interpreter, 0
 
     def one(pipe: int) -> Any:
         nonlocal asked
@@ -130,7 +141,7 @@ def test_what_does_not_start_any_more_is_done_by_those_that_are_there(
             raise OSError(24, "Too many open files")
         return right(pipe)
 
-    monkeypatch.setattr(workers, "_interpreter", one)
+    monkeypatch.setattr(child, "_interpreter", one)
     for how in HOW[:2]:
         asked = 0
         assert validate(["double_pendulum", "planar_two_link"], samples=60, **how).passed
@@ -152,8 +163,41 @@ def test_a_worker_runs_nothing_of_the_current_folder(
     monkeypatch.setattr("subprocess.Popen", started)
     monkeypatch.syspath_prepend("")
     with pytest.raises(RecordedError):
-        workers._interpreter(3)
+        child._interpreter(3)
     assert codes[0][1] == "-I"
     path = codes[0][3].partition("sys.path[:] = ")[2].partition("; from")[0]
     assert "''" not in path
     assert "site-packages" in path
+
+
+@pytest.mark.slow
+def test_workers_killed_at_random_times_change_no_number(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Twenty seeds: when, which of two, and how often; real processes, whose answers are known beforehand."""
+    robots, right = ["planar_two_link", "double_pendulum", "<robot/>", "iris_simple"], answer.answer
+
+    def remembered(chunk: Chunk) -> Answer:
+        found = right(chunk)
+        (tmp_path / canned_worker.name(bytes(ForkingPickler.dumps(chunk)))).write_bytes(pickle.dumps(found))
+        return found
+
+    monkeypatch.setattr(engine, "answer", remembered)
+    monkeypatch.setattr(memory, "share", lambda *_: None)  # it is part of a chunk, and free memory changes
+    expected = numbers(validate(robots, samples=100))
+    monkeypatch.setattr(child, "WORKER", "tests.validation.canned_worker")
+    monkeypatch.setenv("URDFKIN_TEST_ANSWERS", str(tmp_path))
+    killed = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+
+        def kill(standing: Standing, rng: np.random.Generator = rng) -> None:
+            nonlocal killed
+            # Later on a robot may be alone with its second process, whose death is its result.
+            if standing.chunks_done < 8 and rng.uniform() < 0.4:
+                time.sleep(rng.uniform(0.0, 0.02))
+                os.kill(int(rng.choice(children(os.getpid()))), signal.SIGKILL)
+                killed += 1
+
+        assert numbers(validate(robots, samples=100, jobs=2, progress=kill)) == expected
+    assert killed > 20

@@ -37,6 +37,7 @@ _AFTER: dict[str, tuple[str, str]] = {
     "screws": ("urdfkin.cli.screws", "product of exponentials: home pose and screws, checked"),
     "structure": ("urdfkin.cli.structure", "what kind of arm it is, and what can be solved in closed form"),
     "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
+    "campaign": ("urdfkin.cli.campaign", "validations kept in a folder: how far they are, merged"),
     "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),
     "explain": ("urdfkin.cli.explain", "what a finding's code means, or an equation's number"),
     "report": ("urdfkin.cli.report", "show or write the report of an earlier validation"),

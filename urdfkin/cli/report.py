@@ -1,4 +1,4 @@
-"""`urdfkin report`: render a report from the data of an earlier run."""
+"""`urdfkin report`: render a report from the data of an earlier run, or from a campaign's store."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")
-@click.argument("results", metavar="RESULTS.json", type=click.Path(path_type=Path), required=False)
+@click.argument("results", metavar="RESULTS.json|DIR", type=click.Path(path_type=Path), required=False)
+@click.option("--json", "json_", type=click.Path(path_type=Path), help="Write a store's report as data.")
 @report_options
 @click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case.")
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of the data instead.")
@@ -21,31 +22,34 @@ EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 def command(
     context: click.Context,
     results: Path | None,
+    json_: Path | None,
     html: Path | None,
     junit: Path | None,
     markdown: Path | None,
     cases: bool,
     schema: bool,
 ) -> None:
-    """Show or write the report of an earlier `urdfkin validate ... --json RESULTS.json`.
+    """Show or write the report of an earlier `urdfkin validate ... --json RESULTS.json` or `--store DIR`.
+
+    A store has one at any time: one that is not complete says so, and is reported as an interrupted run.
 
     Exit as the run did: 0 when it had verified everything, 1 for a disagreement, 3 for a robot not verified,
     130 when it was interrupted. 2: a robot could not be read, or the file cannot be used.
     """
     from urdfkin.report.document import asset, outcome_of  # noqa: PLC0415  keeps --help fast
-    from urdfkin.report.reading import read_document  # noqa: PLC0415
+    from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415
 
     if schema:
         click.echo(asset("validation-1.schema.json"), nl=False)
         return
     if results is None:
-        raise click.UsageError("name the file that `urdfkin validate ... --json FILE` wrote")
-    document = read_document(results)
-    check_writable(html, junit, markdown)
-    failed = write_reports(document, html=html, junit=junit, markdown=markdown)
+        raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of --store")
+    document = stored_document(results) if results.is_dir() else read_document(results)
+    check_writable(json_, html, junit, markdown)
+    failed = write_reports(document, json_=json_, html=html, junit=junit, markdown=markdown)
     if not failed:
-        say_written(html, junit, markdown)
-    if not (html or junit or markdown):
+        say_written(json_, html, junit, markdown)
+    if not (json_ or html or junit or markdown):
         from urdfkin.report.terminal import print_report  # noqa: PLC0415
 
         print_report(document, console(), cases=cases)

@@ -5,23 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import click
 
 from urdfkin.cli.arguments import xacro_args, xacro_option
+from urdfkin.cli.door import say
 from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.judgement import judge_all
 from urdfkin.cli.numbers import Whole
 from urdfkin.cli.output import compiling, console
+from urdfkin.cli.progress import progress
 from urdfkin.cli.reports import check_writable, report_options, say_written, write_reports
 from urdfkin.cli.stopping import stoppable
-from urdfkin.errors.printable import printable
+from urdfkin.errors import InputError
 from urdfkin.urdf.catalogue import examples
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
-    from urdfkin.validation.gathering import Progress
+    from urdfkin.validation.engine import Engine
+    from urdfkin.validation.results import ValidationReport
     from urdfkin.verify.witnesses import WitnessName
 
 EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
@@ -49,6 +52,13 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 )
 @click.option("--isolate", is_flag=True, help="Each robot in a process of its own, whose death is a result.")
 @xacro_option
+@click.option(
+    "--store", type=click.Path(path_type=Path), help="A folder that keeps every chunk; go on there."
+)
+@click.option("--retry", type=click.Choice(["failed"]), help="Compute these again, with --store.")
+@click.option("--shard", metavar="I/N", help="Only the I-th of N parts, with --store.")
+@click.option("--scheduler", metavar="ADDRESS", help="A dask scheduler's, or local:N for N workers here.")
+@click.option("--json-progress", is_flag=True, help="Progress as lines of JSON on standard error.")
 @click.option("--judge", "judged", is_flag=True, help="Say whose last digits are right, at 50 digits.")
 @click.option("--judge-samples", type=Whole(1), default=5, show_default=True, help="For --judge.")
 @click.option("--judge-moving-base", is_flag=True, help="For --judge: the root link moves, at random.")
@@ -70,6 +80,11 @@ def command(
     judge_moving_base: bool,
     isolate: bool,
     oracle: WitnessName,
+    store: Path | None,
+    retry: Literal["failed"] | None,
+    shard: str | None,
+    scheduler: str | None,
+    json_progress: bool,
     json_: Path | None,
     html: Path | None,
     junit: Path | None,
@@ -82,9 +97,20 @@ def command(
     eighth sample has rates a hundred times larger. Disagreement is given in multiples of eps * scale: 1 to
     10 is what rounding gives. Exit 0: verified. 1: a disagreement. 2: a robot that cannot be read. 3: a robot
     that was not verified. 128 and the signal's number: ended by it; what had finished is written.
+
+    With --store the same command goes on where one was ended, however it was, and `urdfkin report DIR` has
+    the report at any time.
     """
     if bool(robots) == all_:
         raise click.UsageError("name robots, or say --all for the whole catalogue")
+    if (retry or shard) and store is None:
+        raise click.UsageError("--retry and --shard go with --store DIR")
+    if scheduler and (jobs > 1 or isolate):
+        raise click.UsageError(
+            "--jobs and --isolate are for this machine's processes, --scheduler for others'"
+        )
+    if shard and (judged or json_ or html or junit or markdown):
+        raise click.UsageError("a shard has no report: merge the stores, then `urdfkin report DIR`")
     from urdfkin.report.document import Document  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.terminal import print_report  # noqa: PLC0415
     from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415
@@ -95,7 +121,7 @@ def command(
     if xacro_args() and not any(map(is_xacro, robots)):
         refuse_idle(context, ("xacro_arg",), "without a .xacro file")
     given = [_once(robot, how) if judged else robot for robot in robots or examples()]
-    with stoppable() as stop, compiling(), _progress() as progress:
+    with stoppable() as stop, compiling(), _cluster(scheduler) as on, progress(as_json=json_progress) as tell:
         report = validate(
             given,
             samples=samples,
@@ -103,17 +129,40 @@ def command(
             jobs=jobs,
             isolate=isolate,
             oracle=oracle,
-            progress=progress,
+            executor=on,
+            store=store,
+            retry=retry,
+            shard=shard,
+            progress=tell,
             **how,
         )
         if judged:
             report = judge_all(report, given, judge_samples, seed, moving_base=judge_moving_base, **how)
+    if shard:
+        _say_shard(report, shard, store)
+        context.exit(stop.exit_code(report.exit_code))
     document = cast("Document", report.as_dict())
     written = write_reports(document, json_=json_, html=html, junit=junit, markdown=markdown)
     print_report(document, console(), cases=cases)
     if not written:
         say_written(json_, html, junit, markdown)
     context.exit(stop.exit_code(report.exit_code) or written)
+
+
+@contextmanager
+def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
+    """The cluster that was asked for, with a line on where to watch it."""
+    if scheduler is None:
+        yield None
+        return
+    try:
+        from urdfkin.validation.cluster import connected  # noqa: PLC0415  an extra
+    except ImportError:
+        raise InputError(
+            "a cluster needs dask.distributed", remedy="pip install 'urdfkin[cluster]'"
+        ) from None
+    with connected(scheduler, lambda line: say(f"urdfkin: {line}", err=True)) as cluster:
+        yield cluster
 
 
 def _once(source: str, how: dict[str, Any]) -> Robot | str:
@@ -123,15 +172,16 @@ def _once(source: str, how: dict[str, Any]) -> Robot | str:
     return load(source, **how) if source == "-" else source
 
 
-@contextmanager
-def _progress() -> Iterator[Progress]:
-    """A bar on stderr where that is a terminal, nothing in a pipe."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn  # noqa: PLC0415
+def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:
+    """What a part came to; the report is of the whole."""
+    from urdfkin.report.words import counted  # noqa: PLC0415  keeps --help fast
 
-    screen = console(err=True)
-    columns = TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn()
-    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda done, total, label: bar.update(
-            task, completed=done, total=total, description=printable(label)
-        )
+    for robot in report.robots:
+        if robot.reason is not None:
+            say(f"{robot.source}: {robot.verdict}: {robot.reason}")
+    results = sum(robot.results for robot in report.robots)
+    say(
+        f"shard {shard} of {store}: {counted(len(report.robots), 'robot')}, {results:,} results compared, "
+        f"{sum(robot.failed for robot in report.robots):,} outside their bound, {report.seconds:.1f} s"
+    )
+    say("then: urdfkin campaign merge DIR STORE..., urdfkin report DIR")

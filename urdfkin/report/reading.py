@@ -38,6 +38,18 @@ def read_json(path: Path) -> object:
         raise InputError("not a JSON file", where=str(path), found=str(error)) from error
 
 
+def stored_document(folder: Path) -> Document:
+    """The document of a campaign's store, held against itself like any other: its files are evidence too.
+
+    Raises:
+        SourceError: the store cannot be read.
+        InputError: it is none, or contradicts itself.
+    """
+    from urdfkin.validation.campaign import stored  # noqa: PLC0415  only who has a store needs it
+
+    return checked(json.loads(json.dumps(stored(folder).as_dict(), allow_nan=False)), str(folder))
+
+
 def _number(word: str) -> float:
     """JSON has no infinity and no NaN, and a number too large for a double would become one."""
     number = float(word)

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 from urdfkin.errors import UrdfkinError
 from urdfkin.lint import UrdfError
-from urdfkin.validation.chunk import Chunk, ChunkResult, Subject, run_chunk
+from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait, as_data
+from urdfkin.validation.subject import Subject
 from urdfkin.verify.pinocchio import OracleError
 
 
@@ -25,12 +26,14 @@ class Failure:
         reason: In words.
         portrait: What can be told of it all the same.
         error: The traceback of an error that nobody foresaw.
+        passing: Whether it was the machinery that failed, not the robot: to be tried again, not kept.
     """
 
     verdict: Verdict
     reason: str
     portrait: Portrait = NO_PORTRAIT
     error: str | None = None
+    passing: bool = False
 
 
 #: What comes back for a chunk.

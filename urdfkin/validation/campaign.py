@@ -2,38 +2,43 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
-import hashlib
 import os
+import re
 import time
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 from urdfkin.compiled.ahead import load_kernels
-from urdfkin.dh.table import DHTable
-from urdfkin.errors import UrdfkinError
+from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.demands import switch, whole_number
-from urdfkin.loading import load
-from urdfkin.robot import Robot
-from urdfkin.urdf.origin import Origin
-from urdfkin.urdf.sources import Source, as_word, is_xacro, read_source
 from urdfkin.validation import memory
-from urdfkin.validation.answer import Failure, failure, traced, unforeseen
-from urdfkin.validation.chunk import Subject, chunks
+from urdfkin.validation.answer import Answer, Failure, failure, traced, unforeseen
+from urdfkin.validation.chunk import Cut
 from urdfkin.validation.engine import Engine, Here, OnExecutor, Task
 from urdfkin.validation.gathering import Gathering, Progress
+from urdfkin.validation.manifest import Manifest
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.results import ValidationReport
+from urdfkin.validation.store import Store, opened
+from urdfkin.validation.subject import Given, Subject, subjects
 from urdfkin.validation.workers import Processes
 from urdfkin.verify.pinocchio_module import pinocchio
 from urdfkin.verify.witnesses import PINOCCHIO, WitnessName, witness_of
 from urdfkin.verify.worst import load_kernel
 
 
+class StoreWarning(UserWarning):
+    """A file of a store that cannot be trusted, and is computed again."""
+
+
 def validate(
-    robots: Source | DHTable | Robot | Sequence[Source | DHTable | Robot],
+    robots: Given | Sequence[Given],
     *,
     samples: int = 1000,
     seed: int = 0,
@@ -43,7 +48,10 @@ def validate(
     xacro_args: Mapping[str, object] | None = None,
     oracle: WitnessName = "pinocchio",
     isolate: bool = False,
-    executor: Executor | None = None,
+    executor: Executor | Engine | None = None,
+    store: str | os.PathLike[str] | None = None,
+    retry: Literal["failed"] | None = None,
+    shard: str | None = None,
     progress: Progress | None = None,
 ) -> ValidationReport:
     """Hold every quantity of every frame and joint against Pinocchio's, in all three references.
@@ -61,7 +69,13 @@ def validate(
             alone where two of the three agree (needs the extra `mujoco`).
         isolate: Each robot is checked in a process of its own, `jobs` at a time; when one dies, that robot is
             reported as not verified with the reason, and the others go on.
-        executor: Runs the chunks instead of local processes.
+        executor: Runs the chunks instead of local processes: anything like those of `concurrent.futures`, or
+            a cluster (`urdfkin.validation.cluster.connected`).
+        store: A folder that keeps each chunk as soon as it is there: the same call goes on where one was
+            ended, however it was. `stored` makes a report of it at any time.
+        retry: "failed": what the store has of robots that could not be checked is computed again; their
+            texts may have changed.
+        shard: "2/4": only the second of four equal parts, into a store; the report tells of that part alone.
         progress: Told after each chunk.
 
     Returns:
@@ -69,8 +83,10 @@ def validate(
         whatever it raises; an interrupt ends the run and keeps what had finished.
 
     Raises:
-        InputError: a negative number of samples, a negative seed or no job; an oracle that is not installed.
+        InputError: a negative number of samples, a negative seed or no job; an oracle that is not installed;
+            a store of another campaign, or one that somebody else is at work on.
         InstallationError: Pinocchio is missing, or another project goes by its name.
+        SourceError: the store cannot be made.
 
     >>> report = validate("ur5", samples=10)
     >>> report.passed, report.robots[0].failed
@@ -78,34 +94,46 @@ def validate(
     """
     samples, seed = whole_number(samples, "samples", 0), whole_number(seed, "seed", 0)
     jobs, isolate = whole_number(jobs, "jobs", 1), switch(isolate, "isolate")
+    if (retry or shard) and store is None:
+        raise InputError("only a store has something to retry or a shard", remedy="give store=, a folder")
     many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
     pinocchio()  # before the work, not robot by robot
-    subjects, unread = _subjects(many, mimic, root_joint, xacro_args)
+    found, unread = subjects(many, mimic, root_joint, xacro_args)
     if witness_of(oracle) is not PINOCCHIO:
-        subjects = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in subjects]
+        found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
+    cut = Cut(samples)
+    gathering = Gathering(found, cut, shares(len(found), cut, shard), progress)
     most = memory.share(jobs) if executor is None else None  # an executor's machines know their own
-    tasks = [
-        Task(i, chunk) for i, subject in enumerate(subjects) for chunk in chunks(subject, samples, seed, most)
-    ]
-    gathering, interrupted, begin = Gathering(subjects, tasks, progress), False, time.perf_counter()
-    for task in tasks:
-        if task.robot in unread and task.chunk.index == 0:
-            gathering.enter(task, unread[task.robot])
-    try:
-        if isolate or any(_is_robot(subject) for i, subject in enumerate(subjects) if i not in unread):
-            load_kernels()  # once, here, so that no worker has to compile, nor any robot's seconds hold it
-            load_kernel()
-            begin = time.perf_counter()
-        engine = _engine(jobs, isolate, executor)
-        engine.run([task for task in tasks if task.robot not in unread], gathering.enter)
-    except KeyboardInterrupt:
-        interrupted = True
-    except Exception as error:  # what is there already stays
-        gathering.give_up(Failure(Verdict.NOT_VERIFIED, unforeseen(error), error=traced(error)))
+    campaign = _Campaign(found, cut, seed, most, gathering)
+    interrupted, kept, begin = False, None, time.perf_counter()
+    with contextlib.ExitStack() as stack:
+        if store is not None:
+            manifest = Manifest.of(found, samples, seed, started.isoformat(timespec="seconds"))
+            there = opened(Path(store), manifest, _warn, shard=shard, retry_failed=retry == "failed")
+            kept = stack.enter_context(there)
+        try:
+            if kept is not None:
+                campaign.use(kept)
+            for i, error in unread.items():
+                for index in gathering.missing(i):  # the first, for then it has failed
+                    campaign.enter(campaign.task(i, index), failure(found[i], error))
+            missing = [robot for i, robot in enumerate(found) if any(True for _ in gathering.missing(i))]
+            if missing and (isolate or any(map(_is_robot, missing))):
+                load_kernels()  # once, here: no worker has to compile, no robot's seconds hold it
+                load_kernel()
+                begin = time.perf_counter()
+            _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
+        except KeyboardInterrupt:
+            interrupted = True
+        except UrdfkinError as error:
+            gathering.give_up(Failure(Verdict.NOT_VERIFIED, str(error)))
+        except Exception as error:  # what is there already stays
+            gathering.give_up(Failure(Verdict.NOT_VERIFIED, unforeseen(error), error=traced(error)))
+    reports = tuple(gathering.reports())
     return ValidationReport(
-        robots=tuple(gathering.reports()),
-        asked=len(many),
+        robots=reports,
+        asked=len(reports),
         samples=samples,
         seed=seed,
         started=started.isoformat(timespec="seconds"),
@@ -123,64 +151,101 @@ def _is_robot(subject: Subject) -> bool:
     return True
 
 
-def _engine(jobs: int, isolate: bool, executor: Executor | None) -> Engine:
+def stored(folder: str | os.PathLike[str]) -> ValidationReport:
+    """The report of what a store holds, as one run would have made it; interrupted until it is complete.
+
+    Args:
+        folder: The store.
+
+    Raises:
+        SourceError, InputError: it is none.
+    """
+    store = Store.reading(Path(folder), _warn)
+    manifest, found = store.manifest, store.manifest.subjects()
+    gathering = Gathering(found, manifest.cut, shares(len(found), manifest.cut))
+    _Campaign(found, manifest.cut, manifest.seed, None, gathering).use(store)
+    reports, standing = tuple(gathering.reports()), gathering.standing()
+    return ValidationReport(
+        robots=reports,
+        asked=len(reports),
+        samples=manifest.samples,
+        seed=manifest.seed,
+        started=manifest.started,
+        seconds=sum(robot.seconds for robot in reports),
+        interrupted=standing.chunks_done < standing.chunks,
+        made_by=manifest.versions,
+    )
+
+
+@dataclass
+class _Campaign:
+    """The chunks of some robots, what is known of them and what is still to be done."""
+
+    subjects: Sequence[Subject]
+    cut: Cut
+    seed: int
+    memory: int | None
+    gathering: Gathering
+    store: Store | None = None
+
+    def task(self, robot: int, index: int) -> Task:
+        return Task(robot, self.cut.chunk(self.subjects[robot], self.seed, index, self.memory))
+
+    def use(self, store: Store) -> None:
+        """Begin with what a store has, and keep there what comes."""
+        for robot in range(len(self.subjects)):
+            for index in self.gathering.missing(robot):
+                if (found := store.answer(robot, index)) is not None:
+                    self.gathering.enter(self.task(robot, index), found, kept=True)
+        self.store = store
+
+    def work(self) -> Iterator[Iterator[Task]]:
+        """What is missing, robot by robot, made when it is asked for."""
+        return (self._tasks(robot) for robot in range(len(self.subjects)))
+
+    def _tasks(self, robot: int) -> Iterator[Task]:
+        return (self.task(robot, index) for index in self.gathering.missing(robot))
+
+    def enter(self, task: Task, found: Answer) -> None:
+        """Take an answer: what is counted was kept before."""
+        if self.store is not None and not (isinstance(found, Failure) and found.passing):
+            self.store.keep(task.robot, task.chunk.index, found)
+        self.gathering.enter(task, found)
+
+
+def shares(robots: int, cut: Cut, shard: str | None = None) -> list[range]:
+    """Which chunks of each robot belong to a part of the work; without one, all.
+
+    Parts are equal and without gaps in the order of robots and chunks, so that most robots are read once.
+
+    Raises:
+        InputError: not a part.
+
+    >>> shares(2, Cut(1000), "1/4"), shares(2, Cut(1000), "4/4")
+    ([range(0, 4), range(0, 0)], [range(0, 0), range(4, 8)])
+    """
+    part, parts = _shard(shard) if shard is not None else (1, 1)
+    size = len(cut)
+    start, stop = ((part - 1) * robots * size // parts, part * robots * size // parts)
+    found = []
+    for robot in range(robots):
+        low, high = (min(max(end - robot * size, 0), size) for end in (start, stop))
+        found.append(range(low, high) if low < high else range(0))
+    return found
+
+
+def _shard(word: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", word)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        raise InputError("a shard is i/n, the i-th of n parts", found=repr(word), remedy="1/4, ..., 4/4")
+    return int(match[1]), int(match[2])
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, StoreWarning, stacklevel=2)
+
+
+def _engine(jobs: int, isolate: bool, executor: Executor | Engine | None) -> Engine:
     if executor is not None:
-        return OnExecutor(executor)
+        return OnExecutor(executor) if isinstance(executor, Executor) else executor
     return Processes(jobs, isolate=isolate) if isolate or jobs > 1 else Here()
-
-
-def _subjects(
-    robots: Sequence[Source | DHTable | Robot],
-    mimic: bool | None,
-    root_joint: str | None,
-    xacro_args: Mapping[str, object] | None,
-) -> tuple[list[Subject], dict[int, Failure]]:
-    """The robots as plain data, and those whose text cannot be had: by their place, and why."""
-    subjects, failures = list[Subject](), dict[int, Failure]()
-    for i, robot in enumerate(robots):
-        try:
-            subjects.append(_subject(robot, mimic, root_joint, xacro_args))
-        except Exception as error:
-            subjects.append(Subject(b"", Origin(_called(robot), mimic, root_joint)))
-            failures[i] = failure(subjects[i], error)
-    return subjects, failures
-
-
-def _called(robot: Source | DHTable | Robot) -> str:
-    """What to call a robot whose text cannot be had."""
-    if isinstance(robot, str | os.PathLike):
-        return str(robot) if isinstance(robot, str) else as_word(Path(robot))
-    return f"<{type(robot).__name__}>"
-
-
-def _subject(
-    robot: Source | DHTable | Robot,
-    mimic: bool | None,
-    root_joint: str | None,
-    xacro_args: Mapping[str, object] | None = None,
-) -> Subject:
-    if isinstance(robot, DHTable):
-        robot = load(robot, mimic=mimic, root_joint=root_joint)
-    if isinstance(robot, Robot):
-        return Subject.of(robot)
-    if is_xacro(robot):
-        text = read_source(robot, xacro_args=xacro_args)  # expanded once, here
-        return Subject(text.data, Origin(text.source, mimic, root_joint, text.xacro_args))
-    source = as_word(Path(robot)) if isinstance(robot, os.PathLike) else robot
-    if isinstance(source, bytes):
-        return Subject(source, Origin("<bytes>", mimic, root_joint))
-    if isinstance(source, str) and source != "-":
-        return _word(source, mimic, root_joint)
-    text = read_source(source)  # an open file, or standard input, is read once, here
-    return Subject(text.data, Origin(text.source, mimic, root_joint))
-
-
-def _word(source: str, mimic: bool | None, root_joint: str | None) -> Subject:
-    """A path, a name or text."""
-    try:
-        text = read_source(source)
-    except UrdfkinError:
-        return Subject(source, Origin(source, mimic, root_joint))  # the chunk reports what is wrong
-    # It tells one state of a file from another, so that no worker goes on with what it read before.
-    stamp = hashlib.sha256(text.data).hexdigest()
-    return Subject(source, Origin(text.source, mimic, root_joint), stamp)

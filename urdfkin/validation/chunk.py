@@ -1,87 +1,40 @@
-"""One chunk of a validation: a robot and a run of samples that depend on the seed and the chunk alone.
+"""One chunk of a validation: a robot and a run of samples that depend on the seed and their place alone.
 
 A chunk is plain data in and plain data out, so that it can run in this process, in another or on another
 machine. Samples 0, 1, 2 of a robot are the neutral configuration and the two ends of the limits.
+
+Samples are drawn 25 at a time, each draw from its own number; a chunk holds several draws and compares them
+together, so that how many it holds changes no number, only what it costs to hand it out and to keep it.
 """
 
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from urdfkin.lint import UrdfWarning
-from urdfkin.loading import load
 from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
-from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.origin import Origin
 from urdfkin.validation import memory
-from urdfkin.validation.clock import Clock
+from urdfkin.validation.clock import Clock, total
 from urdfkin.validation.comparing import SecondWitness, tallies
 from urdfkin.validation.portrait import Portrait
+from urdfkin.validation.subject import Subject
 from urdfkin.validation.tally import Key, Tally
-from urdfkin.verify.pinocchio import Oracle, OracleError
+from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.sampling import Samples, draw
 from urdfkin.verify.witnesses import PINOCCHIO
 
-#: Samples in a chunk: small enough to spread a single robot over many workers.
-CHUNK_SAMPLES = 25
+#: Samples that are drawn together.
+DRAWN = 25
 #: How many special configurations come before the random ones.
 SPECIAL = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Subject:
-    """A robot to validate, as plain data.
-
-    Attributes:
-        source: What `load` takes: a path, a catalogue name or the URDF itself.
-        origin: Where it comes from, also where `source` is the URDF itself, and how it was asked for.
-        stamp: Differs between two states of the same file.
-    """
-
-    source: str | bytes
-    origin: Origin
-    stamp: str = ""
-
-    @classmethod
-    def of(cls, robot: Robot) -> Subject:
-        """A robot that was loaded already."""
-        source = robot.source if robot.source in catalogue() else robot.urdf.encode()
-        return cls(source, robot.origin)
-
-    @property
-    def label(self) -> str:
-        """How to call it while it is not loaded."""
-        return self.origin.source
-
-    def read(self) -> Robot:
-        """The robot; its warnings are in its portrait."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UrdfWarning)
-            robot = load(
-                self.source,
-                mimic=self.origin.mimic,
-                root_joint=self.origin.root_joint,
-                oracle=self.origin.oracle or PINOCCHIO.name,
-            )
-        robot.verifier.origin = self.origin  # what was read here may be the text of a file
-        return robot
-
-    def load(self) -> Robot:
-        """The robot, to be checked.
-
-        Raises:
-            OracleError: a finding says that Pinocchio refuses it or reads another robot.
-        """
-        robot = self.read()
-        if robot.verifier.unverifiable is not None:
-            raise OracleError(robot.verifier.unverifiable, where=self.label)
-        return robot
+#: A robot has so many chunks, that several workers find work in it,
+_CHUNKS = 8
+#: or more, of so many draws: a second's work on a usual robot, some kilobytes of results.
+_DRAWS = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +43,9 @@ class Chunk:
 
     Attributes:
         subject: The robot.
-        seed: What samples are drawn from, with the index.
+        seed: What samples are drawn from, with the number of the draw.
         index: The chunk's place among the robot's.
+        first: Its first draw.
         samples: Random configurations.
         memory: Bytes that the robot may take where it is run; None: half of what is free there.
     """
@@ -99,42 +53,98 @@ class Chunk:
     subject: Subject
     seed: int
     index: int
+    first: int
     samples: int
     memory: int | None = field(default=None, compare=False)
 
     @property
     def configurations(self) -> int:
         """How many samples it has, the special ones included."""
-        return self.samples + (SPECIAL if self.index == 0 else 0)
+        return self.samples + (SPECIAL if self.first == 0 else 0)
 
     @property
     def first_sample(self) -> int:
         """The number of the chunk's first sample."""
-        return 0 if self.index == 0 else SPECIAL + self.index * CHUNK_SAMPLES
+        return 0 if self.first == 0 else SPECIAL + self.first * DRAWN
 
     def draw(self, tree: KinematicTree) -> Samples:
-        """The samples; the same for every machine and every number of workers."""
-        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.index,)))
-        return draw(tree, self.samples, rng, with_special=self.index == 0)
+        """The samples; the same for every machine, every number of workers and every cut."""
+        drawn = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAWN)))]
+        return Samples(*(np.concatenate([getattr(x, name) for x in drawn]) for name in ("q", "v", "a")))
+
+    def _draw(self, tree: KinematicTree, i: int) -> Samples:
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.first + i,)))
+        samples = min(DRAWN, self.samples - i * DRAWN)
+        return draw(tree, samples, rng, with_special=self.first + i == 0)
 
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """What a chunk found, about whom, and how long it took; the first chunk also says what it is."""
+    """What was found, about whom, and how long it took; the first chunk also says what the robot is.
+
+    Results add up: those of neighbouring chunks to that of both.
+    """
 
     name: str
     joints: tuple[str, ...]
     frames: tuple[str, ...]
     tallies: dict[Key, Tally]
+    samples: int
     seconds: float
     clock: Clock
     portrait: Portrait | None
 
+    def __add__(self, other: ChunkResult) -> ChunkResult:
+        return ChunkResult(
+            name=self.name,
+            joints=self.joints,
+            frames=self.frames,
+            tallies={key: tally + other.tallies[key] for key, tally in self.tallies.items()},
+            samples=self.samples + other.samples,
+            seconds=self.seconds + other.seconds,
+            clock=total((self.clock, other.clock)),
+            portrait=self.portrait or other.portrait,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """How the samples of each robot are cut into chunks: by their number alone, whoever runs them.
+
+    >>> len(Cut(1000)), len(Cut(10_000)), len(Cut(1_000_000)), len(Cut(0))
+    (8, 10, 1000, 1)
+    """
+
+    samples: int
+
+    @property
+    def _draws(self) -> int:
+        """Of a chunk."""
+        return min(_DRAWS, max(1, -(-self.samples // DRAWN) // _CHUNKS))
+
+    def __len__(self) -> int:
+        """Chunks of a robot; at least one, for the special configurations."""
+        return max(1, -(-self.samples // (self._draws * DRAWN)))
+
+    def chunk(self, subject: Subject, seed: int, index: int, most: int | None = None) -> Chunk:
+        """One of them, for a robot that may take so many bytes."""
+        first = index * self._draws
+        samples = min(self._draws * DRAWN, self.samples - first * DRAWN)
+        return Chunk(subject, seed, index, first, samples, most)
+
+    def configurations(self, chunks: range) -> int:
+        """How many samples a run of chunks has."""
+        if not chunks:
+            return 0
+        size = self._draws * DRAWN
+        random = min(self.samples, chunks.stop * size) - chunks.start * size
+        return random + (SPECIAL if chunks.start == 0 else 0)
+
 
 def chunks(subject: Subject, samples: int, seed: int, most: int | None = None) -> Iterator[Chunk]:
-    """The chunks of one robot; at least one, for the special configurations."""
-    for index in range(max(1, -(-samples // CHUNK_SAMPLES))):
-        yield Chunk(subject, seed, index, min(CHUNK_SAMPLES, samples - index * CHUNK_SAMPLES), most)
+    """The chunks of one robot."""
+    cut = Cut(samples)
+    return (cut.chunk(subject, seed, index, most) for index in range(len(cut)))
 
 
 #: The robot that was checked last. The chunks of a robot come one after another; a worker need not read it
@@ -148,7 +158,7 @@ def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondWitness | None]:
     _kept.clear()
     robot = chunk.subject.load()
     most = memory.share() if chunk.memory is None else chunk.memory
-    memory.demand(robot.tree, CHUNK_SAMPLES + SPECIAL, most)
+    memory.demand(robot.tree, chunk.samples + SPECIAL, most)  # no chunk of it is larger than its first
     second = None
     if (by := robot.verifier.witness) is not PINOCCHIO:
         second = SecondWitness(by, robot.verifier.oracle(by=by))
@@ -171,6 +181,7 @@ def run_chunk(chunk: Chunk) -> ChunkResult:
         joints=robot.joint_names,
         frames=robot.all_frames,
         tallies=found,
+        samples=chunk.configurations,
         seconds=seconds,
         clock=clock,
         portrait=portrait,

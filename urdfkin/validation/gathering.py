@@ -1,26 +1,30 @@
 """What has come back of a run, and the report that it makes of each robot.
 
 Whatever was asked for is reported on: a robot of which nothing came back, or not everything, is not verified.
+Results are added up as they come, so that memory does not grow with samples: neighbours to runs of chunks, in
+the order of chunks whatever the order in which they come.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import reduce
+from operator import add
 
 from urdfkin.validation.answer import Answer, Failure
-from urdfkin.validation.chunk import ChunkResult, Subject
-from urdfkin.validation.clock import total
+from urdfkin.validation.chunk import ChunkResult, Cut
 from urdfkin.validation.engine import Task
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
 from urdfkin.validation.results import RobotReport
+from urdfkin.validation.standing import Standing
+from urdfkin.validation.subject import Subject
 from urdfkin.validation.tally import Key, Tally
 from urdfkin.validation.three_sides import plus
 from urdfkin.verify.witnesses import WITNESSES
 
-#: Called after each chunk with (chunks done, chunks in all, the robot's source).
-Progress = Callable[[int, int, str], None]
+#: Called after each chunk.
+Progress = Callable[[Standing], None]
 
 
 class Gathering:
@@ -28,68 +32,134 @@ class Gathering:
 
     Args:
         subjects: The robots.
-        tasks: All chunks.
+        cut: Their chunks.
+        parts: Which of its chunks each robot shall have here.
         progress: Told after each answer.
     """
 
-    def __init__(self, subjects: Sequence[Subject], tasks: Sequence[Task], progress: Progress | None) -> None:
-        self._subjects, self._progress = subjects, progress
-        self._samples: list[dict[int, int]] = [{} for _ in subjects]
-        for task in tasks:
-            self._samples[task.robot][task.chunk.index] = task.chunk.configurations
-        self._results: list[dict[int, ChunkResult]] = [{} for _ in subjects]
-        self._failures: list[dict[int, Failure]] = [{} for _ in subjects]
+    def __init__(
+        self, subjects: Sequence[Subject], cut: Cut, parts: Sequence[range], progress: Progress | None = None
+    ) -> None:
+        self._subjects, self._cut, self._progress = subjects, cut, progress
+        self._robots = [_Robot(part) for part in parts]
+        self._chunks = sum(map(len, parts))
+        self._chunks_done = self._kept = self._over = self._failures = 0
 
-    def enter(self, task: Task, found: Answer) -> None:
-        """Take an answer."""
-        if isinstance(found, Failure):
-            self._failures[task.robot][task.chunk.index] = found
-        else:
-            self._results[task.robot][task.chunk.index] = found
+    def enter(self, task: Task, found: Answer, *, kept: bool = False) -> None:
+        """Take an answer; one that was kept from an earlier run counts as none of this one's work."""
+        robot = self._robots[task.robot]
+        was_over, had_failed, before = robot.over, robot.has_failed, robot.done
+        robot.enter(task.chunk.index, found)
+        self._chunks_done += robot.done - before
+        self._kept += kept * (robot.done - before)
+        self._over += robot.over and not was_over
+        self._failures += robot.has_failed and not had_failed
         if self._progress is not None:
-            done = sum(self._done(i) for i in range(len(self._subjects)))
-            self._progress(done, sum(map(len, self._samples)), self._subjects[task.robot].label)
+            self._progress(self.standing(self._subjects[task.robot].label))
 
-    def _done(self, robot: int) -> int:
-        """How many of a robot's chunks need no more waiting for."""
-        return len(self._samples[robot]) if self._failures[robot] else len(self._results[robot])
+    def standing(self, label: str = "") -> Standing:
+        """How far it has come, with the robot in hand."""
+        return Standing(
+            robots_done=self._over,
+            robots=sum(bool(robot.part) for robot in self._robots),
+            chunks_done=self._chunks_done,
+            chunks=self._chunks,
+            chunks_kept=self._kept,
+            failures=self._failures,
+            label=label,
+        )
+
+    def missing(self, robot: int) -> Iterator[int]:
+        """The chunks of a robot that have no answer, until it fails."""
+        known = self._robots[robot]
+        for index in known.part:
+            if known.failures:
+                return
+            if index not in known:
+                yield index
 
     def give_up(self, found: Failure) -> None:
         """The answer for every robot that has not all of its own."""
-        for i, samples in enumerate(self._samples):
-            if self._done(i) < len(samples):
-                self._failures[i][len(samples)] = found
+        for robot in self._robots:
+            if not robot.over:
+                robot.failures[len(self._cut)] = found
 
     def reports(self) -> Iterator[RobotReport]:
-        """A report for each robot, in the order asked for."""
-        return (self._report(i) for i in range(len(self._subjects)))
+        """A report for each robot of which something was to be done, in the order asked for."""
+        for subject, robot in zip(self._subjects, self._robots, strict=True):
+            if robot.part:
+                yield robot.report(subject, self._cut.configurations(robot.part))
 
-    def _report(self, i: int) -> RobotReport:
-        results = [self._results[i][index] for index in sorted(self._results[i])]
-        failures = self._failures[i]
-        failure = failures[min(failures)] if failures else None
-        tallies: dict[Key, Tally] = {}
-        for result in results:
-            for key, tally in result.tallies.items():
-                tallies[key] = tallies[key] + tally if key in tallies else tally
-        portrait = next((result.portrait for result in results if result.portrait), NO_PORTRAIT)
+
+class _Robot:
+    """The answers for one robot."""
+
+    def __init__(self, part: range) -> None:
+        self.part = part
+        self.failures: dict[int, Failure] = {}
+        self._runs: list[tuple[range, ChunkResult]] = []
+        self._has_disagreed = False
+
+    def enter(self, index: int, found: Answer) -> None:
+        if isinstance(found, Failure):
+            self.failures[index] = found
+        else:
+            self._has_disagreed = self._has_disagreed or any(_outside(found.tallies))
+            self._add(range(index, index + 1), found)
+
+    def _add(self, chunks: range, found: ChunkResult) -> None:
+        """Join it to the runs that end where it begins, or begin where it ends."""
+        at = next((i for i, (run, _) in enumerate(self._runs) if run.start > chunks.start), len(self._runs))
+        if at and self._runs[at - 1][0].stop == chunks.start:
+            at -= 1
+            before, result = self._runs.pop(at)
+            chunks, found = range(before.start, chunks.stop), result + found
+        if at < len(self._runs) and self._runs[at][0].start == chunks.stop:
+            after, result = self._runs.pop(at)
+            chunks, found = range(chunks.start, after.stop), found + result
+        self._runs.insert(at, (chunks, found))
+
+    def __contains__(self, index: int) -> bool:
+        return index in self.failures or any(index in run for run, _ in self._runs)
+
+    @property
+    def has_failed(self) -> bool:
+        return self._has_disagreed or bool(self.failures)
+
+    @property
+    def done(self) -> int:
+        """How many of its chunks need no more waiting for."""
+        return len(self.part) if self.failures else sum(len(run) for run, _ in self._runs)
+
+    @property
+    def over(self) -> bool:
+        return self.done == len(self.part)
+
+    def report(self, subject: Subject, wanted: int) -> RobotReport:
+        # What others found after the chunk that failed is left out: it depends on who was how fast.
+        last = min(self.failures, default=self.part.stop)
+        failure = self.failures.get(last)
+        results = [result for run, result in self._runs if run.start < last]
+        found = reduce(add, results) if results else None
+        tallies = found.tallies if found else {}
+        portrait = (found.portrait if found else None) or NO_PORTRAIT
         if failure is not None and portrait is NO_PORTRAIT:
             portrait = failure.portrait
-        subject, samples = self._subjects[i], sum(self._samples[i][index] for index in self._results[i])
-        verdict, reasons = _verdict(tallies, portrait, failure, samples, sum(self._samples[i].values()))
-        known = results[0].name if results else portrait.model["name"] if portrait.model else subject.label
+        samples = found.samples if found else 0
+        verdict, reasons = _verdict(tallies, portrait, failure, samples, wanted)
+        known = found.name if found else portrait.model["name"] if portrait.model else subject.label
         return RobotReport(
             origin=subject.origin,
             name=known,
             verdict=verdict,
             reason="; ".join(reasons) or None,
-            joints=results[0].joints if results else (),
-            frames=results[0].frames if results else (),
+            joints=found.joints if found else (),
+            frames=found.frames if found else (),
             tallies=tallies,
             samples=samples,
-            seconds=sum(result.seconds for result in results),
+            seconds=found.seconds if found else 0.0,
             portrait=portrait,
-            clock=total(result.clock for result in results) if results else None,
+            clock=found.clock if found else None,
             error=failure.error if failure else None,
         )
 

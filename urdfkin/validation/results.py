@@ -11,7 +11,6 @@ import shlex
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.urdf.catalogue import examples
@@ -19,6 +18,7 @@ from urdfkin.urdf.origin import Origin
 from urdfkin.validation.clock import Clock
 from urdfkin.validation.outcome import Outcome, Verdict, outcome
 from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
+from urdfkin.validation.provenance import version
 from urdfkin.validation.tally import HISTOGRAM_EDGES, Key, Tally, WorstCase
 from urdfkin.verify.pinocchio_module import version as pinocchio_version
 from urdfkin.verify.quantities import QUANTITIES
@@ -171,6 +171,7 @@ class ValidationReport:
         started: When, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run was stopped; what had finished is kept.
+        made_by: What computed and what checked, where it was not what is installed now.
         judgements: The true errors of both sides, where the judge was asked for: one for each robot that was
             compared, None where it could not be had.
     """
@@ -182,6 +183,7 @@ class ValidationReport:
     started: str
     seconds: float
     interrupted: bool = False
+    made_by: dict[str, str] | None = None
     judgements: tuple[Judgement | None, ...] = ()
 
     @property
@@ -216,7 +218,7 @@ class ValidationReport:
         """The JSON document."""
         return {
             "schema": SCHEMA,
-            "versions": versions(robot.origin.oracle for robot in self.robots),
+            "versions": self.made_by or versions(robot.origin.oracle for robot in self.robots),
             "started": self.started,
             "seconds": round(self.seconds, 3),
             "seed": self.seed,
@@ -261,12 +263,5 @@ def versions(witnesses: Iterable[str | None] = ()) -> dict[str, str]:
     """What computed and what checked, second witnesses included."""
     packages = ["urdfkin", "numpy", "numba", "yourdfpy", "example-robot-data"]
     packages += sorted({WITNESSES[name].package for name in witnesses if name in WITNESSES})
-    found = {package: _version(package) for package in packages}
+    found = {package: version(package) for package in packages}
     return {"python": platform.python_version(), "pin": pinocchio_version()} | found
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "a checkout" if package == "urdfkin" else "not installed"

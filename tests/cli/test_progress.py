@@ -1,0 +1,89 @@
+"""Progress says what is done, how fast, how long still and what failed; in lines where nobody watches."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.cli.running import urdfkin
+from urdfkin.cli import progress
+from urdfkin.cli.progress import Pace, line
+from urdfkin.validation.standing import Standing
+
+STANDING = Standing(
+    robots_done=2, robots=68, chunks_done=30, chunks=544, chunks_kept=10, failures=0, label="panda"
+)
+
+
+class Clock:
+    """Stands where it is put."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_what_was_kept_from_before_makes_nobody_fast() -> None:
+    clock = Clock()
+    pace = Pace(clock)
+    assert pace.of(replace(STANDING, chunks_done=10)) == (None, None)
+    clock.now += 5.0
+    assert pace.of(STANDING) == (4.0, 128.5)
+    assert line(STANDING, pace) == (
+        "2 of 68 robots, 30 of 544 chunks (10 from before); 4 chunks/s, 2 min 8 s left, none failed; panda"
+    )
+    assert "3 failed" in line(replace(STANDING, failures=3), pace)
+
+
+def test_programs_are_told_in_json_from_the_first_to_the_last_chunk() -> None:
+    done = urdfkin("validate", "planar_two_link", "nosuch", "--samples", "50", "--json-progress")
+    lines = [json.loads(text) for text in done.err.splitlines() if text.startswith("{")]
+    assert lines[-1]["chunks_done"] == lines[-1]["chunks"] == 4
+    assert (lines[-1]["robots_done"], lines[-1]["failures"]) == (2, 1)
+    assert lines[-1]["seconds_left"] == 0.0
+    assert set(lines[0]) == {*STANDING.__slots__, "chunks_per_second", "seconds_left"}
+
+
+def test_a_log_gets_a_line_now_and_then_and_a_short_run_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "chunks" not in urdfkin("validate", "planar_two_link", "--samples", "50").err
+    monkeypatch.setattr(progress, "_LINES", 0.0)
+    done = urdfkin("validate", "planar_two_link", "--samples", "50")
+    assert "urdfkin: 1 of 1 robots, 2 of 2 chunks; " in done.err
+    assert done.err.endswith("left, none failed; planar_two_link\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--retry", "failed"], "go with --store"),
+        (["--shard", "1/2"], "go with --store"),
+        (["--store", "s", "--shard", "1/2", "--json", "x"], "a shard has no report"),
+        (["--store", "s", "--shard", "3/2"], "the i-th of n parts"),
+        (["--scheduler", "local:2", "--jobs", "2"], "--jobs and --isolate are for"),
+        (["--scheduler", "local:none"], "starts N workers"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = urdfkin("validate", "planar_two_link", "--samples", "0", *words)
+    assert done.code == 2
+    assert said in done.err
+
+
+def test_a_shard_says_what_it_came_to_and_what_comes_next(tmp_path: Path) -> None:
+    where = str(tmp_path / "s")
+    words = ("validate", "planar_two_link", "double_pendulum", "--samples", "0", "--store", where)
+    done = urdfkin(*words, "--shard", "2/2")
+    assert done.code == 0
+    assert f"shard 2/2 of {where}: 1 robot, " in done.text
+    assert "then: urdfkin campaign merge" in done.text
+    assert urdfkin("report", where).code == 130
+    assert urdfkin(*words, "--shard", "1/2").code == 0
+    assert urdfkin("report", where).code == 0

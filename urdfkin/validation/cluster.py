@@ -1,0 +1,264 @@
+"""Chunks on the workers of a dask.distributed cluster (the extra `urdfkin[cluster]`), which come and go."""
+
+from __future__ import annotations
+
+import logging
+import pickle
+import subprocess
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from importlib import metadata
+from itertools import chain
+from typing import Any
+
+from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
+
+from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.system.interpreter import own_python
+from urdfkin.urdf.origin import Origin
+from urdfkin.validation import remote
+from urdfkin.validation.answer import Answer, Failure, failure
+from urdfkin.validation.engine import DIED_TWICE, Enter, Task, Work, died, lost
+from urdfkin.validation.provenance import provenance, version
+from urdfkin.validation.subject import Subject
+
+#: Chunks in flight: so many for each thread of the workers, that none waits for the next, and a few more.
+_FOR_EACH, _MORE = 2, 4
+#: How often a chunk is sent again whose worker was lost. Its robot is never to blame: that is the processes'.
+_TRIES = 20
+#: Seconds between two counts of the workers.
+_COUNT = 1.0
+#: Seconds that workers of our own may take to start, and to end.
+_START, _END = 120.0, 10.0
+#: What the scheduler must have as we do, if it has it.
+_COMPARED = ("urdfkin", "pin")
+_NOBODY = Subject(b"", Origin(""))
+
+
+class ClusterError(UrdfkinError, RuntimeError):
+    """A cluster that cannot be used, or that was lost."""
+
+
+@contextmanager
+def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> Iterator[Cluster]:
+    """An engine on a cluster, for `validate(executor=...)`.
+
+    Args:
+        scheduler: The address of a running scheduler, `tcp://host:8786`; or `local:N`, for N workers here
+            that end with it.
+        tell: Told where to watch it.
+
+    Raises:
+        ClusterError: nobody answers there, or the versions of urdfkin or Pinocchio differ.
+        InputError: `local:N` without a number.
+    """
+    with _client(scheduler) as client:
+        _demand_same(client)
+        threads = client.nthreads()
+        tell(f"{len(threads)} workers; dashboard: {client.dashboard_link}")
+        yield Cluster(client)
+
+
+@contextmanager
+def _client(scheduler: str) -> Iterator[Client]:
+    kind, _, number = scheduler.partition(":")
+    if kind != "local":
+        try:
+            client = Client(scheduler, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise ClusterError(
+                "no scheduler answers", where=scheduler, found=str(error), remedy="start one: dask scheduler"
+            ) from error
+        with client:
+            yield client
+        return
+    if not number.isdecimal() or not int(number):
+        raise InputError("local:N starts N workers", found=repr(scheduler), remedy="local:2")
+    with (
+        LocalCluster(
+            n_workers=0, processes=True, dashboard_address="127.0.0.1:0", silence_logs=logging.ERROR
+        ) as cluster,
+        _workers(cluster.scheduler_address, int(number)),
+        Client(cluster, set_as_default=False) as client,
+    ):
+        try:
+            client.wait_for_workers(int(number), timeout=_START)
+        except TimeoutError as error:
+            raise ClusterError("the workers did not start", where=scheduler, found=str(error)) from error
+        yield client
+
+
+@contextmanager
+def _workers(address: str, number: int) -> Iterator[None]:
+    """Workers that run nothing from the current folder or the main module, and end with their scheduler.
+
+    Dask would start them by multiprocessing, which imports the main module again: scripts would need a guard.
+    """
+    command = own_python("from distributed.cli.dask_worker import main; main()")
+    with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
+        options = ["--nthreads", "1", "--no-dashboard", "--local-directory", scratch]
+        processes = [
+            subprocess.Popen(
+                [*command, address, *options],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                process_group=0,  # an interrupt by the terminal is for the client, which keeps what is there
+            )
+            for _ in range(number)
+        ]
+        try:
+            yield
+        finally:
+            for process in processes:
+                process.terminate()
+            for process in processes:
+                try:
+                    process.wait(_END)
+                except subprocess.TimeoutExpired:
+                    process.kill()
+                    process.wait()
+
+
+def _demand_same(client: Client) -> None:
+    """Refuse a cluster that would compute something else, before anything is sent."""
+    for worker, found in client.run(remote.computes, on_error="return").items():
+        if isinstance(found, BaseException):
+            raise ClusterError(
+                "a worker that cannot run urdfkin", where=worker, found=str(found),
+                remedy=f"install urdfkin {version('urdfkin')} there",
+            )  # fmt: skip
+        _demand_code(worker, found)
+    for name in _COMPARED:
+        try:
+            found = client.run_on_scheduler(metadata.version, name)
+        except Exception:  # it computes nothing, and need not have it
+            continue
+        if found != version(name) and version(name) != "a checkout":
+            _refuse("scheduler", [f"{name} {found} there and {version(name)} here"])
+
+
+def _demand_code(worker: str, found: dict[str, str]) -> None:
+    mine = provenance()
+    said = [
+        f"{k} {found.get(k, 'none')[:12]} there and {mine[k][:12]} here"
+        for k in mine
+        if found.get(k) != mine[k]
+    ]
+    if said:
+        _refuse(worker, said)
+
+
+def _refuse(where: str, said: list[str]) -> None:
+    raise ClusterError(
+        "another version computes there", where=where, found=", ".join(said),
+        remedy="install the same versions everywhere; numbers of different ones are not mixed",
+    )  # fmt: skip
+
+
+@dataclass(slots=True)
+class _Flight:
+    task: Task
+    tries: int = 1
+
+
+class Cluster:
+    """An engine: as many chunks in flight as the workers can take, whatever workers there are."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._flying: dict[Future[Any], _Flight] = {}
+        self._robots: dict[int, Future[bytes]] = {}
+        self._in_use = Counter[int]()
+        self._room, self._counted = _MORE, float("-inf")
+
+    def run(self, work: Work, enter: Enter) -> None:
+        """Run the tasks.
+
+        Raises:
+            ClusterError: the scheduler is lost, or a worker came that computes something else.
+        """
+        waiting, failed = chain.from_iterable(work), set[int]()
+        landed = as_completed(loop=self._client.loop)
+        try:
+            while True:
+                while len(self._flying) < self._count() and (task := next(waiting, None)) is not None:
+                    if task.robot in failed:
+                        continue
+                    try:
+                        landed.add(self._send(_Flight(task)))
+                    except (UrdfkinError, OSError) as error:  # its text cannot be had
+                        failed.add(task.robot)
+                        enter(task, failure(task.chunk.subject, error))
+                if not self._flying:
+                    return
+                future = next(landed)
+                flight = self._flying.pop(future)
+                found = self._found(future, flight)
+                if found is None:
+                    landed.add(self._send(_Flight(flight.task, flight.tries + 1)))
+                    self._forget(flight.task.robot)
+                    continue
+                if isinstance(found, Failure):
+                    failed.add(flight.task.robot)
+                enter(flight.task, found)
+                self._forget(flight.task.robot)
+        finally:
+            if self._client.status == "running":
+                self._client.cancel(list(self._flying))
+            self._flying.clear()
+            self._robots.clear()
+
+    def _count(self) -> int:
+        """How many chunks may be in flight, for the workers that there are now."""
+        if time.monotonic() - self._counted > _COUNT and self._client.status == "running":
+            threads = sum(self._client.nthreads().values())
+            self._room, self._counted = _FOR_EACH * threads + _MORE, time.monotonic()
+        return self._room
+
+    def _send(self, flight: _Flight) -> Future[Any]:
+        task = flight.task
+        if (robot := self._robots.get(task.robot)) is None:
+            data = pickle.dumps(task.chunk.subject.carried())
+            robot = self._robots[task.robot] = self._client.submit(remote.hold, data, pure=False)
+        chunk = pickle.dumps(replace(task.chunk, subject=_NOBODY))
+        future = self._client.submit(remote.run, robot, chunk, provenance(), pure=False)
+        self._flying[future] = flight
+        self._in_use[task.robot] += 1
+        return future
+
+    def _forget(self, robot: int) -> None:
+        """Have a robot forgotten of which nothing is in flight; it would be sent again."""
+        self._in_use[robot] -= 1
+        if not self._in_use[robot]:
+            del self._in_use[robot]
+            self._robots.pop(robot, None)
+
+    def _found(self, future: Future[Any], flight: _Flight) -> Answer | None:
+        """The answer; None: to be sent again."""
+        if future.status == "finished":
+            return self._answer(future.result(), flight.task)
+        if self._client.status != "running":
+            raise ClusterError(
+                "the scheduler is lost",
+                where=str(self._client.scheduler.address if self._client.scheduler else "the cluster"),
+                remedy="what a store holds stays; start it again and give the same command to go on",
+            )
+        error = future.exception() if future.status == "error" else None
+        if flight.tries < _TRIES and (error is None or isinstance(error, KilledWorker)):
+            return None
+        return lost(
+            "the cluster lost it", error if isinstance(error, Exception) else RuntimeError(future.status)
+        )
+
+    def _answer(self, found: remote.Found, task: Task) -> Answer:
+        if found[0] == "died":
+            return died(task.chunk.subject, DIED_TWICE, found[1])
+        if found[0] == "other code":
+            _demand_code("a worker", found[1])
+        answer: Answer = pickle.loads(found[1])  # type: ignore[arg-type]
+        return answer

@@ -1,0 +1,39 @@
+"""What the numbers of a validation depend on besides the robots: our own code, and the libraries."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+#: What only shows results, and may change between two runs of a campaign.
+_SHOWING = ("cli", "motion", "report", "view")
+#: Libraries that compute or read.
+LIBRARIES = ("urdfkin", "pin", "numpy", "numba", "llvmlite", "yourdfpy", "mujoco")
+
+
+@cache
+def provenance() -> dict[str, str]:
+    """Versions, and digests of urdfkin's own files: of all that compute, and of the equations."""
+    equations = hashlib.sha256((_PACKAGE / "kinematics" / "equations.py").read_bytes()).hexdigest()
+    return {name: version(name) for name in LIBRARIES} | {"code": _code(), "equations": equations}
+
+
+def version(package: str) -> str:
+    """The version of an installed package; in words where there is none."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "a checkout" if package == "urdfkin" else "not installed"
+
+
+def _code() -> str:
+    digest = hashlib.sha256()
+    for path in sorted(_PACKAGE.rglob("*")):
+        place = path.relative_to(_PACKAGE)
+        if path.suffix in (".py", ".toml", ".json") and place.parts[0] not in _SHOWING:
+            content = path.read_bytes()
+            digest.update(f"{place.as_posix()}\0{len(content)}\0".encode() + content)
+    return digest.hexdigest()
