@@ -14,7 +14,7 @@ from urdfkin.cli import cli
 
 ROOT = Path(__file__).parents[1]
 PAGES = (
-    *("docs/reports.md", "docs/ci.md", "docs/dh-at-work.md", "docs/accelerations.md"),
+    *("docs/reports.md", "docs/ci.md", "docs/campaigns.md", "docs/dh-at-work.md", "docs/accelerations.md"),
     *("docs/examples/robots.yml", "README.md"),
 )
 
@@ -63,7 +63,9 @@ def test_the_pages_have_commands_to_understand() -> None:
     assert len(commands()) >= 12
 
 
-@pytest.mark.parametrize("page", ["docs/reports.md", "docs/ci.md", "docs/performance.md"])
+@pytest.mark.parametrize(
+    "page", ["docs/reports.md", "docs/ci.md", "docs/campaigns.md", "docs/performance.md"]
+)
 def test_links_lead_to_files_and_headings(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")
     for target in re.findall(r"\]\(([^)]+)\)", text):
