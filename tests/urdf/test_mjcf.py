@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 import warnings
 from pathlib import Path
 
@@ -216,6 +217,14 @@ def test_a_slip_in_the_reading_is_found_when_it_is_loaded(
 def test_what_cannot_be_read_is_one_clear_error(text: str, what: str) -> None:
     with pytest.raises(InputError, match=what):
         loaded(text)
+
+
+@pytest.mark.parametrize("root", ["robot", "mujoco"])
+def test_comments_before_the_root_take_no_longer_than_they_are_long(root: str) -> None:
+    began = time.process_time()
+    assert is_mjcf("<?xml?>" + "<!-- x --> <?y z?> " * 20_000 + f"<{root}/>") is (root == "mujoco")
+    assert not is_mjcf("<!--" + "<!-- -- " * 20_000)
+    assert time.process_time() - began < 1.0
 
 
 def test_what_is_mjcf_is_told_by_its_root(tmp_path: Path) -> None:

@@ -29,7 +29,8 @@ from urdfkin.urdf.mujoco import library
 
 #: A sliding joint that the file does not bound: a URDF must say something. A kilometre either way.
 UNBOUNDED = 1000.0
-_ROOT = re.compile(r"\s*(?:<\?.*?\?>\s*|<!--.*?-->\s*|<!DOCTYPE[^>]*>\s*)*<mujoco[\s/>]", re.DOTALL)
+#: Nothing that matched is tried another way: a text with many comments takes no longer than it is long.
+_ROOT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _ENDINGS = (".xml", ".mjcf")
 #: How much of a file is looked at to see what it is.
 _HEAD = 65_536
