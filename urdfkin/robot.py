@@ -764,6 +764,7 @@ class Robot:
         from urdfkin.export.code import code_of  # noqa: PLC0415  loads mpmath
 
         frame = choice(frame, self.tip_frame, "frame")
+        name = None if name is None else word(name, "name")
         code = code_of(self.verifier, self.plan, frame, quantities, reference, name=name, verify=verify)
         return write(code, word(to, "to"))
 
@@ -837,6 +838,10 @@ class Robot:
             >>> urdfkin.load("ur5").dh("tool0", "base", snap=1e-6).rows[3].d
             0.10915
         """
+        if not isinstance(like, DHTable | None):
+            raise InputError(
+                "like is a table", found=shown(like), remedy="read_table(FILE) of urdfkin.dh makes one"
+            )
         table = dh_table(
             self.tree,
             choice(tip, self.tip_frame, "tip"),

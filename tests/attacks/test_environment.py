@@ -153,7 +153,7 @@ def test_numba_told_not_to_compile_is_no_matter(cached: bool, tmp_path: Path) ->
 LONG = {"a name": "x" * 300 + ".urdf", "a path": "x/" * 3000 + "arm.urdf", "a word": "x" * 70_000}
 WITH_FILES = (
     "info {}", "check {}", "validate {}", "dh {}", "dh ur5 --compare {}", "placement ur5 --q @{}",
-    "placement ur5 -o {}", "report {}", "compare {} {}", "plot ur5 --trajectory {} -o x.svg",
+    "placement ur5 -o {} --format csv", "report {}", "compare {} {}", "plot ur5 --trajectory {} -o x.svg",
     "validate ur5 --json {}",
 )  # fmt: skip
 

@@ -19,6 +19,7 @@ from urdfkin.cli import commands
 from urdfkin.cli.door import Door
 from urdfkin.cli.screws import FORMS as SCREWS
 from urdfkin.dh.export import FORMATS
+from urdfkin.export import LANGUAGES
 
 #: A file may be called so.
 FILE = "\x1b[31m\n::error::forged\u202e ##vso[x]"
@@ -40,6 +41,7 @@ ROBOT = {
     ],
     "screws": [["--no-mimic", "--format", form] for form in SCREWS] + [["--base", FILE]],
     "structure": [[], ["--json"], ["--opw", "1"]],
+    "export": [["--no-mimic", "--to", form] for form in LANGUAGES] + [["--to", "c", "--frame", FILE]],
     "check": [["--format", form] for form in ("terminal", "json", "sarif", "github")] + [["--each"]],
     "validate": [["--samples", "2", "--cases"], ["--samples", "1", "--isolate"]],
     "plot": [
@@ -267,6 +269,7 @@ def test_what_is_printed_goes_through_the_door() -> None:
         "explain.py": ("click.echo(equation)", "click.echo(explain(", 'click.echo(f"{rule.id}'),
         "check.py": ("click.echo(as_json(", "click.echo(as_sarif(", "click.echo(summary(", "click.echo(f\"'"),
         "report.py": ("click.echo(asset(",), "compare.py": ("click.echo(json.dumps(",),
+        "same.py": ("click.echo(schema_text()",),
         "dh_work.py": ("click.echo(text, nl=False)",),
         "__init__.py": ('click.echo(f"urdfkin {own_version()}, Pinocchio {version()',),
         "crash.py": ('click.echo("urdfkin: interrupted', 'click.echo("".join(traceback.', "click.echo("),

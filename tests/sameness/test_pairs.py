@@ -86,7 +86,7 @@ def test_what_is_not_is_found_out_and_the_joint_named(turn: int) -> None:
     assert found.differences[0].place in {f"joint {tree.joints[at].name}", f"link {tree.links[at + 1]}"}
 
 
-FOLLOWED = ["panda", "pr2", "talos", "ur5_gripper"]
+FOLLOWED = ["panda", "pr2", "talos", "baxter"]
 
 
 @pytest.mark.parametrize("name", FOLLOWED)

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from urdfkin.cli.arguments import load_robot, xacro_option
+from urdfkin.cli.door import say_file
 from urdfkin.cli.output import compiling, console, write_file
 from urdfkin.cli.reports import check_writable
 from urdfkin.errors.printable import json_text
@@ -47,7 +48,7 @@ def command(
     if markdown is not None:
         write_file(markdown, markdown_of(found).encode())
     if format_ == "json":
-        click.echo(json_text(as_data(found)))
+        say_file(json_text(as_data(found)) + "\n")
     else:
         print_changes(found, console())
     context.exit(1 if found else 0)

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from urdfkin.errors import InputError
+from urdfkin.system.files import shortened
 
 
 def form_of(
@@ -33,7 +34,7 @@ def form_of(
         if not chosen and ending:
             raise InputError(
                 "no form has that ending",
-                where=str(output),
+                where=shortened(output),
                 remedy=f"there are {', '.join(endings)}; or say --format",
             )
         return asked if chosen else plain

@@ -8,6 +8,7 @@ import click
 
 from urdfkin.cli.output import console
 from urdfkin.cli.reports import check_writable, report_options, say_written, write_reports
+from urdfkin.system.files import is_folder
 
 EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 
@@ -44,7 +45,7 @@ def command(
         return
     if results is None:
         raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of --store")
-    document = stored_document(results) if results.is_dir() else read_document(results)
+    document = stored_document(results) if is_folder(results) else read_document(results)
     check_writable(json_, html, junit, markdown)
     failed = write_reports(document, json_=json_, html=html, junit=junit, markdown=markdown)
     if not failed:

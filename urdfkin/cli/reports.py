@@ -38,9 +38,11 @@ def check_writable(*paths: Path | None) -> None:
         SourceError: no permission or no such folder.
     """
     for path in paths:
-        if path is None or (path.exists() and not path.is_file()):  # a device or a pipe is not replaced
+        if path is None:
             continue
         try:
+            if path.exists() and not path.is_file():  # a device or a pipe is not replaced
+                continue
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
                 pass
         except OSError as error:

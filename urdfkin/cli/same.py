@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.arguments import load_robot, xacro_option
-from urdfkin.cli.door import say
+from urdfkin.cli.door import say, say_file
 from urdfkin.cli.numbers import NumberFrom
 from urdfkin.cli.output import compiling, console, write_file
 from urdfkin.cli.reports import check_writable
@@ -128,6 +128,6 @@ def _write(
 
         write_file(path, as_html(found, robots).encode())
     if format_ == "json":
-        click.echo(data, nl=False)
+        say_file(data)
     else:
         print_sameness(found, console(), all_=all_)

@@ -58,7 +58,8 @@ def command(
     if output is not None:
         write_file(output, text.encode())
     elif format_ == "terminal":
-        click.echo(text, nl=False)
+        for one in text.splitlines():
+            say(one)
     else:
         say_file(text)
     if format_ != "terminal":

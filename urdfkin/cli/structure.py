@@ -49,7 +49,7 @@ def command(
     """
     import json  # noqa: PLC0415  keeps --help fast
 
-    from urdfkin.cli.door import say  # noqa: PLC0415
+    from urdfkin.cli.door import say, say_file  # noqa: PLC0415
     from urdfkin.dh.structure import structure  # noqa: PLC0415
     from urdfkin.verify.pinocchio import version  # noqa: PLC0415
     from urdfkin.verify.screws import check_screws  # noqa: PLC0415
@@ -62,10 +62,11 @@ def command(
     found = structure(screws)
     line = f"Pinocchio {version()}: {said}" if said else f"NOT VERIFIED by Pinocchio {version()}"
     if as_json:
-        click.echo(json.dumps(found.as_mapping(), indent=2).replace("Infinity", "null"))
+        say_file(json.dumps(found.as_mapping(), indent=2).replace("Infinity", "null") + "\n")
         say(line, err=True)
     else:
-        click.echo("\n".join([*_lines(found), "", line]))
+        for text in [*_lines(found), "", line]:
+            say(text)
     context.exit(0 if said else 3)
 
 

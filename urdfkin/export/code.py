@@ -8,7 +8,7 @@ from itertools import groupby
 
 from urdfkin.compiled.plan import Plan, Step
 from urdfkin.errors import InputError
-from urdfkin.errors.demands import words
+from urdfkin.errors.demands import word, words
 from urdfkin.export import walk
 from urdfkin.export.expression import Node, Number
 from urdfkin.export.function import Function, function_of
@@ -155,7 +155,8 @@ def exported() -> list[Quantity]:
 
 
 def _rows(names: Collection[str]) -> list[Quantity]:
-    rows = [quantity(name.replace("_", " ")) for name in dict.fromkeys(words(names, "quantities"))]
+    named = [word(name, "each of quantities") for name in words(names, "quantities")]
+    rows = [quantity(name.replace("_", " ")) for name in dict.fromkeys(named)]
     if not rows:
         raise InputError(
             "no quantity to export", remedy=f"name some of {', '.join(x.method for x in exported())}"

@@ -64,7 +64,7 @@ def same(
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur5_limited")
         >>> found.verdict.value, len(found.remarks)
-        ('same', 6)
+        ('same', 5)
         >>> found = urdfkin.same("talos", "talos_reduced_corrected")
         >>> bool(found)
         False

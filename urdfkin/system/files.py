@@ -80,6 +80,14 @@ def exists(path: Path) -> bool:
         return True
 
 
+def is_folder(path: Path) -> bool:
+    """Whether it is a folder; False for a name too long for one, so that reading it says so."""
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
+
+
 def at_home(name: str | os.PathLike[str]) -> Path:
     """A path whose `~` is the home it stands for; what stands for no home is a name like others."""
     try:

@@ -115,7 +115,7 @@ def singular_values(
         rows: Which rows.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
-    >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-13)
+    >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)
     ([4.0, 3.0], True)
     """
     A, off = (x[..., rows, :][..., moving] for x in (J, error))
