@@ -16,6 +16,7 @@ def last_bit_changed(x: FloatArray) -> FloatArray:
     return x * (1.0 + 2.0**-52)
 
 
+@pytest.mark.slow
 def test_results_are_equal_single_in_batches_and_to_those_that_were_kept(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -44,6 +45,7 @@ def test_a_row_of_a_batch_that_differs_in_its_last_bit_is_named(
     assert "polar/velocity/LOCAL: row 3 of 7 from 0 on" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_change_is_told_as_a_share_of_the_bound_and_allowed_within_what_is_given(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

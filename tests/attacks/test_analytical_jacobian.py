@@ -50,6 +50,7 @@ def test_minus_the_result_is_caught(ur5: Robot, monkeypatch: pytest.MonkeyPatch)
         ur5.analytical_jacobian(ur5.sample(1)[0], "tool0")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slip", [1e-10, 1e-12])
 @pytest.mark.parametrize("representation", REPRESENTATIONS)
 def test_a_slip_of_the_rate_matrix_is_caught(

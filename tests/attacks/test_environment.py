@@ -196,6 +196,7 @@ def test_a_named_pipe_that_nobody_writes_to_is_given_up(
             take(tmp_path / "pipe.urdf")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pause", [0.0, 0.3])
 def test_a_named_pipe_is_read_as_soon_as_somebody_writes_however_slowly(pause: float, tmp_path: Path) -> None:
     path = tmp_path / "pipe"

@@ -101,6 +101,7 @@ def _code_alone(text: str, to: str) -> str:
     return re.sub(r'""".*?"""|#[^\n]*', "", text, flags=re.DOTALL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", _PYTHON)
 def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) -> None:
     module = ast.parse(write(code(robot, quantities=("placement",)), to))
@@ -115,6 +116,7 @@ def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) ->
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
 def test_c_says_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None:
     written = code(robot, quantities=("placement",))
@@ -130,6 +132,7 @@ def test_c_says_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None
     }
 
 
+@pytest.mark.slow
 @given(st.lists(st.one_of(st.text(max_size=60), st.sampled_from([*_WORDS, *NAMES.values()])), max_size=20))
 def test_identifiers_are_words_no_two_alike(names: list[str]) -> None:
     found = all_safe(names)

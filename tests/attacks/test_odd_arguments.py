@@ -218,6 +218,7 @@ def test_what_is_no_number_is_not_made_one_in_silence(given: str, verify: bool, 
         robot.prepare("c").placement(ARRAYS_REFUSED[given])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "given",
     [

@@ -195,6 +195,7 @@ def test_what_was_snapped_is_told_with_names_as_words(kind: str) -> None:
     assert page(IN_XML[kind]).found == page("tame_name").found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("html", [True, False])
 @pytest.mark.parametrize("kind", NAMES)
 def test_a_table_in_markdown_has_the_same_elements_under_any_name(kind: str, html: bool) -> None:
@@ -279,6 +280,7 @@ def test_matlab_code_is_the_same_under_any_name(kind: str, form: str) -> None:
     assert code(NAMES[kind]) == code("tame_name")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["json", "toml", "csv"])
 @pytest.mark.parametrize("kind", NAMES)
 def test_a_table_that_is_read_back_has_its_names(kind: str, form: str, tmp_path: Path) -> None:

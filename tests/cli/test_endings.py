@@ -55,6 +55,7 @@ def test_a_table_goes_by_the_ending_too(tmp_path: Path) -> None:
     assert (done.code, "contradicts the ending" in done.err) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_validation_names_its_verdict_and_the_files_it_wrote(tmp_path: Path) -> None:
     html, data = str(tmp_path / "r.html"), str(tmp_path / "r.json")
     done = urdfkin("validate", "elbow", "--samples", "1", "--html", html, "--json", data)

@@ -67,6 +67,7 @@ def test_programs_are_told_by_one_warning_of_a_logger(
     assert "compiling placements" in record.getMessage()
 
 
+@pytest.mark.slow
 def test_no_seconds_of_a_report_hold_what_was_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(campaign, "load_kernels", lambda: time.sleep(1.0))
     begin = time.perf_counter()

@@ -24,6 +24,7 @@ from urdfkin.model.chain import chain
 from urdfkin.model.tree import KinematicTree
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("kinds", ["RRRRRR", "RRPRRR"])
 def test_the_cells_of_any_way_to_write_the_robot_come_back(seed: int, kinds: str) -> None:
@@ -43,6 +44,7 @@ def test_the_cells_of_any_way_to_write_the_robot_come_back(seed: int, kinds: str
     np.testing.assert_allclose(table.placement(q), chain(tree, "tip").placement(q), atol=1e-13)
 
 
+@pytest.mark.slow
 @given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
 @settings(max_examples=25)
 def test_a_table_like_another_is_the_urdf_to_rounding(tree: KinematicTree, seed: int) -> None:
@@ -54,6 +56,7 @@ def test_a_table_like_another_is_the_urdf_to_rounding(tree: KinematicTree, seed:
         assert apart <= 20 * float(table.rounding(q)) + 1e-13
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(references()) - {"kinova"}))
 def test_a_vendors_table_comes_out_in_every_cell(name: str) -> None:
     data, reference = read_mapping(reference_path(name)), read_table(reference_path(name))
@@ -121,6 +124,7 @@ def test_a_minimal_slide_has_no_a_on_the_side_of_its_neighbour() -> None:
     assert minimal.rows[1].a == 0.0
 
 
+@pytest.mark.slow
 def test_columns_stand_in_the_order_asked_for() -> None:
     result = run("ur5", "--like", "ur5", "--columns", "alpha,a,d,theta", "--snap", "1e-6", "--degrees")
     assert result.exit_code == 0
@@ -134,6 +138,7 @@ def test_columns_stand_in_the_order_asked_for() -> None:
     assert run("ur5", "--columns", "a,b,c,d").exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_robot_with_a_published_table_is_told_of_it() -> None:
     assert published("xarm7") == [
         "the modified table that is published of this robot: --like xarm7_modified --snap 1e-04",

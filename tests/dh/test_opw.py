@@ -36,6 +36,7 @@ def table(lengths: dict[str, float], offsets: list[float], signs: list[int], til
     return table_from_rows(rows, "standard")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_the_parameters_of_any_arm_come_back(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -55,6 +56,7 @@ def test_the_parameters_of_any_arm_come_back(seed: int) -> None:
     assert min(found.lengths[name] for name in ("c1", "c2", "c3")) >= 0.0
 
 
+@pytest.mark.slow
 def test_a_calibrated_arm_is_refused_with_its_distance_or_taken_for_one() -> None:
     lengths = dict(zip(NAMES, (0.1, -0.1, 0.0, 0.4, 0.5, 0.5, 0.1), strict=True))
     path = load(table(lengths, [0.0] * 6, [1] * 6, tilt=2e-3), verify=False).chain("tip", "base")
@@ -70,6 +72,7 @@ def test_an_arm_of_another_kind_is_refused(name: str) -> None:
         opw_of(load(name, verify=False).chain())
 
 
+@pytest.mark.slow
 def test_the_command_writes_what_the_solvers_read(tmp_path: Path) -> None:
     result = run_any("structure", "kinova", "--opw", "0.001")
     assert result.exit_code == 0

@@ -58,6 +58,7 @@ def test_the_books_ur5_is_where_the_book_says() -> None:
     np.testing.assert_allclose(robot.placement([0, -np.pi / 2, 0, 0, np.pi / 2, 0], "tip"), T, atol=1e-15)
 
 
+@pytest.mark.slow
 @given(trees(min_joints=1, max_joints=6, tame=True))
 @settings(max_examples=20)
 def test_space_and_body_screws_are_the_chain(tree: KinematicTree) -> None:
@@ -117,6 +118,7 @@ def test_a_written_file_is_a_robot(form: str, tmp_path: Path) -> None:
     assert "agrees within rounding" in shown
 
 
+@pytest.mark.slow
 def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
     arm = screws_from(SPACE, M)
     names: dict[str, Any] = {}

@@ -97,6 +97,7 @@ def test_the_sign_of_a_variable_is_the_rows_sense() -> None:
     assert (table.rows[0].sense, table.rows[0].theta, table.rows[0].d) == (-1, math.pi / 2, 0.107)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["terminal", "markdown", "latex", "csv"])
 @pytest.mark.parametrize("name", references())
 def test_what_urdfkin_prints_is_read_again(name: str, form: str) -> None:

@@ -78,6 +78,7 @@ def test_a_slip_is_named_where_a_joint_slides(kinds: str) -> None:
     assert found.reading.words(found.said) == "millimetres"
 
 
+@pytest.mark.slow
 def test_another_robots_table_fits_in_no_reading() -> None:
     reference = read_table(reference_path("ur3"))
     path = load("ur5").chain("tool0", "base")
@@ -97,6 +98,7 @@ def test_the_fewest_slips_are_tried_first() -> None:
     assert counts[0] == 1
 
 
+@pytest.mark.slow
 def test_the_command_says_what_would_fit_and_still_exits_1(tmp_path: Path) -> None:
     file = tmp_path / "ur5.toml"
     rows: list[list[float]] = [

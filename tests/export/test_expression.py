@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -53,6 +54,7 @@ def test_an_expression_has_the_value_of_its_arithmetic(steps: list[tuple[str, in
         assert abs(value(found) - expected) <= 1e-13 * size
 
 
+@pytest.mark.slow
 @given(written())
 def test_no_operation_is_made_for_nothing(steps: list[tuple[str, int, int]]) -> None:
     graph = Graph()

@@ -31,6 +31,7 @@ ODD = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reference", list(Reference))
 @pytest.mark.parametrize("name", [*ODD, "panda"])
 def test_every_quantity_is_pinocchios_within_the_bound(name: str, reference: Reference) -> None:

@@ -51,6 +51,7 @@ def test_so_does_that_of_planar_and_floating_joints(to: str, tmp_path: Path) -> 
     assert len(found.lines) == len(ALL) * (2 if to == "c" else 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["c", "numpy"])
 def test_a_small_robots_file_does_so_in_every_reference(to: str, tmp_path: Path) -> None:
     need(to)
@@ -90,6 +91,7 @@ def test_c_touches_nothing_that_is_not_its_own(tmp_path: Path) -> None:
     assert said.count("good ") == len(_THREE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["c", "numpy"])
 def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None:
     need(to)
@@ -103,6 +105,7 @@ def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None
     assert any(line.startswith("good acceleration") for line in found.lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["c", "numpy", "matlab"])
 def test_a_frame_that_nothing_moves_has_code_too(to: str, tmp_path: Path) -> None:
     need(to)
@@ -200,6 +203,7 @@ def test_what_cannot_be_exported_is_refused_with_what_can() -> None:
     assert "double" in robot_of("single_link").export("c", quantities=["placement"])
 
 
+@pytest.mark.slow
 def test_what_nobody_checked_says_so_in_its_first_line(tmp_path: Path) -> None:
     robot = urdfkin.load("planar_two_link")
     for to in LANGUAGES:

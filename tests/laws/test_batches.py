@@ -49,6 +49,7 @@ def agree(one: FloatArray, other: FloatArray) -> bool:
     return one.shape == other.shape and one.tobytes() == other.tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quantity", QUANTITIES)
 def test_a_batch_equals_a_loop_over_its_samples(robot: Robot, quantity: str) -> None:
     compute = QUANTITIES[quantity]
@@ -197,6 +198,7 @@ def test_an_out_that_cannot_be_used_is_refused_and_left_alone() -> None:
     assert (v == 1.0).all()
 
 
+@pytest.mark.slow
 def test_threads_get_what_a_single_one_gets() -> None:
     robot = load("a1")
     batches = [state(robot, n, n) for n in (1, 5, 16, 40, 100, 3, 64, 33) * 3]

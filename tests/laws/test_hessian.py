@@ -70,6 +70,7 @@ def truths(robot: Robot, q: FloatArray, link: int, reference: Reference) -> tupl
     return found, quotients
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reference", Reference)
 @pytest.mark.parametrize("name", ["panda", "floating_root", "planar_and_floating_in_the_middle", "tree_3"])
 def test_it_is_the_difference_quotient_of_the_jacobian_at_fifty_digits(

@@ -42,6 +42,7 @@ def pinocchio_reads(text: str) -> bool:
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_pinocchio_refuses_is_found_and_what_is_marked_it_refuses(kind: str, version: str) -> None:

@@ -18,6 +18,7 @@ def moving_base(seed: int) -> urdfkin.BaseMotion:
     return urdfkin.BaseMotion(pose(generator), generator.normal(size=6), generator.normal(size=6))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("base", [None, moving_base(1)], ids=["still", "moving"])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_everything_agrees_with_pinocchio_also_on_a_free_flyer(
@@ -62,6 +63,7 @@ def test_a_wrong_rate_of_the_jacobian_is_caught(monkeypatch: pytest.MonkeyPatch)
         robot.jacobian_rate(robot.sample(1, 6)[0], np.ones(robot.nv), "panda_hand")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("representation", [*SEQUENCES, "quaternion"])
 def test_the_manipulator_jacobian_predicts_the_change_of_the_pose(representation: str) -> None:
     from urdfkin.kinematics.bodies import orientation_of  # noqa: PLC0415

@@ -121,6 +121,7 @@ def untold(robot: Robot) -> Robot:
     return Robot(with_tilts(robot.tree, {}), robot.urdf, origin=robot.origin)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("tilt", [1e-16, 1e-15, 1e-14, 1e-13, 0.99e-12])
 def test_a_robot_with_tilted_axes_is_verified_within_twice_the_tilts(kind: str, tilt: float) -> None:

@@ -145,6 +145,7 @@ def test_a_certificate_holds(compared: tuple[Robot, Robot, dict[str, Any]], tmp_
     assert recheck(read_certificate(tmp_path / "c.json"), a, b) == []
 
 
+@pytest.mark.slow
 def test_a_certificate_of_what_was_turned_round_holds() -> None:
     a, b = robot("panda"), other("panda", "all of it")
     assert recheck(certificate(urdfkin.same(a, b)), a, b) == []
@@ -179,6 +180,7 @@ def test_a_certificate_of_other_texts_is_refused(compared: tuple[Robot, Robot, d
 # -- the command -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_commands_exit_says_whether(tmp_path: Path) -> None:
     files = {}
     for what in ("axes flipped", "tilted by 0.01"):

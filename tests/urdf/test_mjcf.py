@@ -139,6 +139,7 @@ def random_mjcf(rng: np.random.Generator) -> tuple[str, list[str]]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(25))
 def test_any_tree_of_hinges_and_slides_is_placed_as_mujoco_places_it(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -116,6 +116,7 @@ def test_what_was_prepared_is_in_the_same_certificate_as_what_was_checked(robot:
     assert "1 not checked" in str(certificate)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("often")
 def test_eight_threads_are_counted_as_one_is_and_get_what_one_gets(robot: Robot) -> None:
     q, v, a = state(robot, 16, 3)

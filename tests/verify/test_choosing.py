@@ -124,6 +124,7 @@ def test_the_worst_sample_is_named_in_whatever_part_it_stands(
     assert not any(line.checked for line in fresh.certificate().lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shape", "base"), BATCHES)
 def test_the_certificate_does_not_depend_on_the_parts(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, shape: tuple[int, ...], base: tuple[int, ...] | None

@@ -53,6 +53,7 @@ def ask_everything(robot: urdfkin.Robot, n: int, base: urdfkin.BaseMotion | None
     robot.analytical_jacobian(q, frames[-1], "quaternion", base=base)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SUBJECTS)
 @pytest.mark.parametrize("far", [None, 1.0, 1e6], ids=lambda far: f"base {far}")
 def test_mujoco_agrees_in_every_quantity_and_reference(name: str, far: float | None) -> None:

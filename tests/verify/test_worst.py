@@ -41,6 +41,7 @@ def cases(draw: st.DrawFn) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     return ours, theirs, scale.reshape(own), draw(st.integers(0, len(shape)))
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(cases())
 def test_it_is_the_definition_to_the_last_bit(case: tuple[FloatArray, FloatArray, FloatArray, int]) -> None:

@@ -38,6 +38,7 @@ def viewer() -> Iterator[Viewer]:
     server.stop()
 
 
+@pytest.mark.slow
 def test_it_answers_on_loopback_and_nowhere_else(viewer: Viewer) -> None:
     port = viewer.server.get_port()
     assert viewer.server.get_host() == "127.0.0.1"
@@ -144,6 +145,7 @@ def test_the_browser_is_started_with_a_file_that_nobody_else_can_read(
     assert not page.exists()
 
 
+@pytest.mark.slow
 def test_every_overlay_can_be_shown_in_every_reference(viewer: Viewer) -> None:
     viewer.set_rates(np.ones(6), np.full(6, 0.5))
     viewer.parts.value = True

@@ -83,6 +83,7 @@ def test_what_is_no_rotation_is_refused() -> None:
         log_rotation(np.diag([1.0, 1.0, -1.0]))
 
 
+@pytest.mark.slow
 @given(axes)
 def test_the_aligning_rotation_has_the_axis_as_its_z(axis: FloatArray) -> None:
     R = axis_aligning(axis)

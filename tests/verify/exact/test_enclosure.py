@@ -90,6 +90,7 @@ def test_every_number_at_fifty_digits_lies_in_its_interval_at_any_precision(name
             assert widest <= before
 
 
+@pytest.mark.slow
 def test_quaternions_in_the_file_and_joints_that_the_root_hangs_from_are_enclosed_too() -> None:
     for robot in (
         urdfkin.load(text(quaternions(1.7), 'version="1.1"'), verify=False),
@@ -115,6 +116,7 @@ def test_the_ends_are_neighbouring_doubles_unless_fewer_digits_are_asked_for(nam
         assert next_ones.mean() > 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "ur5", "tree_2", "floating_root"])
 def test_what_doubles_give_lies_in_what_intervals_of_as_many_digits_give_but_for_few(name: str) -> None:
     robot = urdfkin.load("ur5", verify=False) if name == "ur5" else robot_of(name)
