@@ -63,7 +63,7 @@ FRAGMENTS = [
      "return bool(R[axis, axis] > 0.9)"),
     ("compiled.program", "op = Op.CARRY_X + along[0] if len(along) == 1 else Op.CARRY",
      "op = Op.CARRY_X + along[0]"),
-    ("compiled.program", "how = int(self.plan.columns[c, Column.TURNS]) + 2 * (leader != c)",
+    ("compiled.program", "how = int(self.plan.columns[c, Column.TURNS]) + 2 * (to != c)",
      "how = int(self.plan.columns[c, Column.TURNS])"),
     ("compiled.program", "int(self.rules[i] > 0)", "0"),
     ("compiled.plan", "turned(joint).T, 0.0)", "turned(joint), 0.0)"),

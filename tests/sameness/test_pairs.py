@@ -48,8 +48,10 @@ ROBOTS = sorted(catalogue())
 
 @cache
 def robot(name: str) -> Robot:
-    tree = urdfkin.load(name, verify=False).tree
-    return urdfkin.load(to_urdf(pairs.bounded(tree)), verify=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        tree = urdfkin.load(name, verify=False).tree
+        return urdfkin.load(to_urdf(pairs.bounded(tree)), verify=False)
 
 
 def changed(name: str, change: Change) -> Robot | None:

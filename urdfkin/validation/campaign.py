@@ -16,7 +16,7 @@ from typing import Literal
 
 from urdfkin.compiled.ahead import load_kernels
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.errors.demands import switch, whole_number
+from urdfkin.errors.demands import shown, switch, whole_number, word
 from urdfkin.validation import memory
 from urdfkin.validation.answer import Answer, Failure, failure, traced, unforeseen
 from urdfkin.validation.chunk import Cut
@@ -94,7 +94,13 @@ def validate(
     """
     samples, seed = whole_number(samples, "samples", 0), whole_number(seed, "seed", 0)
     jobs, isolate = whole_number(jobs, "jobs", 1), switch(isolate, "isolate")
-    if (retry or shard) and store is None:
+    shard = None if shard is None else word(shard, "shard")
+    if retry is not None and word(retry, "retry") != "failed":
+        raise InputError(
+            "what failed can be computed again", found=f"retry={retry!r}", remedy='retry="failed"'
+        )
+    folder = None if store is None else _folder(store)
+    if (retry or shard is not None) and store is None:
         raise InputError("only a store has something to retry or a shard", remedy="give store=, a folder")
     many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
@@ -108,9 +114,9 @@ def validate(
     campaign = _Campaign(found, cut, seed, most, gathering)
     interrupted, kept, begin = False, None, time.perf_counter()
     with contextlib.ExitStack() as stack:
-        if store is not None:
+        if folder is not None:
             manifest = Manifest.of(found, samples, seed, started.isoformat(timespec="seconds"))
-            there = opened(Path(store), manifest, _warn, shard=shard, retry_failed=retry == "failed")
+            there = opened(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
             kept = stack.enter_context(there)
         try:
             if kept is not None:
@@ -140,6 +146,17 @@ def validate(
         seconds=time.perf_counter() - begin,
         interrupted=interrupted,
     )
+
+
+def _folder(store: str | os.PathLike[str]) -> Path:
+    """A store's path, of letters that a file system has."""
+    try:
+        name = os.fsencode(store)
+    except (TypeError, ValueError):
+        name = b""
+    if not name or b"\0" in name:
+        raise InputError("a store is a folder's path", found=shown(store))
+    return Path(os.fsdecode(name))
 
 
 def _is_robot(subject: Subject) -> bool:
