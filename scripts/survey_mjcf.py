@@ -1,7 +1,7 @@
 """Load every MJCF file below a folder and count who vouches for what is read: the figures of docs/mjcf.md.
 
-pip install --no-deps --target /tmp/models gymnasium==1.4.0 dm-control==1.0.50
-python scripts/survey_mjcf.py /tmp/models
+pip install --no-deps --target models gymnasium==1.4.0 dm-control==1.0.50
+python scripts/survey_mjcf.py models
 """
 
 from __future__ import annotations

@@ -204,7 +204,7 @@ def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[s
         found.append("Pieper, three axes meet: EAIK, ik-geo")
     if "three parallel axes" in named:
         meet = any(one.distance <= NEAR_LENGTH and one.angle > NEAR_ANGLE for one in pairs)
-        found.append(f"Pieper, three axes are parallel{', two meet' if meet else ''}: EAIK, ik-geo")
+        found.append(f"Pieper, three axes are parallel{', two meet: EAIK, ik-geo' if meet else ': ik-geo'}")
     return found
 
 
