@@ -10,7 +10,7 @@ import pytest
 from scripts.mutate import Mutant, judge, mutants
 from scripts.mutating.arguments import argued
 from scripts.mutating.operators import function_at, mutated, slips
-from scripts.mutating.selection import ROOT, files, near_tests
+from scripts.mutating.selection import PACKAGE, ROOT, files, module_of, near_tests
 
 SOURCE = '''
 """A text is left alone: 1 < 2."""
@@ -59,9 +59,11 @@ def test_a_slip_changes_one_place_and_each_changes_another() -> None:
 @pytest.mark.slow
 def test_every_slip_of_the_package_compiles_and_has_a_test_to_ask() -> None:
     for path in files([]):
-        source = path.read_text(encoding="utf-8")
-        for number in range(0, len(slips(ast.parse(source))), 7):
-            compile(mutated(source, number), str(path), "exec")
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for statement in tree.body:
+            for slip in slips(ast.Module([statement], []))[::7]:
+                with slip.made():
+                    compile(ast.fix_missing_locations(ast.Module([statement], [])), str(path), "exec")
         if path.stem not in ("__init__", "__main__"):
             assert near_tests(path), path
 
@@ -106,7 +108,10 @@ def test_what_is_argued_can_still_be_made_and_stands_on_the_page_once() -> None:
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     lines = [line for line in page.splitlines() if line.startswith("- `urdfkin.")]
     assert len(lines) == len(argued()) > 0
-    assert argued().keys() <= {(mutant.place, mutant.what) for mutant in mutants([])}
+    modules = {module_of(path): path for path in files([])}
+    named = {place: [name for name in modules if place.startswith(name)] for place, _ in argued()}
+    parts = {str(modules[max(names, key=len)].relative_to(PACKAGE)) for names in named.values()}
+    assert argued().keys() <= {(mutant.place, mutant.what) for mutant in mutants(sorted(parts))}
 
 
 @pytest.mark.parametrize(("line", "place"), [(3, "C"), (5, "C.f"), (7, "C.f.g"), (9, "h"), (1, "")])

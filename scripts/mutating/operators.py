@@ -7,8 +7,10 @@ a sign, a call left out, an error not raised. Texts, types and what compiled ker
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 _COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
@@ -24,17 +26,54 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Slip:
-    """One change.
+    """One change: a value put into a list's place or a node's field.
 
     Attributes:
-        line: Where.
-        what: The text as it was and as it is, for a person.
-        make: Changes the tree in place.
+        shown: The node whose text a person is shown.
+        home: The list or the node.
+        place: The place or the field.
+        value: What comes there.
     """
 
-    line: int
-    what: str
-    make: Callable[[], None]
+    shown: ast.AST
+    home: Any
+    place: int | str
+    value: Any
+
+    @property
+    def line(self) -> int:
+        """Where."""
+        return getattr(self.shown, "lineno", 0)
+
+    @property
+    def what(self) -> str:
+        """The text as it is and as it will be, for a person."""
+        before = _short(self.shown)
+        with self.made() as old:
+            after = _short(self.shown if self.shown is not old else self.value)
+        return f"{before}  ->  {after}"
+
+    @contextmanager
+    def made(self) -> Iterator[Any]:
+        """The tree changed in place, until the end of the block; gives what was there before."""
+        old = self._put(self.value)
+        try:
+            yield old
+        finally:
+            self._put(old)
+
+    def make(self) -> None:
+        """Change the tree in place, for good."""
+        self._put(self.value)
+
+    def _put(self, value: Any) -> Any:
+        """Put a value there; what was there before."""
+        if isinstance(self.place, int):
+            old, self.home[self.place] = self.home[self.place], value
+        else:
+            old = getattr(self.home, self.place)
+            setattr(self.home, self.place, value)
+        return old
 
 
 def slips(tree: ast.Module) -> list[Slip]:
@@ -51,10 +90,14 @@ def mutated(source: str, number: int) -> ast.Module:
 
 def function_at(tree: ast.Module, line: int) -> str:
     """The function or class in which a line stands, `Tally.percentile`; empty outside of all."""
+    return ".".join(node.name for node in _definitions(tree) if node.lineno <= line <= (node.end_lineno or 0))
+
+
+@lru_cache(maxsize=1)
+def _definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef]:
+    """All functions and classes, as they stand."""
     kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-    around = (node for node in ast.walk(tree) if isinstance(node, kinds))
-    found = [node for node in around if node.lineno <= line <= (node.end_lineno or 0)]
-    return ".".join(node.name for node in sorted(found, key=lambda node: node.lineno))
+    return sorted((node for node in ast.walk(tree) if isinstance(node, kinds)), key=lambda node: node.lineno)
 
 
 def rewritten(source: str, before: str, after: str) -> ast.Module:
@@ -89,29 +132,29 @@ def _of_expression(node: ast.AST) -> Iterator[Slip]:
     match node:
         case ast.Compare():
             for i, op in enumerate(node.ops):
-                yield _set(node, node.ops, i, _COMPARISONS[type(op)]())
+                yield Slip(node, node.ops, i, _COMPARISONS[type(op)]())
         case ast.BoolOp():
-            yield _set(node, node, "op", ast.Or() if isinstance(node.op, ast.And) else ast.And())
+            yield Slip(node, node, "op", ast.Or() if isinstance(node.op, ast.And) else ast.And())
         case ast.BinOp() | ast.AugAssign() if type(node.op) in _OPERATIONS and not _of_text(node):
-            yield _set(node, node, "op", _OPERATIONS[type(node.op)]())
+            yield Slip(node, node, "op", _OPERATIONS[type(node.op)]())
         case ast.UnaryOp(op=ast.USub()):
-            yield _set(node, node, "op", ast.UAdd())
+            yield Slip(node, node, "op", ast.UAdd())
         case ast.UnaryOp(op=ast.Not()):
-            yield _set(node, node, "operand", _not(node.operand))
+            yield Slip(node, node, "operand", _not(node.operand))
         case ast.Constant(value=bool() | int() | float() as value):
-            yield _set(node, node, "value", _other(value))
+            yield Slip(node, node, "value", _other(value))
         case ast.Name(id=name) if name in _NAMES:
-            yield _set(node, node, "id", _NAMES[name])
+            yield Slip(node, node, "id", _NAMES[name])
 
 
 def _of_statement(node: ast.AST) -> Iterator[Slip]:
     match node:
         case ast.If(test=ast.Name() | ast.Attribute() | ast.Call() as test):
-            yield _set(node, node, "test", _not(test))
+            yield Slip(node, node, "test", _not(test))
         case ast.IfExp(test=ast.Name() | ast.Attribute() | ast.Call() as test):
-            yield _set(node, node, "test", _not(test))
+            yield Slip(node, node, "test", _not(test))
         case ast.Expr(value=ast.Call()):
-            yield _set(node, node, "value", ast.Constant(None))
+            yield Slip(node, node, "value", ast.Constant(None))
     for field in ("body", "orelse", "finalbody"):
         statements = getattr(node, field, None)
         if isinstance(statements, list):
@@ -121,31 +164,11 @@ def _of_statement(node: ast.AST) -> Iterator[Slip]:
 def _left_out(statements: list[ast.stmt]) -> Iterator[Slip]:
     for i, statement in enumerate(statements):
         if isinstance(statement, ast.Raise):
-            yield _set(statement, statements, i, ast.Pass())
+            yield Slip(statement, statements, i, ast.Pass())
         elif isinstance(statement, ast.Continue):
-            yield _set(statement, statements, i, ast.Break())
+            yield Slip(statement, statements, i, ast.Break())
         elif isinstance(statement, ast.Break):
-            yield _set(statement, statements, i, ast.Continue())
-
-
-def _set(shown: ast.AST, home: Any, place: int | str, value: Any) -> Slip:
-    """Put a value into a list's place or a node's field; the words show the statement before and after."""
-
-    def make() -> None:
-        if isinstance(place, int):
-            home[place] = value
-        else:
-            setattr(home, place, value)
-
-    before = _short(shown)
-    old = home[place] if isinstance(place, int) else getattr(home, place)
-    make()
-    after = _short(shown if shown is not old else value)
-    if isinstance(place, int):
-        home[place] = old
-    else:
-        setattr(home, place, old)
-    return Slip(getattr(shown, "lineno", 0), f"{before}  ->  {after}", make)
+            yield Slip(statement, statements, i, ast.Continue())
 
 
 def _short(node: ast.AST) -> str:
