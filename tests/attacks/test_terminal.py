@@ -37,7 +37,7 @@ ROBOT = {
     "dh": [
         *(["--format", form, "--no-mimic"] for form in (*FORMATS, "urdf", "svg")),
         *(["--tree", "--format", form] for form in ("terminal", "markdown", "csv", "json")),
-        ["--flip", FILE], ["--near-parallel", "strict"], ["--compare", "TABLE"],
+        ["--flip", FILE], ["--near-parallel", "strict"], ["--compare", "TABLE", "--no-fit"],
     ],
     "screws": [["--no-mimic", "--format", form] for form in SCREWS] + [["--base", FILE]],
     "structure": [[], ["--json"], ["--opw", "1"]],

@@ -24,6 +24,8 @@ from urdfkin.model.tree import FloatArray, JointKind
 #: Metres at the tip up to which a table agrees: half as much again as rounding to 0.1 mm in a cell or two.
 TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
+#: Patterns of signs that are fitted, and kept at each joint, where a size will do.
+_HASTY = (3, 16)
 #: Of each row, half a unit of the last digit with which its cells were written, metres and radians.
 Digits = Sequence[Mapping[str, float]]
 
@@ -82,7 +84,9 @@ def compare(
 
 
 def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
-    """Metres and radians that a table's tip is off at most, with base, tool and offsets fitted.
+    """Metres and radians that a table's tip is off at most, with base, tool and offsets fitted in haste.
+
+    Few patterns of signs are tried, and none of the turns against each other that nearly coinciding axes allow.
 
     Args:
         chain: The path.
@@ -95,7 +99,7 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
     check_joints(chain, reference)
     standard = to_standard(reference) if reference.convention is Convention.MODIFIED else reference
     tried, wanted = _samples(chain, FIT_SAMPLES, 1)
-    model = _best_fit(chain, standard, _written(standard), tried, wanted, _reach(chain, wanted), enough)
+    model = _best_fit(chain, standard, _written(standard), tried, wanted, _reach(chain, wanted), enough, hasty=True)
     return _apart(model, *_samples(chain, CHECK_SAMPLES, 2))
 
 
@@ -149,6 +153,8 @@ def _best_fit(
     wanted: FloatArray,
     scale: float,
     enough: float = 0.0,
+    *,
+    hasty: bool = False,
 ) -> Model:
     """Of the table as written and the likely sign patterns, the one whose freedoms fit best.
 
@@ -162,9 +168,9 @@ def _best_fit(
     if size(written) <= EPS * of_a_fit(0) * scale:
         return written
     best, best_size = written, size(written)
-    for start in _starts(chain, standard, written):
+    for start in _starts(chain, standard, written, *(_HASTY if hasty else ())):
         # Least squares make the sum small. The worst sample is what counts: there the start may be better.
-        model = min(fit_freedoms(start, values, wanted, scale), start, key=size)
+        model = min(fit_freedoms(start, values, wanted, scale, turns=not hasty), start, key=size)
         needed = 1.0 if start is written else 0.5
         if (its_size := size(model)) < needed * best_size:
             best, best_size = model, its_size
@@ -173,10 +179,10 @@ def _best_fit(
     return best
 
 
-def _starts(chain: FrameChain, standard: DHTable, written: Model) -> Iterator[Model]:
+def _starts(chain: FrameChain, standard: DHTable, written: Model, *effort: int) -> Iterator[Model]:
     """Where fits begin: what is written, then each likely pattern of signs."""
     yield written
-    for aligned in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4))):
+    for aligned in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         yield _start(standard, aligned)
 
 
@@ -213,7 +219,7 @@ def _slide(limit: object) -> tuple[float, float]:
 
 
 def _apart(model: Model, values: FloatArray, wanted: FloatArray) -> tuple[float, float]:
-    poses, _, _ = model.walk(values)
+    poses = model.poses(values)
     metres = np.linalg.norm(poses[:, :3, 3] - wanted[:, :3, 3], axis=-1).max()
     return float(metres), float(rotation_angle(poses[:, :3, :3], wanted[:, :3, :3]).max())
 

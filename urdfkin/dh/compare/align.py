@@ -65,10 +65,12 @@ class _Partial:
     absorber: tuple[int, float] | None = None
 
 
-def align(chain: FrameChain, reference: DHTable, count: int = 12) -> list[Alignment]:
+def align(
+    chain: FrameChain, reference: DHTable, count: int = 12, beam: int = BEAM
+) -> list[Alignment]:
     """The sign patterns closest to a standard reference table with as many joints of the same kinds.
 
-    Sliding joints leave patterns that cells cannot tell apart; the fit can, so several are returned.
+    Sliding joints leave patterns that cells cannot tell apart; the fit can, so up to `count` are returned.
     """
     reach = max(chain.reach, reference.span, 1e-9)
     n = len(reference.rows)
@@ -80,7 +82,7 @@ def align(chain: FrameChain, reference: DHTable, count: int = 12) -> list[Alignm
             for sense in (1, -1)
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
-        partials = sorted(longer, key=lambda partial: partial.cost)[:BEAM]
+        partials = sorted(longer, key=lambda partial: partial.cost)[:beam]
     # Where axes nearly coincide, many patterns of x are nearly the same: the fit finds from one to another.
     by_senses: dict[tuple[int, ...], _Partial] = {}
     for partial in partials:

@@ -61,6 +61,16 @@ class Model:
             T = T @ along_axis(theta, d) @ between_axes(a, alpha) @ between_axes(0.0, 0.0, beta)
         return T
 
+    def poses(self, values: FloatArray) -> FloatArray:
+        """(s, 4, 4) poses of the tip."""
+        thetas, ds, *between = self.cells.T
+        moved = self.senses * values
+        joints = along_axis(thetas + self.turns * moved, ds + (1.0 - self.turns) * moved)
+        T: FloatArray = np.broadcast_to(self.base, (len(values), 4, 4))
+        for i, step in enumerate(map(between_axes, *between)):
+            T = T @ (joints[:, i] @ step)
+        return T @ self.tool
+
     def walk(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Tip poses (s, 4, 4), then the lines and kinds of motion of every cell.
 
@@ -173,8 +183,9 @@ def _sparse(
     total = np.zeros(cells.shape[1])
     weights = np.linspace(1.0, 1.2, cells.shape[1])  # of two equally good cells, one is to win
     weights[4::5] = 0.3  # beta only where alpha will not do
+    turned, square = np.linalg.qr(cells_left)
     for _ in range(25):
-        total = weights * np.linalg.lstsq(cells_left * weights, target, rcond=1e-9)[0]
+        total = weights * np.linalg.lstsq(square * weights, turned.T @ target, rcond=1e-9)[0]
         weights = np.abs(total) + 1e-9 * scale
         weights[4::5] *= 0.5
     return np.asarray(total - so_far, np.float64)

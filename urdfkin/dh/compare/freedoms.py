@@ -27,7 +27,9 @@ _ROUNDING = 1e-13
 _TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 
 
-def fit_freedoms(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> Model:
+def fit_freedoms(
+    model: Model, values: FloatArray, wanted: FloatArray, scale: float, *, turns: bool = True
+) -> Model:
     """The table's best fit.
 
     Args:
@@ -35,10 +37,11 @@ def fit_freedoms(model: Model, values: FloatArray, wanted: FloatArray, scale: fl
         values: (s, n) the URDF's joint values.
         wanted: (s, 4, 4) its tip there.
         scale: Metres that a radian counts as much as.
+        turns: Whether offsets of neighbours are turned against each other where a descent ends.
     """
     for _ in range(2 * len(model.cells)):
         model, size = _descended(model, values, wanted, scale)
-        if size <= _ROUNDING * scale * math.sqrt(6 * len(values)):
+        if not turns or size <= _ROUNDING * scale * math.sqrt(6 * len(values)):
             break
         turned = min(_turned(model), key=lambda one: _size(one, values, wanted, scale), default=model)
         if _size(turned, values, wanted, scale) >= size:
@@ -48,7 +51,7 @@ def fit_freedoms(model: Model, values: FloatArray, wanted: FloatArray, scale: fl
 
 
 def _size(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> float:
-    return float(np.linalg.norm(errors(model.walk(values)[0], wanted, scale)))
+    return float(np.linalg.norm(errors(model.poses(values), wanted, scale)))
 
 
 def _descended(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> tuple[Model, float]:
