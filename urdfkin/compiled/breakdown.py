@@ -9,10 +9,11 @@ frame, and 7.125 names its terms; applied joint by joint from the last inwards t
     coriolis     2 w_{k-1} x u_k        what it does while the joints before it turn the link it sits on
     sliding      a_k z                  a prismatic joint speeds up
 
-with d from the joint's origin to the frame: not a difference of two places in the world, which far away from
-its origin has lost its digits, but of two places seen from the frame. The angular rows are those of 7.129:
-a_k z, and v_k w_{k-1} x z under coriolis. A planar or floating joint slides and turns at once, along axes
-that turn with it: its sliding velocity s then adds o x s, with o its own angular velocity, under coriolis.
+with d from the joint's origin to the frame: not a difference of two places, which has lost its digits far
+from the world's origin and behind a long link, but the sum of the interorigin vectors behind the joint, as in
+7.110. The angular rows are those of 7.129: a_k z, and v_k w_{k-1} x z under coriolis. A planar or floating
+joint slides and turns at once, along axes that turn with it: its sliding velocity s then adds o x s, with o
+its own angular velocity, under coriolis.
 """
 
 from __future__ import annotations
@@ -35,9 +36,6 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: The kinds of contribution, in the order in which they are kept.
 KINDS = ("transverse", "centripetal", "coriolis", "sliding")
-
-
-_OFFSET, _NOWHERE = slice(9, 12), np.zeros(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,17 +112,17 @@ def acceleration_breakdown(
     """
     if not np.isfinite(a).all():  # the walks below, which look at their inputs themselves, take q and v
         raise NotFiniteError("q, v and a must be finite")
-    path = moving_joints(tree, link)
-    plan = make_plan(tree, [0, link, *(i + 1 for i in path), *(tree.joints[i].parent for i in path)])
+    moving = moving_joints(tree, link)
+    plan = make_plan(tree, [0, *(i + 1 for i in tree.path(link))])  # the links on the way
     n = len(q)
-    terms = np.empty((n, len(path), len(KINDS), 6)) if out is None else out
+    terms = np.empty((n, len(moving), len(KINDS), 6)) if out is None else out
     of_base = np.empty((n, 6))
 
     def compute(part: slice) -> None:
         state = base if len(base) == 1 else base[part]
         try:
             of_base[part] = _contributions(
-                tree, path, plan, q[part], v[part], a[part], reference, state, terms[part]
+                tree, link, plan, q[part], v[part], a[part], reference, state, terms[part]
             )
         except RangeError as error:
             if part == slice(0, n):
@@ -133,7 +131,7 @@ def acceleration_breakdown(
             raise RangeError(error.what, where=where, remedy=error.remedy) from error
 
     in_parts(compute, n, threads)
-    return AccelerationBreakdown(tuple(tree.joints[i].name for i in path), of_base, terms)
+    return AccelerationBreakdown(tuple(tree.joints[i].name for i in moving), of_base, terms)
 
 
 def moving_joints(tree: KinematicTree, link: int) -> list[int]:
@@ -144,7 +142,7 @@ def moving_joints(tree: KinematicTree, link: int) -> list[int]:
 @np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite is refused at the end
 def _contributions(
     tree: KinematicTree,
-    path: Sequence[int],
+    link: int,
     plan: Plan,
     q: FloatArray,
     v: FloatArray,
@@ -153,24 +151,19 @@ def _contributions(
     base: FloatArray,
     terms: FloatArray,
 ) -> FloatArray:
-    """Fill in the terms; what the base contributes."""
+    """Fill in the terms; what the base contributes. Joint k of the path carries link k + 1 of the plan."""
+    path = tree.path(link)
     Ts = placements(plan, q, base=base, threads=1)
     velocity = velocities(plan, q, v, base=base, threads=1)
-    end = _NOWHERE
-    if reference is not Reference.WORLD:
-        # The same walk with the world's origin at the frame: what it rounds is as small as the robot, and
-        # what the new start is off by is the same for all.
-        base = _moved(base, -Ts[:, 1, :3, 3])
-        Ts = placements(plan, q, base=base, threads=1)
-        end = Ts[:, 1, :3, 3]
-    for k, i in enumerate(path):
-        R, d = Ts[:, 2 + k, :3, :3], end - Ts[:, 2 + k, :3, 3]
-        w_before = velocity[:, 2 + len(path) + k, 3:]
+    levers = -Ts[..., :3, 3] if reference is Reference.WORLD else _levers(tree, path, q, Ts[..., :3, :3])
+    moving = [(k, i) for k, i in enumerate(path) if tree.joints[i].kind.nv]
+    for place, (k, i) in enumerate(moving):
+        R, d, w_before = Ts[:, k + 1, :3, :3], levers[:, k + 1], velocity[:, k, 3:]
         joint, at = tree.joints[i], tree.v_index[i]
-        terms[:, k] = _terms(_moves(joint, v[:, at:], R), _moves(joint, a[:, at:], R), w_before, d)
-    of_base = _rigid(base, end - Ts[:, 0, :3, 3])
+        terms[:, place] = _terms(_moves(joint, v[:, at:], R), _moves(joint, a[:, at:], R), w_before, d)
+    of_base = _rigid(base, levers[:, 0])
     if reference is Reference.LOCAL:
-        back = Ts[:, 1, :3, :3].swapaxes(-1, -2)
+        back = Ts[:, -1, :3, :3].swapaxes(-1, -2)
         of_base = _turned(back, of_base)
         terms[...] = _turned(back[:, np.newaxis, np.newaxis], terms)
     if not (np.isfinite(of_base).all() and np.isfinite(terms).all()):
@@ -180,11 +173,27 @@ def _contributions(
     return of_base
 
 
-def _moved(base: FloatArray, by: FloatArray) -> FloatArray:
-    """(n, 24) the base's state with its place moved."""
-    moved = np.repeat(base, len(by), axis=0) if len(base) == 1 else base.copy()
-    moved[:, _OFFSET] += by
-    return moved
+def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatArray) -> FloatArray:
+    """(n, links, 3) from each link's origin to the path's end, in world axes, added up from there."""
+    levers = np.zeros(Rs.shape[:-1])
+    for k in reversed(range(len(path))):
+        joint, at = tree.joints[path[k]], tree.q_index[path[k]]
+        own = joint.T_parent_joint[:3, 3] + _slide(joint, q[:, at:]) @ joint.T_parent_joint[:3, :3].T
+        levers[:, k] = (Rs[:, k] @ own[..., np.newaxis])[..., 0] + levers[:, k + 1]
+    return levers
+
+
+def _slide(joint: Joint, q: FloatArray) -> FloatArray:
+    """(n, 3) how far a joint has slid, in its own axes; its coordinates come first in q."""
+    slide = np.zeros((len(q), 3))
+    if joint.kind is JointKind.PLANAR:
+        slide[:, :2] = q[:, :2]
+    elif joint.kind is JointKind.FLOATING:
+        slide[:] = q[:, :3]
+    elif joint.kind is JointKind.PRISMATIC:
+        value = joint.mimic.multiplier * q[:, :1] + joint.mimic.offset if joint.mimic else q[:, :1]
+        slide[:] = value * joint.axis
+    return slide
 
 
 def _terms(rate: _Moves, rate_2: _Moves, w_before: FloatArray, d: FloatArray) -> FloatArray:

@@ -116,8 +116,8 @@ def acceleration_scale(plan: Plan, size: Magnitudes, reference: Reference) -> Fl
     It is that of a breakdown's sum too. There the terms are gathered by joints: v_k z x (v_k z x d_k) and
     2 w_{k-1} x (v_k z x d_k) with d_k from the joint to the frame have the lengths (w_k^2 - w_{k-1}^2) d_k, w
     being the sum of the rates so far, and added over the joints they are w^2 times each link's own length, as
-    in 7.130. The d_k, differences of places seen from the frame, round as the sums of 7.77 do, and adding up
-    the 4 n parts rounds n + 3 times: both are less than the 2 eps that each joint has for sums.
+    in 7.130. The d_k, interorigin vectors added up from the frame, round as the sums of 7.77 do, and adding
+    up the 4 n parts rounds n + 3 times: both are less than the 2 eps that each joint has for sums.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared

@@ -86,7 +86,7 @@ def compare(
 def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
     """Metres and radians that a table's tip is off at most, with base, tool and offsets fitted in haste.
 
-    Few patterns of signs are tried, and none of the turns against each other that nearly coinciding axes allow.
+    Few patterns of signs are tried, and none of the turns that nearly coinciding axes allow.
 
     Args:
         chain: The path.
@@ -99,7 +99,9 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
     check_joints(chain, reference)
     standard = to_standard(reference) if reference.convention is Convention.MODIFIED else reference
     tried, wanted = _samples(chain, FIT_SAMPLES, 1)
-    model = _best_fit(chain, standard, _written(standard), tried, wanted, _reach(chain, wanted), enough, hasty=True)
+    model = _best_fit(
+        chain, standard, _written(standard), tried, wanted, _reach(chain, wanted), enough, hasty=True
+    )
     return _apart(model, *_samples(chain, CHECK_SAMPLES, 2))
 
 

@@ -65,9 +65,7 @@ class _Partial:
     absorber: tuple[int, float] | None = None
 
 
-def align(
-    chain: FrameChain, reference: DHTable, count: int = 12, beam: int = BEAM
-) -> list[Alignment]:
+def align(chain: FrameChain, reference: DHTable, count: int = 12, beam: int = BEAM) -> list[Alignment]:
     """The sign patterns closest to a standard reference table with as many joints of the same kinds.
 
     Sliding joints leave patterns that cells cannot tell apart; the fit can, so up to `count` are returned.
