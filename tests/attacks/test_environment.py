@@ -120,8 +120,14 @@ ASCII = (
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("env", ASCII, ids=str)
-@pytest.mark.parametrize("words", ["info", "check", "check --format json", "check --format github"])
+@pytest.mark.parametrize(
+    ("words", "env"),
+    [
+        *(("info", env) for env in ASCII),
+        *((f"check{form}", ASCII[0]) for form in ("", " --format json", " --format github")),
+    ],
+    ids=str,
+)
 def test_names_of_any_script_are_printed_on_any_terminal(words: str, env: dict[str, str], arm: Path) -> None:
     code, out, err = shell(f"$URDFKIN {words} arm.urdf", arm.parent, **env)
     assert code == 0, err

@@ -77,7 +77,7 @@ def viewer() -> Iterator[Viewer]:
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     rules = "--host-resolver-rules=MAP rebound.test 127.0.0.1"
-    with opened(tmp_path_factory.mktemp("profile"), flags=(rules,)) as browser:
+    with opened(tmp_path_factory.mktemp("profile"), width=800, height=500, flags=(rules,)) as browser:
         yield browser
 
 

@@ -62,7 +62,7 @@ def test_the_table_places_the_tip_where_the_chain_does(
 
 @pytest.mark.slow
 @given(trees(), st.sampled_from(CONVENTIONS), st.booleans())
-@settings(max_examples=1500)
+@settings(max_examples=600)
 def test_on_many_more_chains_the_table_is_exact_and_short(
     tree: KinematicTree, convention: str, backwards: bool
 ) -> None:

@@ -52,6 +52,7 @@ def opened(
         options.add_argument(flag)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     chrome = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    chrome.set_script_timeout(120)  # a busy machine is no error
     try:
         chrome.execute_cdp_cmd(
             "Emulation.setDeviceMetricsOverride",

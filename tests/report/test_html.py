@@ -153,7 +153,7 @@ def test_a_robot_costs_little_beside_what_every_page_carries() -> None:
 
 @pytest.mark.slow
 def test_the_page_of_all_68_robots_is_at_most_10_megabytes() -> None:
-    document = cast("Document", validate(examples(), samples=0, jobs=2).as_dict())
+    document = cast("Document", validate(examples(), samples=0).as_dict())
     assert len(document["robots"]) == 68
     text = as_html(document)
     assert 3_000_000 < len(text.encode()) <= 10_000_000
