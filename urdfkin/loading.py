@@ -206,7 +206,7 @@ def robot_of(
         verify=verify,
         mimic=mimic,
         findings=findings,
-        unverifiable=_unverifiable(findings),
+        unverifiable=_unverifiable((*findings, *(finding for finding, _ in report.silenced))),
         oracle=oracle,
         base_frame=text.entry.base if text.entry else None,
         tip_frame=text.entry.tip if text.entry else None,

@@ -4,7 +4,7 @@
 def document(example: str) -> str:
     """An example as a URDF; see `urdfkin.lint.pages.Page`."""
     text = example.strip("\n")
-    if not text.startswith(("<joint", "<link", "<material")):
+    if not text.startswith(("<joint", "<link", "<material", "<!--")):
         return example
-    links = '<link name="base"/>\n<link name="tip"/>\n' if text.startswith("<joint") else ""
+    links = '<link name="base"/>\n<link name="tip"/>\n' if text.startswith(("<joint", "<!--")) else ""
     return f'<robot name="example">\n{links}{text}\n</robot>\n'

@@ -13,6 +13,7 @@ from typing import Any
 
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.printable import printable
+from urdfkin.lint.edits import Fix
 from urdfkin.lint.escape import shortened
 
 
@@ -58,6 +59,8 @@ class Finding:
         oracle: Set when Pinocchio refuses the file for this, or reads it differently: then nothing that is
             computed from the file can be verified against it.
         also: The line of each further finding that says the same and was folded into this one.
+        width: How many characters of the line, from `column` on, it is about; 0: no place of the text.
+        fix: What cures it without a person's judgement, or None.
     """
 
     code: str
@@ -72,6 +75,8 @@ class Finding:
     name: str | None = None
     oracle: PinocchioReading | None = None
     also: tuple[int, ...] = ()
+    width: int = 0
+    fix: Fix | None = None
 
     @property
     def subject(self) -> str:
@@ -110,8 +115,9 @@ class Finding:
         return f"{place}: {self.code} {self.severity.value}: {self.sentence}"
 
     def as_dict(self) -> dict[str, Any]:
-        """The finding as JSON has it: the words of the enums, lists for tuples."""
+        """The finding as a report's JSON has it: the words of the enums, lists for tuples, no `fix`."""
         data = asdict(self)
+        del data["width"], data["fix"]
         data["severity"] = self.severity.value
         data["oracle"] = self.oracle.value if self.oracle else None
         data["also"] = list(self.also)

@@ -18,6 +18,7 @@ from urdfkin.lint import rules
 from urdfkin.lint.rule import Rule
 from urdfkin.lint.rules import (
     axes,
+    comments,
     dialect,
     document,
     encoding,
@@ -40,7 +41,7 @@ from urdfkin.lint.rules import (
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
     for module in (
-        *(encoding, document, dialect, prefixes, vocabulary, numbers, names, structure),
+        *(encoding, document, comments, dialect, prefixes, vocabulary, numbers, names, structure),
         *(joints, axes, ranges, mimic, suspicious, inertials, shapes, meshes, materials),
     )
 }
@@ -59,7 +60,7 @@ class Page:
         title: The claim in one line, for tables.
         why: Why it matters to someone who wants numbers.
         example: A smallest one that has it. A whole document, or the inside of `<robot>`; when it begins
-            with a joint, the links `base` and `tip` are there already.
+            with a joint or a comment, the links `base` and `tip` are there already.
         cure: The same example, put right.
         others: What Pinocchio (urdfdom) and yourdfpy do with the example.
     """
@@ -109,3 +110,20 @@ def find_rule(word: str) -> Rule:
         if wanted in (rule.id.lower(), rule.slug):
             return rule
     raise UnknownNameError("code", word, [*RULES, *(rule.slug for rule in RULES.values())])
+
+
+def find_rules(word: str) -> tuple[Rule, ...]:
+    """The rules that a word stands for: one by its code or short name, a family by a code's beginning, ALL.
+
+    Raises:
+        UnknownNameError: it stands for none; the nearest are offered.
+
+    >>> [rule.id for rule in find_rules("rounded-pi")], len(find_rules("URDF30"))
+    (['URDF601'], 5)
+    """
+    wanted = word.strip().upper()
+    wanted = f"URDF{wanted}" if wanted.isdigit() else wanted
+    family = tuple(rule for rule in RULES.values() if rule.id.startswith(wanted))
+    if wanted == "ALL":
+        return tuple(RULES.values())
+    return family if family and wanted[4:] else (find_rule(word),)

@@ -5,14 +5,17 @@ The text is read once: who loads a robot makes it of the same records that the r
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from urdfkin.errors.demands import switch, word
 from urdfkin.lint.finding import Finding
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
+from urdfkin.lint.pages import find_rule
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rules.axes import check_axes
+from urdfkin.lint.rules.comments import check_unused, read_comments
 from urdfkin.lint.rules.dialect import check_dialect
 from urdfkin.lint.rules.document import read_document
 from urdfkin.lint.rules.inertials import check_inertials
@@ -56,8 +59,8 @@ def check(
             hundredth of a kind on into that one.
 
     Returns:
-        The findings; an empty list for a file nothing can be said against. Of each kind 10,000 are written
-        out; `also` of the last holds the lines of the others.
+        The findings that no comment of the file silences; an empty list for a file nothing can be said
+        against. Of each kind 10,000 are written out; `also` of the last holds the lines of the others.
 
     Raises:
         SourceError: the file cannot be read.
@@ -74,17 +77,61 @@ def check(
         word(root_joint, "root_joint")
     switch(fold, "fold")
     text = read_source(source, limits.bytes, xacro_args)
+    return list(examine(text, limits=limits, mimic=mimic, root_joint=root_joint, fold=fold).findings)
+
+
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """A text and what was found in it.
+
+    Attributes:
+        text: What was read.
+        data: Its bytes behind a byte order mark: lines, columns and fixes count in them.
+        robot: What it says; None where it is no URDF.
+        findings: By line.
+        silenced: Findings that a comment silences, each with its reason.
+    """
+
+    text: Text
+    data: bytes
+    robot: RobotRecord | None
+    findings: tuple[Finding, ...]
+    silenced: tuple[tuple[Finding, str], ...]
+
+
+def examine(
+    text: Text,
+    *,
+    limits: Limits = DEFAULT_LIMITS,
+    mimic: bool | None = None,
+    root_joint: str | None = None,
+    fold: bool = False,
+    wanted: Callable[[Finding], bool] | None = None,
+) -> Examined:
+    """As `check`, of a text that was read already.
+
+    Args:
+        text: The text.
+        limits: As for `check`, and so the next three.
+        mimic: See there.
+        root_joint: See there.
+        fold: See there.
+        wanted: Which findings, asked before any are folded; None: all.
+    """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data, limits)
     robot = read_urdf(report, mimic=mimic, root_joint=root_joint)
     if robot is not None:
-        check_meshes(report, robot.element, _file(text))
-    return list(report.findings(fold=fold))
+        check_meshes(report, robot.element, file_of(text))
+        check_unused(report)
+    return Examined(
+        text, report.data, robot, report.findings(fold=fold, wanted=wanted), tuple(report.silenced)
+    )
 
 
-def _file(text: Text) -> Path | None:
-    """The file a text was read from, which tells where its packages may lie."""
+def file_of(text: Text) -> Path | None:
+    """The file a text was read from, which tells where its packages may lie; None where there is none."""
     path = Path(text.source if text.entry is None else text.label)
     return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path
 
@@ -117,6 +164,7 @@ def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = 
             joint takes are errors.
     """
     root = read_document(report)
+    read_comments(report, find_rule)
     version = None if root is None else check_dialect(report, root)
     if root is None or version is None:
         return None

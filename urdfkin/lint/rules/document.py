@@ -15,6 +15,7 @@ from urdfkin.lint.limits import ORACLE_DEPTH
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, REFUSES, WARNING, Rule
 from urdfkin.lint.rules.encoding import line_and_column, utf8_bytes
+from urdfkin.lint.silence import MARK, Comment
 from urdfkin.urdf.element import Element
 
 SYNTAX = Rule("URDF105", "xml-syntax", ERROR)
@@ -97,6 +98,8 @@ class _Builder:
         self.begun = False
         self.count = self.deepest = 0
         self.deepest_element: Element | None = None
+        self.waiting: list[Comment] = []
+        self.marked = MARK.encode() in report.data
         self.parser = parser = expat.ParserCreate("utf-8")
         parser.buffer_text = True
         parser.StartElementHandler = self.start
@@ -128,10 +131,14 @@ class _Builder:
         element = Element(tag, attributes, parent, line, column, self.parser.CurrentByteIndex)
         if parent is None:
             self.root, self.begun = element, True
-            self.parser.CommentHandler = None
+            if not self.marked:
+                self.parser.CommentHandler = None
         else:
             element.above = None if parent is self.root else parent.holder
             parent.append(element)
+        for comment in self.waiting:
+            comment.element = element
+        self.waiting.clear()
         self.open.append(element)
         self.count += 1
         if len(self.open) > self.deepest:
@@ -165,6 +172,7 @@ class _Builder:
         raise _Stop
 
     def end(self, tag: str) -> None:
+        self.waiting.clear()
         element = self.open.pop()
         if element.text:
             element.text = element.text.strip()
@@ -176,6 +184,17 @@ class _Builder:
 
     def comment(self, text: str) -> None:
         self.begun = True
+        if text.lstrip().startswith(MARK):
+            comment = Comment(text, *self.here(), self._is_behind_something())
+            self.report.comments.append(comment)
+            self.waiting.append(comment)
+
+    def _is_behind_something(self) -> bool:
+        """Whether there is more than blanks before what expat is reading, on its line."""
+        data, start = self.report.data, self.parser.CurrentByteIndex
+        while start > 0 and data[start - 1] in b" \t":
+            start -= 1
+        return start > 0 and data[start - 1] not in b"\r\n"
 
     def instruction(self, target: str, text: str) -> None:
         """Judge a processing instruction: urdfdom's parser allows them at the very beginning alone."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 
+from urdfkin.lint.edits import Edit, Fix
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
@@ -107,6 +108,7 @@ def _agrees(report: Reporter, text: bytes, declared: str | None) -> bool:
             "the declared encoding is not UTF-8, though every character is ASCII",
             found=quoted(declared),
             remedy='write encoding="UTF-8"',
+            fix=lambda: Fix((Edit(*named.span(1), "UTF-8"),)) if (named := _ENCODING.search(text)) else None,
         )
         return True
     report.add(

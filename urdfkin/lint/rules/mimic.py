@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from urdfkin.lint.edits import Fix
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.finding import Severity
 from urdfkin.lint.reporter import Reporter
@@ -42,7 +45,15 @@ class _Judge:
         self.report, self.joints, self.obeyed = report, joints, obeyed
         self.looped = _looped(joints)
 
-    def add(self, code: Rule, message: str, mimic: MimicRecord, attribute: str, remedy: str) -> None:
+    def add(
+        self,
+        code: Rule,
+        message: str,
+        mimic: MimicRecord,
+        attribute: str,
+        remedy: str,
+        fix: Callable[[], Fix | None] | None = None,
+    ) -> None:
         """Report a finding at an attribute of a `<mimic>`."""
         written = mimic.element.attributes.get(attribute)
         self.report.add(
@@ -53,6 +64,7 @@ class _Judge:
             found=None if written is None else f"{attribute}={quoted(written)}",
             remedy=remedy,
             severity=None if self.obeyed else Severity.NOTE,
+            fix=fix,
         )
 
     def check(self, joint: JointRecord, mimic: MimicRecord) -> None:
@@ -64,6 +76,7 @@ class _Judge:
                 mimic,
                 "joint",
                 "remove it",
+                lambda: self.report.without_element(mimic.element),
             )
             return
         if joint.kind in ("planar", "floating"):

@@ -149,6 +149,9 @@ class NumberReader:
             attribute=attribute,
             found=quoted(self.report.raw(element, attribute) or element.attributes[attribute]),
             remedy="write single spaces between numbers and none around them",
+            fix=lambda: self.report.rewritten(
+                element, attribute, " ".join(element.attributes[attribute].split())
+            ),
         )
 
 

@@ -74,4 +74,5 @@ def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
             attribute=written[0],
             found=" ".join(f"{name}={quoted(limit.element.attributes[name])}" for name in written),
             remedy='remove them, or write type="revolute"',
+            fix=lambda: report.without(limit.element, *written),
         )

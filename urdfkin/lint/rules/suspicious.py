@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from fractions import Fraction
 
 from urdfkin.lint.escape import quoted
@@ -91,24 +92,38 @@ def _degrees(report: Reporter, joint: JointRecord, what: str, found: str) -> Non
 
 def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], reach: float) -> None:
     """The angle of an origin that is furthest off a multiple of pi it was probably meant to be."""
-    off, text, multiple, meant = 0.0, "", Fraction(0), 0.0
-    for word, angle in zip(written, joint.rpy, strict=True):
+    off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
+    whole = list(written)
+    for k, (word, angle) in enumerate(zip(written, joint.rpy, strict=True)):
         found = rounded_pi(word, angle)
-        if found is not None and abs(angle - found[1]) > off:
+        if found is None:
+            continue
+        whole[k], turns = repr(found[1]), turns + abs(angle - found[1])
+        if abs(angle - found[1]) > off:
             off, text, (multiple, meant) = abs(angle - found[1]), word, found
-    if not off:
+    if not off or joint.origin_element is None:
         return
+    origin = joint.origin_element
     moves = f", which moves what it carries by up to {_metres(off * reach)}" if reach > 0.0 else ""
     report.add(
         ROUNDED_PI,
         f"rpy holds a rounded {_as_pi(multiple)}, off by {off:.1e} rad{moves}",
-        joint.origin_element,
+        origin,
         attribute="rpy",
         found=quoted(text),
         remedy=f"write {meant!r} if {_as_pi(multiple)} is meant; it is used as written",
         severity=Severity.WARNING if off * reach > NOTICEABLE else None,
         weight=off * reach,
+        fix=lambda: report.rewritten(origin, "rpy", _exchanged(report.raw(origin, "rpy"), whole), turns),
     )
+
+
+def _exchanged(raw: str | None, words: list[str]) -> str:
+    """A value as the file has it, with other words between the same blanks."""
+    blanks = re.split(r"[^ \t\r\n]+", raw or "")
+    if len(blanks) != len(words) + 1:  # blanks that are written as references
+        return " ".join(words)
+    return "".join(blank + word for blank, word in zip(blanks, [*words, ""], strict=True))
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:

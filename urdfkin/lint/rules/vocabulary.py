@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.finding import Severity
@@ -58,6 +58,9 @@ ATTRIBUTES = {
 
 #: Elements and attributes of other formats that say where something is, and are skipped here.
 _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
+
+#: Attributes that mean something elsewhere, or to others: whether they may go takes a person.
+_MEANT = frozenset().union(*ATTRIBUTES.values()) | _FOREIGN | EXTENSIONS
 
 #: Children that may stand once only.
 _ONCE = {
@@ -173,6 +176,7 @@ def _check_attributes(report: Reporter, element: Element) -> None:
             found=f"{attribute}={quoted(element.attributes[attribute])}",
             remedy=f"did you mean {close}?" if close else f"known are {', '.join(sorted(known))}",
             severity=Severity.NOTE if attribute in EXTENSIONS else None,
+            fix=None if close or attribute in _MEANT else partial(report.without, element, attribute),
         )
 
 

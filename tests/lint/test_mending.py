@@ -1,0 +1,220 @@
+"""A fix cures its finding, leaves every other byte alone, and proves that the robot is the same."""
+
+from __future__ import annotations
+
+import codecs
+import dataclasses
+import difflib
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import urdfkin
+from tests.lint.cases import CASES
+from tests.lint.cases.arm import Case, arm, axis, limit
+from urdfkin.lint import Finding, Severity
+from urdfkin.lint.edits import Edit, Fix
+from urdfkin.lint.mending import TILT, Mended, differences, mend
+from urdfkin.lint.rules.axes import unit_vector
+from urdfkin.lint.runner import Examined, examine
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.sources import Text, read_source
+
+
+def all_of() -> Callable[[Finding], bool]:
+    return lambda _: True
+
+
+def mended(data: bytes | str) -> Mended:
+    raw = data.encode() if isinstance(data, str) else data
+    return mend(Text(raw, "<bytes>", "<bytes>"), examine, all_of)
+
+
+def codes(data: bytes) -> list[str]:
+    return [finding.code for finding in examine(Text(data, "<bytes>", "<bytes>")).findings]
+
+
+SLOPPY = """<?xml version="1.0"?>\r
+<robot name='r'>   <!-- keep: rpy="1.5708 0 0" -->\r
+  <link name="a"/><link name="b"/><link name="c"/>\r
+\t<joint  name='j' type="continuous">\r
+    <parent link="a"/>  <child link="b"/>\r
+    <origin rpy = '1.5708   -3.1416 0.5'   xyz="0 0 1" colour="red"/>\r
+    <axis\txyz="0 0 2" />\r
+    <limit  lower="-1"\r
+            effort="1" upper="2"\r
+            velocity="3"/>\r
+  </joint>\r
+  <joint name="k" type="fixed"><parent link="b"/><child link="c"/>\r
+    <mimic joint="j"/>\r
+  </joint>\r
+</robot>\r
+"""
+TIDY = (
+    SLOPPY.replace("'1.5708   -3.1416 0.5'", "'1.5707963267948966   -3.141592653589793 0.5'")
+    .replace(' colour="red"', "").replace('"0 0 2"', '"0 0 1"').replace("    <mimic joint=\"j\"/>\r\n", "")
+    .replace('<limit  lower="-1"\r\n            effort="1" upper="2"', '<limit\r\n            effort="1"')
+)  # fmt: skip
+
+
+def test_nothing_but_what_is_cured_changes_a_byte() -> None:
+    done = mended(SLOPPY)
+    assert done.text.data.decode() == TIDY
+    assert sorted(f.code for f in done.fixed) == ["URDF208", "URDF503", "URDF510", "URDF510", "URDF601"]
+    assert codes(done.text.data) == []
+
+
+def test_a_byte_order_mark_stays_where_it_is() -> None:
+    done = mended(codecs.BOM_UTF8 + SLOPPY.encode())
+    assert done.text.data == codecs.BOM_UTF8 + TIDY.encode()
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_of_every_odd_document_what_is_fixed_is_gone_and_nothing_new_is_found(case: Case) -> None:
+    before, done = examine(Text(case.data, "<bytes>", "<bytes>")), mended(case.data)
+    after = examine(done.text)
+    assert len(after.findings) == len(before.findings) - len(done.fixed)
+    if any(finding.severity is Severity.ERROR for finding in before.findings):
+        assert done.fixed == ()
+    else:
+        assert done.kept == {}
+        assert [finding.code for finding in after.findings if finding.fix] == []
+    if not done.fixed:
+        assert done.text.data == case.data
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        arm(origin='<origin xyz="0 0 1" xzy="0 0 2"/>'),  # a slip of the pen, not a value that nobody misses
+        arm(origin='<origin xyz="0 0 1" pose="0 0 2 0 0 0"/>'),
+        arm(axis='<axis xyz="0 0 1" rpy="1 0 0"/>'),
+        arm(axis='<axis xyz="1e-13 0 2"/>'),  # of unit length, Pinocchio would take another axis
+        limit('lower="2" upper="-2" effort="1" velocity="1"'),
+        axis("0 0 0"),
+    ],
+)
+def test_what_takes_judgement_is_left(text: str) -> None:
+    assert codes(text.encode())
+    assert mended(text).text.data == text.encode()
+
+
+@pytest.mark.parametrize(
+    ("damage", "objection"),
+    [
+        (b'"0 0 2"', "joint j1 would have another axis"),
+        (b'effort="10"', "joint j1 would have another limit"),
+        (b'<origin xyz="0 0 0.3"', "joint j1 would have another origin"),
+        (b'rpy="0.1 0.2', "joint j1 would have another orientation"),
+        (b'<link name="l1"', "links or joints would not be the same"),
+        (b"</robot>", "it would bring URDF105"),
+    ],
+)
+def test_a_fix_that_does_more_than_it_says_is_not_made(damage: bytes, objection: str) -> None:
+    text = arm(axis='<axis xyz="0 0 2"/>')
+
+    def look(asked: Text) -> Examined:
+        found = examine(asked)
+        at = found.data.find(damage)
+        digit = next((k for k in range(at, at + len(damage)) if found.data[k : k + 1].isdigit()), at + 1)
+        edits = [Edit(digit, digit + 1, "7")]
+        own = [f.fix for f in found.findings if f.code == "URDF503" and f.fix]
+        if own and damage != b'"0 0 2"':
+            edits = sorted([*edits, *own[0].edits], key=lambda edit: edit.start)
+        elif own:
+            edits = [Edit(own[0].edits[0].start, own[0].edits[0].end, "0 1e-7 1")]
+        wrong = [
+            dataclasses.replace(f, fix=Fix(tuple(edits))) if f.code == "URDF503" else f
+            for f in found.findings
+        ]
+        return dataclasses.replace(found, findings=tuple(wrong))
+
+    done = mend(Text(text.encode(), "<bytes>", "<bytes>"), look, all_of)
+    assert done.text.data == text.encode()
+    assert done.fixed == ()
+    assert done.kept["URDF503"].startswith((objection, "URDF503 would still be there", "it would bring"))
+
+
+numbers = st.floats(-1e3, 1e3).filter(lambda x: x == 0.0 or abs(x) > 1e-6)
+
+
+@given(st.tuples(numbers, numbers, numbers).filter(lambda v: math.hypot(*v) > 1e-3))
+def test_a_unit_vector_tilts_by_less_than_a_rounding(vector: tuple[float, float, float]) -> None:
+    a, b = [list(map(Fraction, v)) for v in (vector, unit_vector(vector))]
+    cross = sum((a[i] * b[j] - a[j] * b[i]) ** 2 for i, j in ((0, 1), (1, 2), (2, 0)))
+    lengths = sum(x * x for x in a) * sum(x * x for x in b)
+    assert cross <= (TILT / 2) ** 2 * lengths * (1 + Fraction(1, 10**9))
+    assert abs(math.hypot(*unit_vector(vector)) - 1.0) < 1e-12
+
+
+SPOILT = {
+    "long axes": ('<axis xyz="0 0 1"', '<axis xyz="0 0 2.5"'),
+    "unknown attributes": ("<axis ", '<axis  shade="3" '),
+    "tabs between numbers": ('<origin rpy="', '<origin rpy=" '),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["ur5", "panda", "talos_reduced", "kinova"])
+def test_a_mended_robot_is_proven_to_be_the_same(robot: str) -> None:
+    text = catalogue()[robot].path.read_text("utf-8")
+    for old, new in SPOILT.values():
+        text = text.replace(old, new)
+    done = mended(text)
+    assert {"URDF208", "URDF503"} <= {finding.code for finding in done.fixed}
+    pi = [finding.fix.turns for finding in done.fixed if finding.code == "URDF601" and finding.fix]
+    found = urdfkin.same(robot, done.text.data)
+    if not pi:
+        assert found
+        return
+    # Turned by what was said of all joints together, nowhere more; lengths together are metres.
+    assert found.exit_code(within=sum(pi) * 10.0) == 0
+    assert sum(pi) < 1e-2
+
+
+def test_a_rounded_pi_turns_no_frame_by_more_than_its_fix_says() -> None:
+    rough = arm(origin='<origin xyz="0 0 0.3" rpy="1.5708 0 -3.1416"/>')
+    done = mended(rough)
+    (finding,) = done.fixed
+    assert finding.fix is not None
+    a, b = (urdfkin.load(data) for data in (rough, done.text.data))
+    R_a, R_b = (robot.placement(robot.neutral(), "l1")[:3, :3] for robot in (a, b))
+    turned = math.sqrt(float(((R_a - R_b) ** 2).sum()) / 2.0)
+    assert 0.0 < turned <= finding.fix.turns < 1.2e-5
+
+
+def test_the_differences_that_are_looked_for_are_all_there_are() -> None:
+    """Every field of a joint's record is held against the other, or says where it stands in the file."""
+    record = examine(read_source(arm())).robot
+    assert record is not None
+    joint = record.joints[0]
+    places = {"element", "axis_element", "origin_element"}
+    changed: dict[str, Any] = {
+        "name": "x", "kind": "prismatic", "parent": "tool", "child": "tool", "xyz": (9.0, 0.0, 0.0),
+        "rpy": (1.0, 0.2, 0.3), "quaternion": (0.0, 0.0, 0.0, 1.0), "axis": (1.0, 0.0, 0.0), "limit": None,
+        "mimic": "anything",
+    }  # fmt: skip
+    assert {field.name for field in dataclasses.fields(joint)} == places | changed.keys()
+    for name, value in changed.items():
+        if name == "mimic":
+            continue
+        other = dataclasses.replace(
+            record, joints=[dataclasses.replace(joint, **{name: value}), *record.joints[1:]]
+        )
+        assert list(differences(record, other, {})) != [], name
+    assert list(differences(record, record, {})) == []
+
+
+def test_a_file_with_an_error_has_no_meaning_to_keep() -> None:
+    done = mended(limit('lower="1" upper="-1" effort="1" velocity="1"').replace("<axis ", '<axis shade="3" '))
+    assert done.kept == {"URDF208": "errors come first, URDF507 here"}
+
+
+def test_the_patch_has_the_changed_lines_only() -> None:
+    lines = difflib.ndiff(SLOPPY.splitlines(), mended(SLOPPY).text.data.decode().splitlines())
+    assert sum(line.startswith("- ") for line in lines) == 5
