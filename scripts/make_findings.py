@@ -53,10 +53,7 @@ with an error and warns of the rest. `urdfkin explain CODE` prints a code's page
 Codes marked *refuses* or *differs* are legal, but Pinocchio refuses the file or reads another robot from it:
 urdfkin computes the robot and reports every result as **not verified**, with the finding as the reason.
 
-In a repository of robots, use the hook `urdfkin-check` of pre-commit, or in a workflow
-`urdfkin check --format github robots/*.urdf`. `--format sarif` is for code scanning, `--format json` for
-programs. Exit status: 0 no error, 1 an error (with `--strict`, a warning), 2 a file or an option that cannot
-be used.
+[check.md](check.md) is about the command: folders, settings, comments that silence, baselines, cures.
 
 Time and memory grow with the file, and no faster (`scripts/check_growth.py` measures it for every kind of
 content). Limits, which options raise: {limits.bytes:,} bytes (`--max-bytes`), {limits.depth:,} levels of

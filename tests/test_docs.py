@@ -14,6 +14,7 @@ from urdfkin.cli import cli
 
 ROOT = Path(__file__).parents[1]
 PAGES = (
+    "docs/check.md",
     *("docs/reports.md", "docs/ci.md", "docs/campaigns.md", "docs/dh-at-work.md", "docs/accelerations.md"),
     *("docs/examples/robots.yml", "README.md"),
 )
@@ -64,7 +65,7 @@ def test_the_pages_have_commands_to_understand() -> None:
 
 
 @pytest.mark.parametrize(
-    "page", ["docs/reports.md", "docs/ci.md", "docs/campaigns.md", "docs/performance.md"]
+    "page", ["docs/check.md", "docs/reports.md", "docs/ci.md", "docs/campaigns.md", "docs/performance.md"]
 )
 def test_links_lead_to_files_and_headings(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")

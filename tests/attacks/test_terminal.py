@@ -42,7 +42,9 @@ ROBOT = {
     "screws": [["--no-mimic", "--format", form] for form in SCREWS] + [["--base", FILE]],
     "structure": [[], ["--json"], ["--opw", "1"]],
     "export": [["--no-mimic", "--to", form] for form in LANGUAGES] + [["--to", "c", "--frame", FILE]],
-    "check": [["--format", form] for form in ("terminal", "json", "sarif", "github")] + [["--each"]],
+    "check": [["--format", form] for form in ("terminal", "concise", "json", "sarif", "github")]
+    + [["--each"], ["--statistics"], ["--diff"]]
+    + [[option, FILE] for option in ("--baseline", "--changed-since", "--config", "--select")],
     "validate": [["--samples", "2", "--cases"], ["--samples", "1", "--isolate"]],
     "plot": [
         ["--to", "neutral", "--frame", NAMES["math"], "--output", "PICTURE"],
@@ -267,7 +269,7 @@ def test_what_is_printed_goes_through_the_door() -> None:
         "door.py": ("click.echo(printable(line)",),
         "info.py": ("click.echo()",), "robots.py": ("click.echo()",),
         "explain.py": ("click.echo(equation)", "click.echo(explain(", 'click.echo(f"{rule.id}'),
-        "check.py": ("click.echo(as_json(", "click.echo(as_sarif(", "click.echo(summary(", "click.echo(f\"'"),
+        "checked.py": ("click.echo(as_json(", "click.echo(as_sarif("),
         "report.py": ("click.echo(asset(",), "compare.py": ("click.echo(json.dumps(",),
         "same.py": ("click.echo(schema_text()",),
         "dh_work.py": ("click.echo(text, nl=False)",),

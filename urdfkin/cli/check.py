@@ -2,157 +2,262 @@
 
 from __future__ import annotations
 
-import importlib.metadata
-import re
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 import click
 
-from urdfkin.cli.arguments import xacro_args, xacro_option
-from urdfkin.cli.door import command_lines, say, say_styled
+from urdfkin.cli.arguments import together, xacro_args, xacro_option
+from urdfkin.cli.checked import STYLES, Outcome, print_outcome, say_fixed, show_difference
+from urdfkin.cli.door import say
+from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.numbers import Whole
-from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
-from urdfkin.lint import DEFAULT_LIMITS, Finding, Limits, Severity, check
-from urdfkin.lint.formats import as_github, as_json, summary
-from urdfkin.lint.pages import find_rule, page
-from urdfkin.lint.sarif import as_sarif
+from urdfkin.errors import SourceError, UnknownNameError
+from urdfkin.lint import Finding, Limits, Severity
+from urdfkin.lint.baseline import baseline_text, read_baseline
+from urdfkin.lint.choosing import Choice, known_before
+from urdfkin.lint.collecting import collected
+from urdfkin.lint.mending import mend
+from urdfkin.lint.pages import RULES
+from urdfkin.lint.runner import Examined, examine, file_of
+from urdfkin.lint.settings import INCLUDE, Settings, codes, find_settings, read_settings
+from urdfkin.system.files import write_file
+from urdfkin.system.git import Version, version_before
+from urdfkin.urdf.sources import Text, is_xacro, read_source
 from urdfkin.urdf.xacro import XacroError
 
-_COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}
+_SETTINGS = "urdfkin.settings"
+#: Settings that are called as options.
+_OPTIONS = ("select", "ignore", "exclude", "strict")
+_FILE = click.Path(path_type=Path, dir_okay=False)
+
+
+def _take_settings(context: click.Context, _: click.Parameter, file: Path | None) -> None:
+    """The repository's settings, or those of a file: what the command line does not say, they do."""
+    isolated = "--isolated" in context.meta
+    settings = Settings() if isolated else find_settings(Path()) if file is None else read_settings(file)
+    values = dict(settings.values)
+    given: dict[str, Any] = {name: values[name] for name in _OPTIONS if name in values}
+    if "notes" in values:
+        given["no_notes"] = not values["notes"]
+    if "baseline" in values:
+        given["baseline"] = str(settings.root / values["baseline"])
+    context.default_map = given
+    context.meta[_SETTINGS] = settings
+
+
+def _isolate(context: click.Context, _: click.Parameter, isolated: bool) -> None:
+    if isolated:
+        context.meta["--isolated"] = True
+
+
+choice_options = together(
+    click.option(
+        "--select", multiple=True, metavar="CODE", help="Only these: codes, names or families, URDF5."
+    ),
+    click.option(
+        "--ignore", multiple=True, metavar="CODE", help="Leave out a code; may be repeated, or a,b,c."
+    ),
+    click.option("--strict", is_flag=True, help="Turn warnings into errors."),
+    click.option("--no-notes", is_flag=True, help="Leave out notes."),
+    click.option(
+        "--exclude", multiple=True, metavar="GLOB", help="Files and folders that a folder has in vain."
+    ),
+    click.option("--baseline", type=_FILE, help="Leave out the findings that this file knows."),
+    click.option("--write-baseline", type=_FILE, help="Make all that is found known to this file; exit 0."),
+    click.option(
+        "--changed-since", metavar="VERSION", help="Only what is new since a branch, tag or commit."
+    ),
+)
+settings_options = together(
+    click.option(
+        "--isolated", is_flag=True, is_eager=True, expose_value=False, callback=_isolate,
+        help="Take no settings from pyproject.toml.",
+    ),
+    click.option(
+        "--config", type=_FILE, is_eager=True, expose_value=False, callback=_take_settings,
+        help="Take [tool.urdfkin] of this file.  [default: of the nearest pyproject.toml]",
+    ),
+)  # fmt: skip
+limit_options = together(
+    *(
+        click.option(f"--max-{limit.name}", type=Whole(1), default=limit.default, show_default=True)
+        for limit in fields(Limits)
+    )
+)
 
 
 @click.command("check")
-@click.argument("files", nargs=-1, required=True, metavar="FILE...")
+@click.argument("files", nargs=-1, metavar="[FILE|FOLDER|GLOB]...")
 @click.option(
-    "--format",
-    "style",
-    type=click.Choice(["terminal", "json", "sarif", "github"]),
-    default="terminal",
-    show_default=True,
+    "--format", "--output-format", "style", type=click.Choice(STYLES), default="terminal", show_default=True,
     help="How to print the findings.",
-)
-@click.option("--strict", is_flag=True, help="Turn warnings into errors.")
-@click.option("--ignore", multiple=True, metavar="CODE", help="Leave out a code; may be repeated, or a,b,c.")
+)  # fmt: skip
+@click.option("--fix", is_flag=True, help="Cure what needs no judgement, in the files.")
+@click.option("--diff", is_flag=True, help="Print what --fix would change, and change nothing.")
+@click.option("--statistics", is_flag=True, help="Print how many there are of each code.")
+@choice_options
 @click.option("--each", is_flag=True, help="Print each place instead of folding many of a kind into one.")
-@click.option("--no-notes", is_flag=True, help="Leave out notes.")
 @click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow.  [default: they do]")
 @click.option(
     "--root-joint", type=click.Choice(["floating", "planar"]), help="Check the names this joint needs, too."
 )
 @xacro_option
-@click.option("--max-bytes", type=Whole(1), default=DEFAULT_LIMITS.bytes, show_default=True)
-@click.option("--max-depth", type=Whole(1), default=DEFAULT_LIMITS.depth, show_default=True)
-@click.option("--max-elements", type=Whole(1), default=DEFAULT_LIMITS.elements, show_default=True)
-@click.option("--max-attributes", type=Whole(1), default=DEFAULT_LIMITS.attributes, show_default=True)
-@click.option("--max-name", type=Whole(1), default=DEFAULT_LIMITS.name, show_default=True)
-@click.option("--max-number", type=Whole(1), default=DEFAULT_LIMITS.number, show_default=True)
-@click.option("--max-markup", type=Whole(1), default=DEFAULT_LIMITS.markup, show_default=True)
-def command(
-    files: Sequence[str],
-    style: str,
-    strict: bool,
-    ignore: Sequence[str],
-    each: bool,
-    no_notes: bool,
-    mimic: bool | None,
-    root_joint: str | None,
-    max_bytes: int,
-    max_depth: int,
-    max_elements: int,
-    max_attributes: int,
-    max_name: int,
-    max_number: int,
-    max_markup: int,
-) -> None:
+@settings_options
+@limit_options
+@click.pass_context
+def command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
     """Check URDFs and print what is wrong with them: code, place, what was found, what to do.
 
-    FILE is a path, or - for standard input. A .xacro file is expanded by a process that can compute and read
-    its package's files, no more (docs/xacro.md). Exit 0 when there is no error, 1 when there is, 2 when a
-    file cannot be read or an option is wrong.
+    A FILE is a path, a name of the catalogue, or - for standard input; a FOLDER stands for all *.urdf in it;
+    with neither, the current folder is checked. A .xacro file is expanded by a process that can compute and
+    read its package's files, no more (docs/xacro.md). Exit 0 when there is no error, 1 when there is, or
+    something to --diff, 2 when a file cannot be read or an option is wrong.
 
     \b
     Example:
-      urdfkin check arm.urdf
-      urdfkin check --strict --ignore URDF601 robots/*.urdf
+      urdfkin check robots/
+      urdfkin check --strict --ignore URDF601 arm.urdf 'hands/**/*.urdf'
+      urdfkin check --changed-since origin/main
+      urdfkin check --select URDF503 --fix arm.urdf
       urdfkin explain URDF502
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
-    ignored = _codes(ignore)
-    limits = Limits(max_bytes, max_depth, max_elements, max_attributes, max_name, max_number, max_markup)
-    fold = style == "terminal" and not each
-    findings: list[Finding] = []
-    read: list[str] = []
-    unreadable: list[UrdfkinError] = []
-    for file in files:
-        try:
-            found = check(
-                _as_path(file),
-                limits=limits,
-                mimic=mimic,
-                root_joint=root_joint,
-                xacro_args=xacro_args(),
-                fold=fold,
-            )
-        except (SourceError, UnknownNameError, XacroError) as error:
-            unreadable.append(error)
-            continue
-        read.append(file)
-        findings += [_judged(f, strict) for f in found if _wanted(f, ignored, no_notes)]
-    _print(findings, read, style)
-    for failure in unreadable:
+    if options["fix"] and options["diff"]:
+        refuse_idle(context, ("fix",), "with --diff")
+    if options["statistics"] and options["style"] not in ("terminal", "concise"):
+        refuse_idle(context, ("statistics",), f"with --format {options['style']}")
+    run = _run(context.meta[_SETTINGS], options)
+    for word in files or ["."]:
+        run.take(word, options["exclude"])
+    if (known := run.choice.baseline) is not None:
+        run.outcome.known = known.met, known.gone(run.outcome.files)
+    if options["write_baseline"] is not None:
+        _write_baseline(run, options["write_baseline"])
+    if options["diff"]:
+        say(f"{run.outcome.to_fix} findings to fix in {len(run.outcome.files)} files", err=True)
+    else:
+        print_outcome(run.outcome, options["style"], statistics=options["statistics"])
+    for failure in run.outcome.unreadable:
         say(f"urdfkin: error: {failure}", err=True)
-    failed = any(finding.severity is Severity.ERROR for finding in findings)
-    sys.exit(2 if unreadable else 1 if failed else 0)
+    sys.exit(run.exit_code())
 
 
-def _as_path(file: str) -> str:
-    # A file whose name begins like a tag is a file here: text is not given on the command line.
-    return f"./{file}" if file.lstrip().startswith("<") else file
+def _run(settings: Settings, options: dict[str, Any]) -> Run:
+    writing = options["write_baseline"] is not None
+    known = None if writing or options["baseline"] is None else read_baseline(options["baseline"])
+    since = options["changed_since"]
+    look = partial(
+        examine,
+        limits=Limits(**{limit.name: options[f"max_{limit.name}"] for limit in fields(Limits)}),
+        mimic=options["mimic"],
+        root_joint=options["root_joint"],
+    )
+    return Run(
+        look=look,
+        choice=Choice(_chosen(options), not options["no_notes"], settings, known),
+        strict=options["strict"],
+        fold=options["style"] in ("terminal", "concise") and not (options["each"] or writing),
+        fix=options["fix"],
+        diff=options["diff"],
+        version=None if since is None else version_before(since, Path()),
+        accepting=writing,
+    )
 
 
-def _codes(words: Sequence[str]) -> set[str]:
-    try:
-        return {find_rule(part).id for word in words for part in re.split(r"[,\s]+", word) if part}
-    except UnknownNameError as error:
-        raise click.UsageError(f"--ignore: {error}") from error
+def _chosen(options: dict[str, Any]) -> frozenset[str]:
+    words = {
+        name: [part for word in options[name] for part in word.replace(",", " ").split()]
+        for name in ("select", "ignore")
+    }
+    found = {}
+    for name, parts in words.items():
+        try:
+            found[name] = codes(parts)
+        except UnknownNameError as error:
+            raise click.UsageError(f"--{name}: {error}") from error
+    return (found["select"] if words["select"] else frozenset(RULES)) - found["ignore"]
 
 
-def _wanted(finding: Finding, ignored: set[str], no_notes: bool) -> bool:
-    return finding.code not in ignored and not (no_notes and finding.severity is Severity.NOTE)
+@dataclass(slots=True)
+class Run:
+    """One check of many files."""
+
+    look: partial[Examined]
+    choice: Choice
+    strict: bool
+    fold: bool
+    fix: bool
+    diff: bool
+    version: Version | None
+    accepting: bool
+    outcome: Outcome = field(default_factory=Outcome)
+    _taken: set[str] = field(default_factory=set)
+
+    def take(self, word: str, exclude: Sequence[str]) -> None:
+        """All files that a word means, each once."""
+        settings = self.choice.settings
+        try:
+            files = collected(word, settings, settings.values.get("include", INCLUDE), exclude)
+        except SourceError as error:
+            self.outcome.unreadable.append(error)
+            return
+        for file in files:
+            if file not in self._taken:
+                self._taken.add(file)
+                try:
+                    self._check(file)
+                except (SourceError, UnknownNameError, XacroError) as error:
+                    self.outcome.unreadable.append(error)
+
+    def _check(self, file: str) -> None:
+        text = read_source(file, self.look.keywords["limits"].bytes, xacro_args())
+        before = None
+        if self.version is not None:
+            before = known_before(text, self.version, self.look)
+            if before is None:
+                self.outcome.unchanged += 1
+                return
+        if self.fix or self.diff:
+            text = self._mended(file, text, lambda: self.choice.again(text, before))
+        found = self.look(text, fold=self.fold, wanted=self.choice.of(text, before))
+        judged = [self._judged(finding) for finding in found.findings]
+        self.outcome.add(file, replace(found, findings=tuple(judged)))
+
+    def _mended(self, file: str, text: Text, choose: Any) -> Text:
+        path = None if text.entry is not None or is_xacro(text.source) else file_of(text)
+        if path is None:
+            return text
+        mended = mend(text, self.look, choose)
+        for code, objection in mended.kept.items():
+            say(f"{file}: {code} was not fixed: {objection}", err=True)
+        if self.diff:
+            self.outcome.to_fix += len(mended.fixed)
+            show_difference(file, text.data, mended.text.data)
+            return text
+        if mended.fixed:
+            write_file(path, mended.text.data)
+            say_fixed(file, mended.fixed)
+        return mended.text
+
+    def _judged(self, finding: Finding) -> Finding:
+        # A baseline knows findings by what they are, whatever is made of them.
+        raised = self.strict and not self.accepting and finding.severity is Severity.WARNING
+        return replace(finding, severity=Severity.ERROR) if raised else finding
+
+    def exit_code(self) -> int:
+        """2 where a file could not be read, 1 for an error or something to mend, 0 otherwise."""
+        failed = any(finding.severity is Severity.ERROR for finding in self.outcome.findings)
+        asked = self.outcome.to_fix > 0 if self.diff else failed and not self.accepting
+        return 2 if self.outcome.unreadable else int(asked)
 
 
-def _judged(finding: Finding, strict: bool) -> Finding:
-    raised = strict and finding.severity is Severity.WARNING
-    return replace(finding, severity=Severity.ERROR) if raised else finding
-
-
-def _print(findings: list[Finding], files: Sequence[str], style: str) -> None:
-    version = _version()
-    if style == "json":
-        click.echo(as_json(findings, files, version))
-    elif style == "sarif":
-        click.echo(as_sarif(findings, version))
-    elif style == "github":
-        if findings:
-            command_lines(as_github(findings))
-    elif files:
-        _print_terminal(findings, len(files))
-
-
-def _version() -> str:
-    try:
-        return importlib.metadata.version("urdfkin")
-    except importlib.metadata.PackageNotFoundError:  # run from a checkout that is not installed
-        return "0+unknown"
-
-
-def _print_terminal(findings: list[Finding], files: int) -> None:
-    for finding in findings:
-        place, rest = str(finding).split(f": {finding.code} ", 1)
-        colour = {"fg": _COLOURS[finding.severity], "bold": True}
-        say_styled((place, {"bold": True}), (": ", {}), (finding.code, colour), (f" {rest}", {}))
-    click.echo(summary(findings, files))
-    worst = next((f.code for f in findings if f.severity is Severity.ERROR), None)
-    if worst is not None:
-        click.echo(f"'urdfkin explain {worst}' tells more: {page(worst).title}")
+def _write_baseline(run: Run, path: Path) -> None:
+    outcome = run.outcome
+    if outcome.unreadable:
+        return
+    write_file(path, baseline_text(outcome.findings, outcome.files, path).encode())
+    say(f"wrote {path}", err=True)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from urdfkin.lint.edits import Fix
 from urdfkin.lint.finding import Finding
 from urdfkin.lint.pages import RULES, page
 from urdfkin.lint.rule import Rule
@@ -19,8 +20,14 @@ from urdfkin.lint.rule import Rule
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 
 
-def as_sarif(findings: Sequence[Finding], version: str) -> str:
-    """One SARIF run with every code as a rule and every finding as a result."""
+def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
+    """One SARIF run with every code as a rule and every finding as a result.
+
+    Args:
+        findings: What is told.
+        version: Of urdfkin.
+        silenced: What comments silence, each with its reason: results that are suppressed in the source.
+    """
     index = {code: number for number, code in enumerate(RULES)}
     run = {
         "tool": {
@@ -31,7 +38,14 @@ def as_sarif(findings: Sequence[Finding], version: str) -> str:
             }
         },
         "columnKind": "unicodeCodePoints",
-        "results": [_result(finding, index[finding.code]) for finding in findings],
+        "results": [
+            *(_result(finding, index[finding.code]) for finding in findings),
+            *(
+                _result(finding, index[finding.code])
+                | {"suppressions": [{"kind": "inSource", "justification": reason}]}
+                for finding, reason in silenced
+            ),
+        ],
     }
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
 
@@ -58,19 +72,38 @@ def _result(finding: Finding, rule: int) -> dict[str, Any]:
     }
     if finding.oracle is not None:
         result["properties"] = {"pinocchio": finding.oracle.value}
+    if finding.fix is not None:
+        result["fixes"] = [_fix(finding, finding.fix)]
     return result
+
+
+def _fix(finding: Finding, fix: Fix) -> dict[str, Any]:
+    replacements = [
+        {
+            "deletedRegion": {"byteOffset": edit.start, "byteLength": edit.end - edit.start},
+            "insertedContent": {"text": edit.text},
+        }
+        for edit in fix.edits
+    ]
+    change = {"artifactLocation": {"uri": _uri(finding.file)}, "replacements": replacements}
+    return {"description": {"text": finding.remedy or finding.message}, "artifactChanges": [change]}
 
 
 def _location(finding: Finding) -> dict[str, Any]:
     location: dict[str, Any] = {
         "physicalLocation": {
             "artifactLocation": {"uri": _uri(finding.file)},
-            "region": {"startLine": finding.line, "startColumn": finding.column},
+            "region": _region(finding),
         }
     }
     if finding.element and finding.name:
         location["logicalLocations"] = [{"name": finding.name, "kind": finding.element}]
     return location
+
+
+def _region(finding: Finding) -> dict[str, int]:
+    region = {"startLine": finding.line, "startColumn": finding.column}
+    return region | ({"endColumn": finding.column + finding.width} if finding.width else {})
 
 
 def _uri(file: str) -> str:

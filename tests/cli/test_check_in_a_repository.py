@@ -1,0 +1,437 @@
+"""`urdfkin check` where maintainers live: folders, settings, what is known, what changed, what is mended."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.running import Done, urdfkin
+
+LONG = """<robot name="r">
+  <link name="a"/><link name="b"/>
+  <joint name="j" type="continuous">
+    <parent link="a"/><child link="b"/>
+    <axis xyz="0 0 2"/>
+  </joint>
+</robot>
+"""
+GOOD = LONG.replace("0 0 2", "0 0 1")
+BAD = '<robot name="r"><link name="a"/><link name="b"/></robot>\n'
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty repository, and the current folder."""
+    (tmp_path / ".git").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def put(name: str, text: str = LONG) -> Path:
+    path = Path(name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+def check(*words: str) -> Done:
+    return urdfkin("check", *words)
+
+
+def found(*words: str) -> list[tuple[str, str]]:
+    """(file, code) of each finding."""
+    return [(f["file"], f["code"]) for f in check("--format", "json", *words).data["findings"]]
+
+
+def settings(text: str) -> None:
+    Path("pyproject.toml").write_text(f"[tool.urdfkin]\n{text}\n")
+
+
+# -- files ---------------------------------------------------------------------------------------------
+
+
+def test_a_folder_stands_for_every_urdf_in_it_but_for_hidden_copied_and_excluded_ones(here: Path) -> None:
+    for name in (
+        "arm.urdf",
+        "hands/left.urdf",
+        ".venv/x.urdf",
+        "build/arm.urdf",
+        "old/arm.urdf",
+        "hands/x.xml",
+    ):
+        put(name)
+    put("build/COLCON_IGNORE", "")
+    expected = [("arm.urdf", "URDF503"), ("hands/left.urdf", "URDF503")]
+    assert found("--exclude", "old") == found(".", "--exclude", "old/*") == expected
+    assert found("hands", str(here / "arm.urdf"), "hands/left.urdf") == [
+        ("hands/left.urdf", "URDF503"), (str(here / "arm.urdf"), "URDF503"),
+    ]  # fmt: skip
+
+
+def test_a_pattern_stands_for_what_it_matches(here: Path) -> None:
+    for name in ("a/one.urdf", "a/b/two.urdf", "a/three.txt"):
+        put(name)
+    assert found("a/**/*.urdf") == [("a/b/two.urdf", "URDF503"), ("a/one.urdf", "URDF503")]
+    assert found("a/o?e.urdf") == [("a/one.urdf", "URDF503")]
+    put("[odd].urdf")
+    assert found("[odd].urdf") == [("[odd].urdf", "URDF503")]
+
+
+@pytest.mark.parametrize("word", ["empty", "nowhere/*.urdf", "."])
+def test_a_folder_or_pattern_without_a_urdf_is_an_error_not_a_success(here: Path, word: str) -> None:
+    (here / "empty").mkdir()
+    done = check(word)
+    assert (done.code, done.err.startswith(f"urdfkin: error: {word}: no URDF there")) == (2, True)
+
+
+def test_a_file_in_a_folder_that_is_called_as_a_robot_or_an_option_is_a_file(here: Path) -> None:
+    put("panda.urdf")
+    put("-x.urdf")
+    assert found() == [("-x.urdf", "URDF503"), ("panda.urdf", "URDF503")]
+
+
+# -- what is told --------------------------------------------------------------------------------------
+
+
+def test_the_line_stands_below_its_finding_with_carets_below_what_is_meant(here: Path) -> None:
+    put("arm.urdf", LONG.replace("    <axis", "\t<!-- \u6c49 --><axis"))
+    lines = check("arm.urdf").text.splitlines()
+    assert lines[0].startswith("arm.urdf:5:18: URDF503 [*] warning: joint 'j': the axis has length 2")
+    assert lines[1] == '  5 |     <!-- \u6c49 --><axis xyz="0 0 2"/>'
+    assert lines[2] == "    | " + " " * (4 + len("<!-- ") + 2 + len(" --><axis ")) + "^" * len('xyz="0 0 2"')
+    assert lines[3:] == ["1 warning in 1 file", "[*] --fix mends these, --diff shows how"]
+    assert check("arm.urdf", "--format", "concise").text.splitlines() == [lines[0], *lines[3:]]
+
+
+def test_of_a_long_line_the_part_around_is_shown(here: Path) -> None:
+    put("arm.urdf", " ".join(LONG.replace("<joint", f"<!-- {'x' * 5000} --><joint").split()))
+    _, line, caret, *_ = check("arm.urdf").text.splitlines()
+    assert len(line) < 120
+    assert line[caret.index("^") : caret.rindex("^") + 1] == 'xyz="0 0 2"'
+
+
+def test_codes_are_selected_and_ignored_by_code_name_and_family(here: Path) -> None:
+    put("arm.urdf", LONG.replace("<axis", '<axis shade="3"'))
+    assert [code for _, code in found()] == ["URDF208", "URDF503"]
+    for words in (
+        ["--select", "URDF5"],
+        ["--select", "axis-not-unit"],
+        ["--ignore", "2"],
+        ["--ignore", "URDF208"],
+    ):
+        assert [code for _, code in found(*words)] == ["URDF503"]
+    assert found("--select", "URDF5,URDF2", "--ignore", "ALL") == []
+    assert "did you mean URDF523, URDF513, URDF503" in check("--select", "URDF5O3").err
+
+
+def test_statistics_count_by_code_the_most_first(here: Path) -> None:
+    for k in range(3):
+        put(f"{k}.urdf")
+    put("bad.urdf", BAD)
+    done = check("--statistics")
+    assert done.code == 1
+    assert [line.split()[:3] for line in done.text.splitlines()] == [
+        ["3", "URDF503", "warning"], ["1", "URDF411", "error"], ["1", "error,", "3"],
+    ]  # fmt: skip
+    assert "--statistics does nothing with --format json" in check("--statistics", "--format", "json").err
+
+
+# -- comments ------------------------------------------------------------------------------------------
+
+
+def test_a_comment_silences_and_the_reason_reaches_machines(here: Path) -> None:
+    comment = "<!-- urdfkin: ignore[URDF503] the drawing gives two points -->"
+    put("arm.urdf", LONG.replace("    <axis", f"    {comment}\n    <axis"))
+    done = check("--strict", "arm.urdf")
+    assert (done.code, done.text) == (0, "no findings in 1 file (1 silenced by comments)\n")
+    data = check("--format", "json", "arm.urdf").data
+    assert data["findings"] == []
+    (silenced,) = data["silenced"]
+    assert (silenced["code"], silenced["reason"]) == ("URDF503", "the drawing gives two points")
+    (result,) = check("--format", "sarif", "arm.urdf").data["runs"][0]["results"]
+    assert result["suppressions"] == [{"kind": "inSource", "justification": "the drawing gives two points"}]
+
+
+# -- settings ------------------------------------------------------------------------------------------
+
+
+def test_settings_are_found_above_and_the_command_line_says_otherwise(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put("robots/arm.urdf")
+    put("robots/old/arm.urdf", BAD)
+    settings('strict = true\nexclude = ["robots/old"]\nselect = ["URDF5"]')
+    monkeypatch.chdir("robots")
+    assert found() == [("arm.urdf", "URDF503")]
+    assert check().code == 1
+    assert check("--select", "URDF2").code == 0
+    assert check("--isolated", "arm.urdf").code == 0
+    put("other.toml", "[tool.urdfkin]\nignore = ['503']\n")
+    assert check("--config", "other.toml", "arm.urdf").code == 0
+
+
+def test_codes_are_ignored_in_some_files(here: Path) -> None:
+    put("legacy/arm.urdf")
+    put("arm.urdf")
+    settings('per-file-ignores = { "legacy/*" = ["URDF5"] }')
+    assert found() == [("arm.urdf", "URDF503")]
+
+
+def test_settings_beyond_the_repository_are_not_taken(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings('ignore = ["URDF503"]')
+    (here / "inner/.git").mkdir(parents=True)
+    put("inner/arm.urdf")
+    monkeypatch.chdir("inner")
+    assert found() == [("arm.urdf", "URDF503")]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("ignor = []", "[tool.urdfkin]: unknown setting 'ignor'; did you mean ignore?"),
+        ("strict = 1", "[tool.urdfkin]: strict is true or false: found 1"),
+        ("ignore = 'URDF503'", "[tool.urdfkin]: ignore is a list of strings: found 'URDF503'"),
+        ("ignore = ['URDF5O3']", "[tool.urdfkin]: ignore: unknown code 'URDF5O3'; did you mean"),
+        ("per-file-ignores = { x = 'URDF503' }", "per-file-ignores is a table of lists of strings"),
+        ("baseline = 'no.json'", "no.json: no such baseline; "),
+        ("ignore = [", "pyproject.toml: not TOML: found "),
+    ],
+)
+def test_a_wrong_setting_is_told_with_its_place(here: Path, text: str, message: str) -> None:
+    put("arm.urdf", GOOD)
+    settings(text)
+    done = check()
+    assert (done.code, done.out) == (2, b"")
+    assert message in done.err
+    assert "Traceback" not in done.err
+    assert check("--isolated").code == 0
+
+
+def test_other_tools_tables_are_nobodys_settings(here: Path) -> None:
+    put("arm.urdf", GOOD)
+    Path("pyproject.toml").write_text("[tool.other]\nignor = 1\n")
+    assert check().code == 0
+    assert "no table [tool.urdfkin]" in check("--config", "pyproject.toml").err
+
+
+# -- what is known -------------------------------------------------------------------------------------
+
+
+def test_what_a_baseline_knows_blocks_nobody_and_what_is_new_does(here: Path) -> None:
+    arm = put("robots/arm.urdf")
+    put("robots/two.urdf", BAD)
+    done = check("--strict", "--write-baseline", "known.json")
+    assert (done.code, done.err) == (0, "wrote known.json\n")
+    done = check("--strict", "--baseline", "known.json")
+    assert (done.code, done.text) == (0, "no findings in 2 files (2 known before)\n")
+    arm.write_text("\n\n" + LONG.replace("<axis", '<axis  shade="3"'))  # known again on another line
+    assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF208")]
+    arm.write_text(LONG.replace("0 0 2", "0 0 3"))  # what is touched is new
+    assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF503")]
+    arm.write_text(GOOD)
+    assert (
+        "(1 known before, 1 of the baseline are gone: write it again)"
+        in check("--baseline", "known.json").text
+    )
+
+
+def test_a_second_finding_of_a_known_kind_is_new(here: Path) -> None:
+    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/><a/>{}</joint>'
+    text = f'<robot name="r"><link name="a"/><link name="b"/>{joint}</robot>'
+    put("arm.urdf", text.format(""))
+    check("--write-baseline", "known.json")
+    put("arm.urdf", text.format("<a/>"))
+    assert found("--baseline", "known.json") == [("arm.urdf", "URDF207")]
+
+
+def test_a_baseline_written_for_some_files_keeps_what_it_knows_of_others(here: Path) -> None:
+    one, two = put("one.urdf"), put("two.urdf")
+    check("--write-baseline", "known.json")
+    one.write_text(GOOD)
+    check("--write-baseline", "known.json", "one.urdf")
+    assert found("--baseline", "known.json") == []
+    two.unlink()
+    check("--write-baseline", "known.json", "one.urdf")
+    assert json.loads(Path("known.json").read_text())["findings"] == []
+
+
+def test_a_baseline_is_named_from_its_own_folder_by_a_setting_too(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put("robots/arm.urdf")
+    check("--write-baseline", "known.json")
+    settings('baseline = "known.json"')
+    monkeypatch.chdir("robots")
+    assert found() == found(str(here)) == []
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{", '{"schema": "urdfkin-baseline", "version": 2}', "[" * 100_000]
+)
+def test_what_is_no_baseline_is_refused(here: Path, text: str) -> None:
+    put("arm.urdf")
+    put("known.json", text)
+    for option in ("--baseline", "--write-baseline"):
+        done = check(option, "known.json")
+        assert (done.code, "not a baseline of urdfkin" in done.err) == (2, True)
+    assert Path("known.json").read_text() == text
+
+
+# -- what changed --------------------------------------------------------------------------------------
+
+
+def git(*words: str) -> None:
+    who = {
+        f"GIT_{role}_{what}": "x@example.org"
+        for role in ("AUTHOR", "COMMITTER")
+        for what in ("NAME", "EMAIL")
+    }
+    environ = os.environ | who | {"GIT_CONFIG_GLOBAL": "/dev/null", "GIT_CONFIG_SYSTEM": "/dev/null"}
+    subprocess.run(["git", *words], check=True, capture_output=True, env=environ)
+
+
+@pytest.fixture
+def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A branch `main` with two robots, and a branch `work` that has parted from it."""
+    monkeypatch.chdir(tmp_path)
+    git("init", "-q", "-b", "main")
+    put("arm.urdf")
+    put("hand.urdf", LONG.replace('"r"', '"hand"'))
+    git("add", ".")
+    git("commit", "-qm", "robots")
+    git("checkout", "-qb", "work")
+    return tmp_path
+
+
+def test_only_what_is_new_since_a_branch_is_told(repository: Path) -> None:
+    done = check("--strict", "--changed-since", "main")
+    assert (done.code, done.text) == (0, "no findings in 0 files (2 files unchanged)\n")
+    put("arm.urdf", "\n" + LONG.replace("<axis", '<axis  shade="3"'))
+    put("new.urdf", LONG.replace('"r"', '"new"'))
+    Path("hand.urdf").rename("left.urdf")
+    new = [("arm.urdf", "URDF208"), ("new.urdf", "URDF503")]
+    assert found("--changed-since", "main") == new
+    git("add", ".")
+    git("commit", "-qm", "work")
+    assert found("--changed-since", "main") == new
+    # What main does meanwhile is not ours.
+    git("checkout", "-q", "main")
+    put("arm.urdf", GOOD)
+    git("commit", "-qam", "mended on main")
+    git("checkout", "-q", "work")
+    assert found("--changed-since", "main") == new
+
+
+def test_from_a_folder_below_and_for_a_file_beyond(
+    repository: Path, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    (repository / "below").mkdir()
+    monkeypatch.chdir("below")
+    other = tmp_path_factory.mktemp("other") / "arm.urdf"
+    other.write_text(LONG.replace('"r"', '"other"'))
+    assert found("--changed-since", "main", "../arm.urdf", str(other)) == [(str(other), "URDF503")]
+
+
+@pytest.mark.parametrize("version", ["nowhere", "--help", "HEAD:arm.urdf", ""])
+def test_a_version_that_is_none_is_told_with_what_to_do(repository: Path, version: str) -> None:
+    done = check(f"--changed-since={version}")
+    assert (done.code, done.out) == (2, b"")
+    assert "git knows no version from which this one parted" in done.err
+    assert "fetch-depth: 0" in done.err
+
+
+def test_where_there_is_no_repository_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    put("arm.urdf")
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    done = check("--changed-since", "main")
+    assert (done.code, "not a git repository" in done.err) == (2, True)
+    monkeypatch.setenv("PATH", "")
+    assert "git is not installed" in check("--changed-since", "main").err
+
+
+def test_git_runs_nothing_that_a_strangers_repository_names(repository: Path) -> None:
+    mark = repository / "RUN"
+    for setting in ("core.fsmonitor", "diff.external", "filter.x.clean", "core.pager", "core.sshCommand"):
+        git("config", setting, f"touch {mark}; cat")
+    Path(".gitattributes").write_text("*.urdf filter=x diff=x\n")
+    put("arm.urdf", LONG.replace("0 0 2", "0 0 3"))
+    assert found("--changed-since", "main") == [("arm.urdf", "URDF503")]
+    assert not mark.exists()
+
+
+# -- what is mended ------------------------------------------------------------------------------------
+
+
+def test_fix_mends_files_and_what_is_left_is_told(here: Path) -> None:
+    arm = put("arm.urdf", LONG.replace("<parent", '<parent frame="x"'))
+    arm.chmod(0o640)
+    done = check("--fix")
+    assert (done.code, done.text) == (0, "no findings in 1 file\n")
+    assert done.err.splitlines() == [
+        "arm.urdf: fixed URDF208 unknown-attribute, line 4; the robot is the same",
+        "arm.urdf: fixed URDF503 axis-not-unit, line 5; the robot is the same",
+    ]
+    assert arm.read_text() == GOOD
+    assert arm.stat().st_mode & 0o777 == 0o640
+    before = arm.stat().st_mtime_ns, arm.stat().st_ino
+    assert check("--fix").err == ""
+    assert (arm.stat().st_mtime_ns, arm.stat().st_ino) == before
+
+
+def test_only_what_is_told_is_mended(here: Path) -> None:
+    text = LONG.replace("<parent", '<parent frame="x"')
+    arm = put("arm.urdf", text)
+    check("--select", "URDF503", "--fix")
+    assert arm.read_text() == text.replace("0 0 2", "0 0 1")
+    check("--write-baseline", "known.json")
+    check("--baseline", "known.json", "--fix")
+    assert arm.read_text() == text.replace("0 0 2", "0 0 1")
+    silenced = text.replace("<parent", "<!-- urdfkin: ignore[208] wanted --><parent").replace(
+        "0 0 2", "0 0 1"
+    )
+    arm.write_text(silenced)
+    check("--fix")
+    assert arm.read_text() == silenced
+
+
+def test_diff_shows_a_patch_that_does_what_fix_does(here: Path) -> None:
+    arm = put("arm.urdf", LONG.replace("    <axis", "\t<axis"))
+    done = check("--diff")
+    assert (done.code, done.err) == (1, "1 findings to fix in 1 files\n")
+    assert arm.read_text() == LONG.replace("    <axis", "\t<axis")
+    subprocess.run(["git", "apply", "-p0"], input=done.out, check=True, capture_output=True)
+    assert arm.read_text() == GOOD.replace("    <axis", "\t<axis")
+    done = check("--diff")
+    assert (done.code, done.out) == (0, b"")
+    assert "--fix does nothing with --diff" in check("--diff", "--fix").err
+
+
+def test_what_is_no_file_of_the_users_is_not_mended(here: Path) -> None:
+    done = urdfkin("check", "--fix", "-", stdin=LONG)
+    assert (done.code, "URDF503" in done.text) == (0, True)
+    assert check("--fix", "ur5", "--select", "URDF601").code == 0
+
+
+def test_a_rounded_pi_says_how_far_it_turns(here: Path) -> None:
+    arm = put("arm.urdf", GOOD.replace("<axis", '<origin rpy="1.5708 0 0"/><axis'))
+    assert (
+        check("--fix").err
+        == "arm.urdf: fixed URDF601 rounded-pi, line 5; a frame is turned by up to 3.7e-06 rad\n"
+    )
+    assert 'rpy="1.5707963267948966 0 0"' in arm.read_text()
+
+
+def test_sarif_fixes_are_the_edits(here: Path) -> None:
+    put("arm.urdf")
+    (result,) = check("--format", "sarif").data["runs"][0]["results"]
+    (change,) = result["fixes"][0]["artifactChanges"]
+    (edit,) = change["replacements"]
+    region: Any = edit["deletedRegion"]
+    cut = LONG[region["byteOffset"] :][: region["byteLength"]]
+    assert (cut, edit["insertedContent"]["text"]) == ("0 0 2", "0 0 1")
