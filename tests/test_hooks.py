@@ -1,0 +1,222 @@
+"""How repositories of robots take urdfkin in, step by step and without a network.
+
+pre-commit clones and builds it and guards a commit; the GitHub Action installs it and annotates lines.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from packaging.requirements import Requirement
+
+yaml = pytest.importorskip("yaml", reason="pip install pre-commit, which brings it")
+
+ROOT = Path(__file__).parents[1]
+#: What builds urdfkin, and what the hook installs: pure Python, as is all that these need.
+PACKAGES = ("hatchling", "click")
+#: What a build needs of the repository.
+SOURCES = ("pyproject.toml", "README.md", "LICENSE", ".pre-commit-hooks.yaml", "urdfkin", "robots")
+
+LONG = """<robot name="r"><link name="a"/><link name="b"/>
+  <joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 2"/></joint>
+</robot>
+"""
+
+
+def with_what_it_needs(name: str, found: set[str]) -> set[str]:
+    """A package, and those that it needs in turn."""
+    if name not in found:
+        found.add(name)
+        for line in importlib.metadata.requires(name) or ():
+            needed = Requirement(line)
+            if needed.marker is None or needed.marker.evaluate({"extra": ""}):
+                with_what_it_needs(needed.name, found)
+    return found
+
+
+def wheel(name: str, folder: Path) -> None:
+    """An installed package as the wheel that it came in."""
+    found = importlib.metadata.distribution(name)
+    tag = next(line[5:] for line in (found.read_text("WHEEL") or "").splitlines() if line.startswith("Tag: "))
+    assert tag.endswith("-none-any"), name
+    stem = f"{name.replace('-', '_')}-{found.version}"
+    skipped = ("INSTALLER", "REQUESTED", "RECORD", "direct_url.json")
+    files = [
+        file
+        for file in found.files or ()
+        if ".." not in file.parts and "__pycache__" not in file.parts and file.name not in skipped
+    ]
+    info = next(file.parts[0] for file in files if file.parts[0].endswith(".dist-info"))
+    with zipfile.ZipFile(folder / f"{stem}-{tag}.whl", "w") as archive:
+        for file in files:
+            archive.write(Path(str(found.locate_file(file))), str(file))
+        archive.writestr(f"{info}/RECORD", "".join(f"{file},,\n" for file in [*files, f"{info}/RECORD"]))
+
+
+class Repository:
+    """A git repository, and commands in it that see the wheels and no index."""
+
+    def __init__(self, folder: Path, environ: dict[str, str]) -> None:
+        self.folder, self.environ = folder, environ
+        folder.mkdir()
+        self.run("git", "init", "-q")
+
+    def run(self, *words: str, fails: bool = False) -> str:
+        done = subprocess.run(
+            words, cwd=self.folder, env=self.environ, capture_output=True, text=True, check=False
+        )
+        assert (done.returncode != 0) == fails, done.stdout + done.stderr
+        return done.stdout + done.stderr
+
+    def commit(self, *, fails: bool = False) -> str:
+        self.run("git", "add", "--all")
+        return self.run("git", "commit", "-m", "robots", fails=fails)
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Repository:
+    """This very tree as a repository, and all that building and installing it needs."""
+    folder = tmp_path_factory.mktemp("hooks")
+    wheels = folder / "wheels"
+    wheels.mkdir()
+    needed: set[str] = set()
+    for name in PACKAGES:
+        with_what_it_needs(name, needed)
+    for name in needed:
+        wheel(name, wheels)
+    who = {f"GIT_{role}_{what}": "x@y.z" for role in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")}
+    kept = {name: os.environ[name] for name in ("PATH", "LD_LIBRARY_PATH") if name in os.environ}
+    environ = kept | who | {
+        "HOME": str(folder), "PRE_COMMIT_HOME": str(folder / "pre-commit"),
+        "PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(wheels), "PIP_CONFIG_FILE": os.devnull,
+        "GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull,
+    }  # fmt: skip
+    made = Repository(folder / "urdfkin", environ)
+    for name in SOURCES:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, made.folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy(ROOT / name, made.folder / name)
+    made.commit()
+    return made
+
+
+# -- pre-commit ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def robots(source: Repository) -> Repository:
+    """A repository of robots into which the hooks were installed."""
+    pytest.importorskip("pre_commit", reason="pip install pre-commit, which the extra [test] holds")
+    made = Repository(source.folder.parent / "robots", source.environ)
+    revision = source.run("git", "rev-parse", "HEAD").strip()
+    (made.folder / ".pre-commit-config.yaml").write_text(
+        f"repos:\n  - repo: {source.folder}\n    rev: {revision}\n    hooks:\n"
+        "      - id: urdfkin-check\n        args: [--strict]\n"
+        "      - id: urdfkin-fix\n        stages: [manual]\n"
+    )
+    made.run(sys.executable, "-m", "pre_commit", "install", "--install-hooks")
+    return made
+
+
+@pytest.mark.slow
+def test_a_commit_with_a_finding_is_refused_until_it_is_mended(robots: Repository) -> None:
+    arm = robots.folder / "arm.urdf"
+    arm.write_text(LONG)
+    told = robots.commit(fails=True)
+    assert re.search(r"arm\.urdf:2:\d+: URDF503 \[\*\] error", told)
+    assert "^^^^^^^^^^^" in told
+    hook = [sys.executable, "-m", "pre_commit", "run", "--hook-stage", "manual", "urdfkin-fix", "--all-files"]
+    assert "files were modified by this hook" in robots.run(*hook, fails=True)
+    assert arm.read_text() == LONG.replace("0 0 2", "0 0 1")
+    robots.run("git", "add", "--all")
+    robots.run(*hook)
+    assert "check URDFs" in robots.commit()
+
+
+@pytest.mark.slow
+def test_the_hook_obeys_the_settings_of_the_repository(robots: Repository) -> None:
+    (robots.folder / "old.urdf").write_text(LONG.replace('"r"', '"old"'))
+    assert "URDF503" in robots.commit(fails=True)
+    (robots.folder / "pyproject.toml").write_text('[tool.urdfkin]\nignore = ["axis-not-unit"]\n')
+    robots.commit()
+
+
+@pytest.mark.slow
+def test_the_hooks_environment_holds_urdfkin_and_click_and_nothing_that_computes(robots: Repository) -> None:
+    home = Path(robots.environ["PRE_COMMIT_HOME"])
+    (packages,) = {path.parent for path in home.glob("*/*/lib/python*/site-packages/click")}
+    names = {path.name.partition("-")[0] for path in packages.glob("*.dist-info")}
+    assert names - {"pip", "setuptools", "wheel"} == {"urdfkin", "click"}
+
+
+# -- the GitHub Action ---------------------------------------------------------------------------------
+
+
+def steps() -> list[dict[str, Any]]:
+    """The action's own steps: those that run a script."""
+    action = yaml.safe_load((ROOT / "action.yml").read_text("utf-8"))
+    return [step for step in action["runs"]["steps"] if "run" in step]
+
+
+@pytest.fixture(scope="module")
+def runner(source: Repository) -> Repository:
+    """A repository of robots on a machine where the action's first step has installed urdfkin."""
+    made = Repository(
+        source.folder.parent / "runner", source.environ | {"RUNNER_TEMP": str(source.folder.parent)}
+    )
+    made.environ |= {"PYTHON": sys.executable, "ACTION": str(source.folder)}
+    (made.folder / "arm.urdf").write_text(LONG)
+    made.commit()
+    # What a stranger puts there is never run.
+    (made.folder / "click.py").write_text("raise SystemExit('run')\n")
+    made.run("bash", "-eo", "pipefail", "-c", steps()[0]["run"])
+    return made
+
+
+def act(runner: Repository, *, fails: bool, **inputs: str) -> tuple[str, str]:
+    """What the second step prints, and the summary that it leaves."""
+    summary = runner.folder.parent / "summary.md"
+    summary.write_text("")
+    given = {"FILES": ".", "SINCE": "", "OPTIONS": "", "SARIF": "", "GITHUB_STEP_SUMMARY": str(summary)}
+    step = Repository.__new__(Repository)
+    step.folder, step.environ = runner.folder, runner.environ | given | inputs
+    return step.run("bash", "-eo", "pipefail", "-c", steps()[1]["run"], fails=fails), summary.read_text()
+
+
+@pytest.mark.slow
+def test_the_action_annotates_the_line_and_summarises(runner: Repository) -> None:
+    told, summary = act(runner, fails=False)
+    assert re.match(r"::warning file=arm\.urdf,line=2,col=\d+,endColumn=\d+,title=URDF503::", told)
+    assert re.search(r"^ +1  URDF503  warning", summary, re.M)
+    sarif = runner.folder.parent / "a b.sarif"
+    told, _ = act(runner, fails=True, OPTIONS="--strict\n\n--select\nURDF5", SARIF=str(sarif))
+    assert told.startswith("::error file=arm.urdf")
+    (result,) = json.loads(sarif.read_text())["runs"][0]["results"]
+    assert (result["ruleId"], result["level"]) == ("URDF503", "error")
+
+
+@pytest.mark.slow
+def test_the_action_tells_what_is_new_and_runs_no_input(runner: Repository) -> None:
+    assert act(runner, fails=False, SINCE="HEAD", OPTIONS="--strict")[0] == ""
+    mark = runner.folder / "RUN"
+    for name in ("FILES", "SINCE", "OPTIONS"):
+        act(runner, fails=True, **{name: f"$(touch {mark})\n`touch {mark}`; touch {mark}"})
+    assert not mark.exists()
+
+
+def test_every_input_of_the_action_reaches_a_script_as_a_variable() -> None:
+    action = yaml.safe_load((ROOT / "action.yml").read_text("utf-8"))
+    used = " ".join(str(step["env"]) for step in steps())
+    assert set(re.findall(r"inputs\.([\w-]+)", used)) == set(action["inputs"])
+    assert not any("${{" in step["run"] for step in steps())
