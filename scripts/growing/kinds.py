@@ -60,6 +60,14 @@ KINDS: dict[str, Kind] = {
         _filled(n, lambda i: f'<joint name="j{i}" type="fixed"><origin xyz="a b c"/></joint>')
     ),
     "signs and points": lambda n: _attribute(f'xyz="{"+." * (n // 2)} 0 0"'),
+    # comments for urdfkin
+    "comments that silence nothing": lambda n: _robot(
+        '<link name="l"/>' + _filled(n, lambda i: f"<!-- urdfkin: ignore[x{i}] y -->\n")
+    ),
+    "comments behind each other": lambda n: _robot(
+        '<link name="l"/>' + _filled(n, lambda i: f"<!-- urdfkin: ignore[URDF207] y --><x{i}/>")
+    ),
+    "one long comment": lambda n: _robot(f'<!-- urdfkin: ignore[{"207 " * (n // 4)}] y --><link name="l"/>'),
     # names
     "one long name": lambda n: _robot(f'<link name="{"a" * n}"/>'),
     "one long tag": lambda n: _in_base(f"<{'a' * n}/>"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ from typing import Any
 import pytest
 
 from tests.cli.running import Done, urdfkin
+from tests.lint.cases import CASES
+from urdfkin.lint import check as lint
 
 LONG = """<robot name="r">
   <link name="a"/><link name="b"/>
@@ -169,7 +172,7 @@ def test_settings_are_found_above_and_the_command_line_says_otherwise(
     monkeypatch.chdir("robots")
     assert found() == [("arm.urdf", "URDF503")]
     assert check().code == 1
-    assert check("--select", "URDF2").code == 0
+    assert check("--select", "URDF2").code == check("--no-strict").code == 0
     assert check("--isolated", "arm.urdf").code == 0
     put("other.toml", "[tool.urdfkin]\nignore = ['503']\n")
     assert check("--config", "other.toml", "arm.urdf").code == 0
@@ -337,6 +340,36 @@ def test_from_a_folder_below_and_for_a_file_beyond(
     assert found("--changed-since", "main", "../arm.urdf", str(other)) == [(str(other), "URDF503")]
 
 
+def test_a_mesh_that_a_pull_request_takes_away_is_missed_in_a_file_that_it_left(repository: Path) -> None:
+    mesh = put("meshes/arm.stl", "")
+    shape = '<link name="a"><visual><geometry><mesh filename="meshes/arm.stl"/></geometry></visual></link>'
+    put("shaped.urdf", LONG.replace('<link name="a"/>', shape))
+    git("add", ".")
+    git("commit", "-qm", "a mesh")
+    assert found("--changed-since", "HEAD") == []
+    mesh.unlink()
+    assert found("--changed-since", "HEAD") == [("shaped.urdf", "URDF706")]
+
+
+def test_a_xacro_file_is_told_in_full_when_what_it_may_include_changed(repository: Path) -> None:
+    pytest.importorskip("xacrodoc")
+    macro = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="l" value="{}"/></robot>'
+    include = (
+        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="part.xacro"/>'
+    )
+    put("part.xacro", macro.format(2))
+    put("whole.urdf.xacro", LONG.replace('<robot name="r">', include).replace("0 0 2", "0 0 ${l}"))
+    settings('include = ["*.urdf.xacro"]')
+    git("add", ".")
+    git("commit", "-qm", "xacro")
+    assert found("--changed-since", "HEAD") == []
+    put("part.xacro", macro.format(3))
+    assert found("--changed-since", "HEAD") == [("whole.urdf.xacro (expanded)", "URDF503")]
+    before = Path("whole.urdf.xacro").read_text()
+    assert "URDF503" in check("--fix", "--changed-since", "HEAD").text
+    assert Path("whole.urdf.xacro").read_text() == before
+
+
 @pytest.mark.parametrize("version", ["nowhere", "--help", "HEAD:arm.urdf", ""])
 def test_a_version_that_is_none_is_told_with_what_to_do(repository: Path, version: str) -> None:
     done = check(f"--changed-since={version}")
@@ -435,3 +468,30 @@ def test_sarif_fixes_are_the_edits(here: Path) -> None:
     region: Any = edit["deletedRegion"]
     cut = LONG[region["byteOffset"] :][: region["byteLength"]]
     assert (cut, edit["insertedContent"]["text"]) == ("0 0 2", "0 0 1")
+
+
+# -- the page ------------------------------------------------------------------------------------------
+
+PAGE = (Path(__file__).parents[2] / "docs" / "check.md").read_text("utf-8")
+
+
+def test_the_transcript_on_the_page_is_what_one_sees(here: Path) -> None:
+    put("arm.urdf")
+    (shown,) = re.findall(r"```console\n\$ urdfkin check arm.urdf\n(.*?)```", PAGE, re.DOTALL)
+    assert check("arm.urdf").text == shown
+
+
+def test_the_settings_and_the_comment_on_the_page_are_good(here: Path) -> None:
+    (table,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    put("pyproject.toml", table)
+    (comment,) = re.findall(r"```xml\n(.*?)```", PAGE, re.DOTALL)
+    put("arm.urdf", LONG.replace('    <axis xyz="0 0 2"/>\n', comment))
+    put("urdfkin-baseline.json", '{"schema": "urdfkin-baseline", "version": 1, "findings": []}')
+    done = check()
+    assert (done.code, done.text) == (0, "no findings in 1 file (1 silenced by comments)\n")
+
+
+def test_the_page_lists_the_codes_that_have_cures() -> None:
+    rows = set(re.findall(r"^\| (URDF\d+) \|", PAGE, re.MULTILINE))
+    cured = {f.code for case in CASES for f in lint(case.data) if f.fix}
+    assert rows == cured

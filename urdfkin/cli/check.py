@@ -32,7 +32,7 @@ from urdfkin.urdf.xacro import XacroError
 
 _SETTINGS = "urdfkin.settings"
 #: Settings that are called as options.
-_OPTIONS = ("select", "ignore", "exclude", "strict")
+_OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
 
@@ -42,8 +42,6 @@ def _take_settings(context: click.Context, _: click.Parameter, file: Path | None
     settings = Settings() if isolated else find_settings(Path()) if file is None else read_settings(file)
     values = dict(settings.values)
     given: dict[str, Any] = {name: values[name] for name in _OPTIONS if name in values}
-    if "notes" in values:
-        given["no_notes"] = not values["notes"]
     if "baseline" in values:
         given["baseline"] = str(settings.root / values["baseline"])
     context.default_map = given
@@ -62,8 +60,8 @@ choice_options = together(
     click.option(
         "--ignore", multiple=True, metavar="CODE", help="Leave out a code; may be repeated, or a,b,c."
     ),
-    click.option("--strict", is_flag=True, help="Turn warnings into errors."),
-    click.option("--no-notes", is_flag=True, help="Leave out notes."),
+    click.option("--strict/--no-strict", default=False, help="Turn warnings into errors."),
+    click.option("--notes/--no-notes", default=True, help="Whether notes are told.  [default: they are]"),
     click.option(
         "--exclude", multiple=True, metavar="GLOB", help="Files and folders that a folder has in vain."
     ),
@@ -158,7 +156,7 @@ def _run(settings: Settings, options: dict[str, Any]) -> Run:
     )
     return Run(
         look=look,
-        choice=Choice(_chosen(options), not options["no_notes"], settings, known),
+        choice=Choice(_chosen(options), options["notes"], settings, known),
         strict=options["strict"],
         fold=options["style"] in ("terminal", "concise") and not (options["each"] or writing),
         fix=options["fix"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from urdfkin.lint.baseline import Baseline, key_of, relative
 from urdfkin.lint.finding import Finding, Severity
+from urdfkin.lint.rules.meshes import MESH_MISSING
 from urdfkin.lint.runner import Examined, file_of
 from urdfkin.lint.settings import Settings
 from urdfkin.system.git import Version
@@ -66,6 +68,8 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
         text: The file as it is.
         version: The version before.
         look: What examines a text, and finds all there is.
+
+    A mesh that is missing was there before, where a file that is gone is called as one of the text's.
     """
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:
@@ -73,8 +77,11 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
     if is_xacro(text.source):
         # What it expanded to before, nobody has: all that is found counts if any part of it may have changed.
         return Baseline(Counter()) if version.changed(_PARTS) else None
-    if version.holds(text.data):
-        return None
-    old = version.read(path)
+    same = version.holds(text.data)
+    old = text.data if same else version.read(path)
     found = () if old is None else look(replace(text, data=old)).findings
+    if any(os.fsencode(name) in text.data for name in version.gone):
+        found = tuple(finding for finding in found if finding.code != MESH_MISSING.id)
+    elif same:
+        return None
     return Baseline(Counter(key_of(finding, relative(finding.file, Path())) for finding in found))

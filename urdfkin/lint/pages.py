@@ -49,6 +49,9 @@ TOPICS: dict[str, tuple[Rule, ...]] = {
 #: Code -> rule, in the order of the codes.
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
 
+#: What a code may be called, in lower case: itself, its number, its short name.
+CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
+
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own}
 
 
@@ -104,12 +107,9 @@ def find_rule(word: str) -> Rule:
     Raises:
         UnknownNameError: there is none; the nearest are offered.
     """
-    wanted = word.strip().lower()
-    wanted = f"urdf{wanted}" if wanted.isdigit() else wanted
-    for rule in RULES.values():
-        if wanted in (rule.id.lower(), rule.slug):
-            return rule
-    raise UnknownNameError("code", word, [*RULES, *(rule.slug for rule in RULES.values())])
+    if (code := CODES.get(word.strip().lower())) is None:
+        raise UnknownNameError("code", word, [*RULES, *(rule.slug for rule in RULES.values())])
+    return RULES[code]
 
 
 def find_rules(word: str) -> tuple[Rule, ...]:

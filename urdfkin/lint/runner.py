@@ -12,7 +12,7 @@ from pathlib import Path
 from urdfkin.errors.demands import switch, word
 from urdfkin.lint.finding import Finding
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
-from urdfkin.lint.pages import find_rule
+from urdfkin.lint.pages import CODES
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rules.axes import check_axes
 from urdfkin.lint.rules.comments import check_unused, read_comments
@@ -164,7 +164,7 @@ def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = 
             joint takes are errors.
     """
     root = read_document(report)
-    read_comments(report, find_rule)
+    read_comments(report, CODES)
     version = None if root is None else check_dialect(report, root)
     if root is None or version is None:
         return None

@@ -52,13 +52,17 @@ class Silence:
     used: set[str] = field(default_factory=set)
 
 
+#: Code -> what silences it at some place; the first comment that does.
+Codes = dict[str, Silence]
+
+
 @dataclass(slots=True)
 class Silences:
-    """The comments of a file, found by the places that they speak for."""
+    """The comments of a file, found by the places that they speak for: the file, a line, an element's id."""
 
-    everywhere: list[Silence] = field(default_factory=list)
-    lines: dict[int, list[Silence]] = field(default_factory=dict)
-    elements: dict[int, list[Silence]] = field(default_factory=dict)
+    everywhere: Codes = field(default_factory=dict)
+    lines: dict[int, Codes] = field(default_factory=dict)
+    elements: dict[int, Codes] = field(default_factory=dict)
     all: list[Silence] = field(default_factory=list)
 
     def __bool__(self) -> bool:
@@ -67,13 +71,18 @@ class Silences:
     def add(self, silence: Silence) -> None:
         """One more."""
         self.all.append(silence)
-        comment = silence.comment
+        place = self._place(silence.comment)
+        for code in silence.codes:
+            place.setdefault(code, silence)
+
+    def _place(self, comment: Comment) -> Codes:
         if comment.behind:
-            self.lines.setdefault(comment.line, []).append(silence)
-        elif comment.element is not None and comment.element.parent is None:
-            self.everywhere.append(silence)
-        elif comment.element is not None:
-            self.elements.setdefault(id(comment.element), []).append(silence)
+            return self.lines.setdefault(comment.line, {})
+        if comment.element is None:
+            return {}
+        if comment.element.parent is None:
+            return self.everywhere
+        return self.elements.setdefault(id(comment.element), {})
 
     def reason(self, code: str, line: int, at: Element | None) -> str | None:
         """Why a finding is silenced, by the nearest comment that speaks for its place; None: it is not.
@@ -83,16 +92,12 @@ class Silences:
             line: Its line.
             at: The element it is about.
         """
-        silence = _of(code, self.lines.get(line))
+        silence = self.lines.get(line, {}).get(code)
         while silence is None and at is not None:
-            silence = _of(code, self.elements.get(id(at)))
+            silence = self.elements.get(id(at), {}).get(code)
             at = at.parent
-        silence = silence or _of(code, self.everywhere)
+        silence = silence or self.everywhere.get(code)
         if silence is None:
             return None
         silence.used.add(code)
         return silence.reason
-
-
-def _of(code: str, silences: list[Silence] | None) -> Silence | None:
-    return next((silence for silence in silences or () if code in silence.codes), None)

@@ -24,11 +24,13 @@ class Version:
         root: The folder that its files are named from.
         files: Name -> the digest of what it held.
         digests: All of these.
+        gone: The last parts of the names of files that are there no more.
     """
 
     root: Path
     files: dict[str, str]
     digests: frozenset[str]
+    gone: frozenset[str]
 
     def name(self, path: Path) -> str:
         """What a file is called in it."""
@@ -85,7 +87,8 @@ def version_before(reference: str, folder: Path) -> Version:
     rows = _git("ls-tree", "-r", "-z", "--full-tree", parted, cwd=root).split(b"\0")
     parts = (row.partition(b"\t") for row in rows if row)
     files = {os.fsdecode(name): head.split()[2].decode() for head, _, name in parts}
-    return Version(root, files, frozenset(files.values()))
+    gone = frozenset(Path(name).name for name in files if not (root / name).exists())
+    return Version(root, files, frozenset(files.values()), gone)
 
 
 def _text(*words: str, cwd: Path) -> str:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Mapping
 
-from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import NOTE, WARNING, Rule
@@ -15,48 +14,47 @@ BAD_COMMENT = Rule("URDF120", "bad-comment", WARNING)
 UNUSED_COMMENT = Rule("URDF121", "unused-comment", NOTE)
 
 _FORM = re.compile(r"\s*urdfkin:\s*ignore\s*\[([^\]]*)\]\s*(.*)", re.DOTALL)
+_BETWEEN = re.compile(r"[,\s]+")
 
 
-def read_comments(report: Reporter, find_rule: Callable[[str], Rule]) -> None:
+def read_comments(report: Reporter, codes: Mapping[str, str]) -> None:
     """Obey the comments of a document that was read, and report those that cannot be understood.
 
     Args:
         report: The file.
-        find_rule: A rule by its code or short name.
+        codes: What a code may be called, in lower case -> the code.
     """
     silences = Silences()
     for comment in report.comments:
-        if (silence := _read(report, comment, find_rule)) is not None:
+        if (silence := _read(report, comment, codes)) is not None:
             silences.add(silence)
     report.silence(silences)
 
 
-def _read(report: Reporter, comment: Comment, find_rule: Callable[[str], Rule]) -> Silence | None:
-    try:
-        codes, reason = _said(comment.text, find_rule)
-    except UrdfkinError as error:
-        report.add(
-            BAD_COMMENT,
-            f"{error.what}, so the comment silences nothing",
-            found=quoted(f"<!--{comment.text}-->"),
-            remedy=error.remedy,
-            position=(comment.line, comment.column),
-        )
-        return None
-    return Silence(comment, codes, reason)
-
-
-def _said(text: str, find_rule: Callable[[str], Rule]) -> tuple[tuple[str, ...], str]:
-    """The codes and the reason of a comment."""
-    match = _FORM.fullmatch(text)
-    words = re.split(r"[,\s]+", match[1].strip(", \t\r\n")) if match else [""]
-    if match is None or words == [""]:
-        raise InputError(
-            "no code in brackets", remedy="write <!-- urdfkin: ignore[URDF503] why that is meant -->"
-        )
-    if not (reason := " ".join(match[2].split())):
-        raise InputError("no reason is given", remedy="say behind the bracket why that is meant")
-    return tuple(dict.fromkeys(find_rule(word).id for word in words)), reason
+def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silence | None:
+    match = _FORM.fullmatch(comment.text)
+    words = [word for word in _BETWEEN.split(match[1]) if word] if match else []
+    unknown = next((word for word in words if word.lower() not in codes), None)
+    reason = " ".join(match[2].split()) if match else ""
+    remedy: str | None
+    if words and unknown is None and reason:
+        return Silence(comment, tuple(dict.fromkeys(codes[word.lower()] for word in words)), reason)
+    if not words:
+        what, remedy = "no code in brackets", "write <!-- urdfkin: ignore[URDF503] why that is meant -->"
+    elif unknown is not None:
+        close = report.nearest(unknown.lower(), codes)
+        what = f"unknown code {quoted(unknown)}"
+        remedy = f"did you mean {', '.join(dict.fromkeys(codes[word] for word in close))}?" if close else None
+    else:
+        what, remedy = "no reason is given", "say behind the bracket why that is meant"
+    report.add(
+        BAD_COMMENT,
+        f"{what}, so the comment silences nothing",
+        found=quoted(f"<!--{comment.text}-->"),
+        remedy=remedy,
+        position=(comment.line, comment.column),
+    )
+    return None
 
 
 def check_unused(report: Reporter) -> None:
