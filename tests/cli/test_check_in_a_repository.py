@@ -455,7 +455,7 @@ def test_a_rounded_pi_says_how_far_it_turns(here: Path) -> None:
     arm = put("arm.urdf", GOOD.replace("<axis", '<origin rpy="1.5708 0 0"/><axis'))
     assert (
         check("--fix").err
-        == "arm.urdf: fixed URDF601 rounded-pi, line 5; a frame is turned by up to 3.7e-06 rad\n"
+        == "arm.urdf: fixed URDF601 rounded-pi, line 5; joints turned by up to 3.7e-06 rad each\n"
     )
     assert 'rpy="1.5707963267948966 0 0"' in arm.read_text()
 

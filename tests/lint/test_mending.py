@@ -20,6 +20,7 @@ from tests.lint.cases.arm import Case, arm, axis, limit
 from urdfkin.lint import Finding, Severity
 from urdfkin.lint.edits import Edit, Fix
 from urdfkin.lint.mending import TILT, Mended, differences, mend
+from urdfkin.lint.reporter import WRITTEN_OUT
 from urdfkin.lint.rules.axes import unit_vector
 from urdfkin.lint.runner import Examined, examine
 from urdfkin.urdf.catalogue import catalogue
@@ -213,6 +214,19 @@ def test_the_differences_that_are_looked_for_are_all_there_are() -> None:
 def test_a_file_with_an_error_has_no_meaning_to_keep() -> None:
     done = mended(limit('lower="1" upper="-1" effort="1" velocity="1"').replace("<axis ", '<axis shade="3" '))
     assert done.kept == {"URDF208": "errors come first, URDF507 here"}
+
+
+@pytest.mark.slow
+def test_more_than_are_written_out_are_cured_too() -> None:
+    many = WRITTEN_OUT + 5
+    links = "".join(f'<link name="l{i}" shade="3"/>' for i in range(many))
+    joints = "".join(
+        f'<joint name="j{i}" type="fixed"><parent link="l0"/><child link="l{i}"/></joint>'
+        for i in range(1, many)
+    )
+    done = mended(f'<robot name="r">{links}{joints}</robot>')
+    assert (len(done.fixed), done.kept) == (many, {})
+    assert b"shade" not in done.text.data
 
 
 def test_the_patch_has_the_changed_lines_only() -> None:

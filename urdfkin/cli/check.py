@@ -62,9 +62,7 @@ choice_options = together(
     ),
     click.option("--strict/--no-strict", default=False, help="Turn warnings into errors."),
     click.option("--notes/--no-notes", default=True, help="Whether notes are told.  [default: they are]"),
-    click.option(
-        "--exclude", multiple=True, metavar="GLOB", help="Files and folders that a folder has in vain."
-    ),
+    click.option("--exclude", multiple=True, metavar="GLOB", help="Leave out files and folders of a folder."),
     click.option("--baseline", type=_FILE, help="Leave out the findings that this file knows."),
     click.option("--write-baseline", type=_FILE, help="Make all that is found known to this file; exit 0."),
     click.option(

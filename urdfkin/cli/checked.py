@@ -119,10 +119,11 @@ def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
     for code in sorted({finding.code for finding in fixed}):
         these = [finding for finding in fixed if finding.code == code]
         turns = max(finding.fix.turns for finding in these if finding.fix)
-        lines = ", ".join(map(str, sorted({finding.line for finding in these})[:4]))
-        more = f" and {len(these) - 4} more" if len(these) > 4 else ""
-        moved = f"; a frame is turned by up to {turns:.1e} rad" if turns else "; the robot is the same"
-        say(f"{file}: fixed {code} {RULES[code].slug}, line {lines}{more}{moved}", err=True)
+        lines = sorted({finding.line for finding in these})
+        more = f" and {len(lines) - 4} more" if len(lines) > 4 else ""
+        where = f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:4]))}{more}"
+        moved = f"; joints turned by up to {turns:.1e} rad each" if turns else "; the robot is the same"
+        say(f"{file}: fixed {code} {RULES[code].slug}, {where}{moved}", err=True)
 
 
 def show_difference(file: str, before: bytes, after: bytes) -> None:

@@ -74,11 +74,16 @@ def mend(
 
 def _objections(before: Examined, after: Examined, cured: list[Finding]) -> Iterator[str]:
     """What speaks against a fix, the first first."""
-    old, new = (Counter((f.code, f.element, f.name) for f in seen.findings) for seen in (before, after))
+    code = cured[0].code
+    # Of a kind of which there are too many to be written out, others take the places of those that are gone.
+    many = {finding.code for finding in before.findings if finding.also}
+    old, new = (
+        Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
+        for seen in (before, after)
+    )
     if appeared := new - old:
         yield f"it would bring {min(code for code, *_ in appeared)}"
-    code = cured[0].code
-    if len(before.findings) - len(after.findings) < len(cured):
+    if sum(f.count for f in before.findings) - sum(f.count for f in after.findings) < len(cured):
         yield f"{code} would still be there"
     if before.robot is None or after.robot is None:
         if before.robot is not after.robot:
