@@ -111,14 +111,15 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
 
     A FILE is a path, a name of the catalogue, or - for standard input; a FOLDER stands for all *.urdf in it;
     with neither, the current folder is checked. A .xacro file is expanded by a process that can compute and
-    read its package's files, no more (docs/xacro.md). Exit 0 when there is no error, 1 when there is, or
+    read its package's files, no more (docs/xacro.md). --changed-since origin/main tells what a pull request
+    brings; settings stand in [tool.urdfkin] of pyproject.toml (docs/check.md). Exit 0 when there is no error, 1 when there is, or
     something to --diff, 2 when a file cannot be read or an option is wrong.
 
     \b
     Example:
       urdfkin check robots/
-      urdfkin check --strict --ignore URDF601 arm.urdf 'hands/**/*.urdf'
-      urdfkin check --changed-since origin/main
+      urdfkin check --strict --ignore URDF601 arm.urdf 'robots/**/*.urdf'
+      urdfkin check --statistics
       urdfkin check --select URDF503 --fix arm.urdf
       urdfkin explain URDF502
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
