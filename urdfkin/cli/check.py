@@ -112,8 +112,8 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
     A FILE is a path, a name of the catalogue, or - for standard input; a FOLDER stands for all *.urdf in it;
     with neither, the current folder is checked. A .xacro file is expanded by a process that can compute and
     read its package's files, no more (docs/xacro.md). --changed-since origin/main tells what a pull request
-    brings; settings stand in [tool.urdfkin] of pyproject.toml (docs/check.md). Exit 0 when there is no error, 1 when there is, or
-    something to --diff, 2 when a file cannot be read or an option is wrong.
+    brings; settings stand in [tool.urdfkin] of pyproject.toml (docs/check.md). Exit 0 when there is no error,
+    1 when there is, or something to --diff, 2 when a file cannot be read or an option is wrong.
 
     \b
     Example:
