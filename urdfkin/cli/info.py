@@ -1,10 +1,11 @@
-"""`urdfkin info`: what a robot is made of."""
+"""`urdfkin info`: what a robot is made of, as one table that is also its tree."""
 
 from __future__ import annotations
 
 import json
 import math
 import sys
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import click
@@ -12,21 +13,26 @@ import click
 from urdfkin.cli.arguments import load_robot, robot_argument
 
 if TYPE_CHECKING:
-    from urdfkin.model.tree import Joint
+    from urdfkin.model.tree import Joint, KinematicTree
     from urdfkin.robot import Robot
 
 EXAMPLE = "urdfkin info panda"
 
-_COLUMNS = ("joint", "kind", "q", "parent", "child", "lower", "upper")
+_COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "follows")
+#: How a link hangs from one with several children: (guide of itself, guide of what is below) while more of
+#: them come, then of the last. A terminal that knows no lines gets the second pair of pairs.
+_GUIDES = {False: (("├ ", "│ "), ("└ ", "  ")), True: (("+ ", "| "), ("` ", "  "))}
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")
 @robot_argument
 @click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
 def command(robot: str, mimic: bool | None, root_joint: str | None, format_: str) -> None:
-    """Joints, limits, frames and coordinates of a robot.
+    """A robot's tree: links, joints, axes, limits, places in q and v, and who follows whom.
 
-    Joints stand in the order of q, v and of a Jacobian's columns, which is Pinocchio's and not the file's.
+    Joints stand in the order of q, v and of a Jacobian's columns, which is Pinocchio's; where the file has
+    another, a line says so. Limits are in rad and rad/s, of prismatic joints in m and m/s. A link that is not
+    indented hangs from the one above it; where several hang from one link, lines lead to them.
     """
     loaded = load_robot(robot, mimic, root_joint)
     if format_ == "json":
@@ -47,43 +53,88 @@ def _print(robot: Robot) -> None:
         f"{robot.name}: nq {robot.nq}, nv {robot.nv}, {len(tree.links)} links, {len(tree.joints)} joints"
     )
     out.print(f"root {tree.links[0]}, default base {robot.base_frame}, default tip {robot.tip_frame}")
-    moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
-    rows = [
-        (
-            joint.name,
-            joint.kind.value,
-            _coordinates(robot, i),
-            tree.links[joint.parent],
-            tree.links[i + 1],
-            *_limits(joint),
-        )
-        for i, joint in moving
+    hung = [
+        guide + link for guide, link in zip(guides(tree, out.options.ascii_only), tree.links, strict=True)
     ]
-    if fits(out, _COLUMNS, rows):
-        out.print(make_table(_COLUMNS, rows, left=range(5)))
+    details = [_details(robot, i) for i in range(len(tree.joints))]
+    columns = _COLUMNS if any(joint.mimic for joint in tree.joints) else _COLUMNS[:-1]
+    empty = ("",) * len(columns)
+    rows = [(hung[0], "", *empty)]
+    for joint, link, cells in zip(tree.joints, hung[1:], details, strict=True):
+        rows.append((link, joint.name, *cells[: len(columns)]))
+    if fits(out, ("link", "joint", *columns), rows):
+        out.print(make_table(("link", "joint", *columns), rows, left=(0, 1, 2, 3, 4, 5, 9)))
     else:
-        short = [
-            (f"{joint}: {parent} -> {child}", kind, q, *limits)
-            for joint, kind, q, parent, child, *limits in rows
-        ]
-        print_named(out, ["joint: parent -> child", "kind", "q", "lower", "upper"], short, left=range(3))
-    fixed = [joint.name for joint in tree.joints if not joint.kind.nv]
-    if fixed:
-        out.print(f"fixed joints ({len(fixed)}): {', '.join(fixed)}")
-    out.print(f"frames: {len(robot.frame_names)}, every link and joint")
+        short = [(f"{link} by {joint}" if joint else link, *cells) for link, joint, *cells in rows]
+        print_named(out, ("link by joint", *columns), short, left=(0, 1, 2, 3, 4, 8))
+    tips = ", ".join(tree.links[leaf] for leaf in tree.leaves())
+    out.print(f"frames: {len(robot.frame_names)}, every link and joint by its name; tips: {tips}")
+    out.print(_order(robot))
 
 
-def _coordinates(robot: Robot, i: int) -> str:
-    joint, at = robot.tree.joints[i], robot.tree.q_index[i]
-    if joint.mimic:
-        return f"{joint.mimic.multiplier:g} q[{at}] {joint.mimic.offset:+g}"
-    return f"q[{at}]" if joint.nq == 1 else f"q[{at}:{at + joint.nq}]"
+def guides(tree: KinematicTree, ascii_only: bool = False) -> Iterator[str]:
+    """What stands before each link, root first, so that the list is a tree: nothing before an only child."""
+    children = [0] * len(tree.links)
+    for joint in tree.joints:
+        children[joint.parent] += 1
+    left, below = list(children), [""]
+    more, last = _GUIDES[ascii_only]
+    yield ""
+    for joint in tree.joints:
+        left[joint.parent] -= 1
+        own, behind = ("", "") if children[joint.parent] == 1 else more if left[joint.parent] else last
+        yield below[joint.parent] + own
+        below.append(below[joint.parent] + behind)
 
 
-def _limits(joint: Joint) -> tuple[str, str]:
+def _details(robot: Robot, i: int) -> tuple[str, ...]:
+    tree = robot.tree
+    joint = tree.joints[i]
+    if not joint.kind.nv:
+        return (joint.kind.value, *[""] * (len(_COLUMNS) - 1))
+    q, v = _place("q", tree.q_index[i], joint.kind.nq), _place("v", tree.v_index[i], joint.kind.nv)
     limit = joint.limit
-    return ("", "") if limit is None else (_bound(limit.lower), _bound(limit.upper))
+    limits = ("", "", "") if limit is None else map(_bound, (limit.lower, limit.upper, limit.velocity))
+    return (joint.kind.value, _axis(joint), q, v, *limits, _follows(joint))
+
+
+def _place(letter: str, at: int, count: int) -> str:
+    return f"{letter}[{at}]" if count == 1 else f"{letter}[{at}:{at + count}]"
+
+
+def _axis(joint: Joint) -> str:
+    """`z`, `-x`, or the three numbers where it is none of the frame's own axes."""
+    if not joint.kind.has_axis:
+        return ""
+    numbers = joint.axis.tolist()
+    if sorted(map(abs, numbers)) == [0.0, 0.0, 1.0]:
+        k = next(k for k, x in enumerate(numbers) if x)
+        return f"{'-' if numbers[k] < 0.0 else ''}{'xyz'[k]}"
+    return " ".join(f"{x:.4g}" for x in numbers)
+
+
+def _follows(joint: Joint) -> str:
+    if joint.mimic is None:
+        return ""
+    leader, factor, offset = joint.mimic.leader, joint.mimic.multiplier, joint.mimic.offset
+    return (f"{factor:g} * " if factor != 1.0 else "") + leader + (f" {offset:+g}" if offset else "")
 
 
 def _bound(value: float) -> str:
     return "" if math.isinf(value) else f"{value:.6g}"
+
+
+def _order(robot: Robot) -> str:
+    """Whether the file has its moving joints in another order, and from where on."""
+    from urdfkin.urdf.plain_xml import plain_xml  # noqa: PLC0415
+
+    known = set(robot.joint_names)
+    written = [
+        e.get("name", "") for e in plain_xml(robot.urdf) if e.tag == "joint" and e.get("name") in known
+    ]
+    ours = [name for name in robot.joint_names if name in set(written)]
+    says = "order of joints: Pinocchio's (depth first, siblings by name), for q, v and columns"
+    first = next((k for k, pair in enumerate(zip(written, ours, strict=False)) if pair[0] != pair[1]), None)
+    if first is None:
+        return f"{says}; the file has the same"
+    return f"{says}; the file's differs: {written[first]} is number {first + 1} there, {ours[first]} here"

@@ -1,0 +1,86 @@
+"""`urdfkin info`: the tree as it hangs, and all that a joint needs in one line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import urdfkin as library
+from tests.cli.running import urdfkin
+from urdfkin.cli.info import guides
+from urdfkin.model.tree import Joint, JointKind, KinematicTree, Mimic, build_tree
+from urdfkin.urdf.writer import to_urdf
+
+
+def joint(name: str, kind: JointKind = JointKind.CONTINUOUS, **more: object) -> Joint:
+    given: dict[str, object] = {"axis": np.array([0.0, 0.0, 1.0])} | more
+    return Joint(name, kind, 0, np.eye(4), **given)  # type: ignore[arg-type]
+
+
+def forked() -> KinematicTree:
+    rows = [(joint("b"), "root", "B"), (joint("a"), "root", "A"), (joint("c"), "A", "C")]
+    rows += [(joint("d"), "C", "D"), (joint("e"), "C", "E"), (joint("f"), "E", "F")]
+    return build_tree("forked", "root", rows)
+
+
+def parents_of_the_drawing(lines: list[str]) -> list[int]:
+    """Whom each line hangs from, read back from the guides alone."""
+    stack: list[tuple[int, int]] = []
+    found = []
+    for k, line in enumerate(lines):
+        depth = len(line) - len(line.lstrip("│├└ "))
+        branch = line[:depth].rstrip().endswith(("├", "└"))
+        while stack and (stack[-1][1] > depth or (branch and stack[-1][1] >= depth)):
+            stack.pop()
+        found.append(stack[-1][0] if stack else -1)
+        stack.append((k, depth))
+    return found
+
+
+@pytest.mark.parametrize("name", ["forked", "panda", "talos"])
+def test_the_guides_say_whom_each_link_hangs_from(name: str) -> None:
+    tree = forked() if name == "forked" else library.load(name, verify=False).tree
+    drawn = [guide + "x" for guide in guides(tree)]
+    assert parents_of_the_drawing(drawn) == [-1, *(one.parent for one in tree.joints)]
+
+
+def test_only_children_do_not_move_to_the_right_however_long_the_chain() -> None:
+    rows = [(joint(f"j{k}"), f"l{k}", f"l{k + 1}") for k in range(300)]
+    assert set(guides(build_tree("long", "l0", rows))) == {""}
+
+
+def test_a_follower_names_its_leader_and_an_axis_its_letter() -> None:
+    rows = [
+        (joint("lead", axis=np.array([0.0, -1.0, 0.0])), "root", "A"),
+        (joint("same", mimic=Mimic("lead", 1.0, 0.0)), "A", "B"),
+        (joint("scaled", mimic=Mimic("lead", -0.5, 0.25), axis=np.array([0.6, 0.0, 0.8])), "B", "C"),
+        (joint("held", JointKind.FIXED), "C", "D"),
+    ]
+    lines = urdfkin("info", to_urdf(build_tree("r", "root", rows))).text.splitlines()
+    cells = {line.split()[0]: line.split()[1:] for line in lines}
+    assert cells["A"] == ["lead", "continuous", "-y", "q[0]", "v[0]"]
+    assert cells["B"] == ["same", "continuous", "z", "q[0]", "v[0]", "lead"]
+    assert cells["C"] == [
+        *("scaled", "continuous", "0.6", "0", "0.8", "q[0]", "v[0]"),
+        *("-0.5", "*", "lead", "+0.25"),
+    ]
+    assert cells["D"] == ["held", "fixed"]
+
+
+def test_a_file_with_another_order_is_told_with_the_first_joint_that_differs() -> None:
+    urdf = to_urdf(forked())
+    assert urdfkin("info", urdf).text.splitlines()[-1].endswith("the file has the same")
+    swapped = urdf.replace('joint name="a"', 'joint name="z"')  # its place in the file stays, ours moves
+    assert urdfkin("info", swapped).text.splitlines()[-1].endswith("differs: z is number 1 there, b here")
+    # A root joint stands in no file.
+    assert urdfkin("info", urdf, "--root-joint", "planar").text.splitlines()[-1].endswith("has the same")
+
+
+def test_a_joint_of_several_numbers_shows_where_all_of_them_are() -> None:
+    text = urdfkin("info", to_urdf(forked()), "--root-joint", "floating").text
+    (line,) = [line for line in text.splitlines() if "root_joint" in line]
+    assert line.split()[1:5] == ["root_joint", "floating", "q[0:7]", "v[0:6]"]
+
+
+def test_the_last_links_are_named_as_tips() -> None:
+    assert "; tips: D, F, B" in urdfkin("info", to_urdf(forked())).text
