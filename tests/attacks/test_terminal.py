@@ -65,6 +65,7 @@ OTHERS: dict[str, list[list[str]]] = {
     "campaign": [["status", FILE], ["merge", FILE, FILE]],
     "view": [[FILE]],
     "warm": [[], [FILE]],
+    "completion": [["bash"], ["zsh"], ["fish"], [FILE]],
 }
 
 

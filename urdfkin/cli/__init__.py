@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 import importlib
+import io
+import os
 import sys
 import warnings
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import click
 
@@ -17,6 +19,9 @@ from urdfkin.cli.crash import run
 from urdfkin.cli.door import guard
 from urdfkin.errors import UnknownNameError
 from urdfkin.verify.quantities import by_command
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 #: Command name -> (module that holds `command`, one-line summary), in the order of the help page, before and
 #: after the commands that compute a quantity.
@@ -43,16 +48,18 @@ _AFTER: dict[str, tuple[str, str]] = {
     "report": ("urdfkin.cli.report", "show or write the report of an earlier validation"),
     "plot": ("urdfkin.cli.plot", "a frame's motion along a trajectory, as a picture"),
     "view": ("urdfkin.cli.view", "a robot in a browser tab, with sliders and arrows"),
+    "completion": ("urdfkin.cli.completion", "makes bash, zsh or fish complete names as they are typed"),
     "warm": ("urdfkin.cli.warm", "compile everything now: for container images and CI"),
     "compare": ("urdfkin.cli.compare", "what changed between two validations"),
 }
-#: The module that makes a command of a row of the quantities' table.
-_QUANTITY = "urdfkin.cli.quantity"
+#: The module that makes a command of a row of the quantities' table; rows whose command has more to it.
+_QUANTITY, _OWN = "urdfkin.cli.quantity", dict[str, str]()
 
 
 def commands() -> dict[str, tuple[str, str]]:
     """Every command's module and summary."""
-    return _BEFORE | {name: (_QUANTITY, row.summary) for name, row in by_command().items()} | _AFTER
+    rows = by_command().items()
+    return _BEFORE | {name: (_OWN.get(name, _QUANTITY), row.summary) for name, row in rows} | _AFTER
 
 
 class LazyGroup(click.Group):
@@ -75,8 +82,18 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """As click does, but an unknown command offers the nearest ones."""
         if args and args[0] not in commands() and not args[0].startswith("-"):
+            if ctx.resilient_parsing:  # a shell wants to complete something
+                return None, None, args
             raise UnknownNameError("command", args[0], commands())
         return super().resolve_command(ctx, args)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:
+        """Commands with their summaries, without importing them; options."""
+        from click.shell_completion import CompletionItem  # noqa: PLC0415  only when a key is pressed
+
+        found = [(name, summary) for name, (_, summary) in commands().items() if name.startswith(incomplete)]
+        names = [CompletionItem(name, help=summary) for name, summary in found]
+        return names + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The table of commands, from the summaries alone."""
@@ -113,6 +130,8 @@ def main() -> None:
     """
     streams.prepare()
     guard()
+    if os.environ.get("_URDFKIN_COMPLETE"):  # while a key is pressed, nothing that fails is worth a line
+        sys.stderr = io.StringIO()
     # The line under a result says that it was not verified, and why; once is enough.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

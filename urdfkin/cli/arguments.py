@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from urdfkin.cli.completing import complete_frame, complete_robot
 from urdfkin.cli.door import say
 from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.numbers import Whole
@@ -18,6 +19,7 @@ from urdfkin.errors.numerals import whole
 from urdfkin.system.files import read_standard_input, read_text
 
 if TYPE_CHECKING:
+    from urdfkin.model.base_motion import BaseMotion
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
     from urdfkin.verify.witnesses import WitnessName
@@ -82,9 +84,21 @@ robot_options = together(
     ),
     xacro_option,
 )
-robot_argument = together(click.argument("robot", metavar="ROBOT"), robot_options)
+robot_argument = together(
+    click.argument("robot", metavar="ROBOT", shell_complete=complete_robot), robot_options
+)
 
-frame_option = click.option("--frame", metavar="NAME", help="A link or joint. Default: the robot's tip.")
+
+def frame_name(option: str, help_: str) -> Callable[[_F], _F]:
+    """An option that names a frame, which a shell completes."""
+    return click.option(option, metavar="NAME", help=help_, shell_complete=complete_frame)
+
+
+frame_option = frame_name("--frame", "A link or joint. Default: the robot's tip.")
+path_options = together(
+    frame_name("--base", "A link or joint. Default: the robot's base frame."),
+    frame_name("--tip", "A link or joint. Default: the robot's tip."),
+)
 reference_option = click.option(
     "--reference",
     type=click.Choice(REFERENCES, case_sensitive=False),
@@ -114,7 +128,7 @@ TRAJECTORY_HELP = "CSV: t, coordinates, v:NAME, a:NAME; or .npz: t, q, v, a."
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """A robot and what to compute with; along a trajectory, at what times."""
+    """A robot and what to compute with; along a trajectory, at what times; how the root link moves."""
 
     robot: Robot
     frame: str
@@ -122,6 +136,12 @@ class Inputs:
     v: FloatArray
     a: FloatArray
     t: FloatArray | None = None
+    base: BaseMotion | None = None
+    said: Mapping[str, Any] = field(default_factory=dict)
+
+    def saying(self, **more: Any) -> Inputs:
+        """With more that the result depends on, for titles and JSON."""
+        return replace(self, said={**self.said, **more})
 
 
 def load_robot(
@@ -166,10 +186,10 @@ def read_inputs(
             found=", ".join(str(len(part)) for part in rows),
         )
     n = lengths.pop() if lengths else 1
-    full = [np.ascontiguousarray(np.broadcast_to(part, (n, part.shape[1]))) for part in rows]
-    for line in robot.limit_violations(full[0]):
+    q_, v_, a_ = (np.ascontiguousarray(np.broadcast_to(part, (n, part.shape[1]))) for part in rows)
+    for line in robot.limit_violations(q_):
         say(f"warning: {line}", err=True)
-    return Inputs(robot, frame or robot.tip_frame, *full)
+    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_)
 
 
 def _values(robot: Robot, letter: str, text: str, rng: Any) -> FloatArray:
@@ -186,7 +206,7 @@ def _values(robot: Robot, letter: str, text: str, rng: Any) -> FloatArray:
         n = _count(letter, count) if count else _RANDOM_SAMPLES
         return sample(robot.tree, n, rng) if letter == "q" else rng.standard_normal((n, len(names)))
     if text.startswith("@"):
-        return _read_csv(Path(text[1:]), letter, names)
+        return read_batch(Path(text[1:]), f"--{letter}", (names,))[0]
     from urdfkin.motion.columns import numbers  # noqa: PLC0415
 
     return np.array([numbers(text.split(","), f"--{letter}", names)])
@@ -199,20 +219,25 @@ def _count(letter: str, text: str) -> int:
     return count
 
 
-def _read_csv(path: Path, letter: str, names: Sequence[str]) -> FloatArray:
-    """A batch, one sample a line; a first line of names may put the columns in any order."""
+def read_batch(path: Path, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
+    """(n, width), one sample a line, and which of the layouts it is in: the one with as many columns.
+
+    A first line of names may put the columns in any order.
+    """
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
-    from urdfkin.motion.columns import read_columns  # noqa: PLC0415
+    from urdfkin.motion.columns import read_columns, width_of  # noqa: PLC0415
 
     text = _standard_input() if str(path) == "-" else read_text(path)
-    columns = read_columns(text, str(path), f"--{letter}", names)
+    width = width_of(text, str(path)) if len(layouts) > 1 else None
+    names = next((names for names in layouts if len(names) == width), layouts[0])
+    columns = read_columns(text, str(path), option, names)
     found = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
     if not len(found):
         raise InputError(
             "no samples", where=str(path), remedy="one line a sample, numbers separated by commas"
         )
-    return np.ascontiguousarray(found)
+    return np.ascontiguousarray(found), names
 
 
 def _standard_input() -> str:

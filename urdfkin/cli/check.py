@@ -13,6 +13,7 @@ import click
 
 from urdfkin.cli.arguments import together, xacro_args, xacro_option
 from urdfkin.cli.checked import STYLES, Outcome, print_outcome, say_fixed, show_difference
+from urdfkin.cli.completing import complete_code, complete_file
 from urdfkin.cli.door import say
 from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.numbers import Whole
@@ -55,10 +56,18 @@ def _isolate(context: click.Context, _: click.Parameter, isolated: bool) -> None
 
 choice_options = together(
     click.option(
-        "--select", multiple=True, metavar="CODE", help="Only these: codes, names or families, URDF5."
+        "--select",
+        multiple=True,
+        metavar="CODE",
+        shell_complete=complete_code,
+        help="Only these: codes, names or families, URDF5.",
     ),
     click.option(
-        "--ignore", multiple=True, metavar="CODE", help="Leave out a code; may be repeated, or a,b,c."
+        "--ignore",
+        multiple=True,
+        metavar="CODE",
+        shell_complete=complete_code,
+        help="Leave out a code; may be repeated, or a,b,c.",
     ),
     click.option("--strict/--no-strict", default=False, help="Turn warnings into errors."),
     click.option("--notes/--no-notes", default=True, help="Whether notes are told.  [default: they are]"),
@@ -88,7 +97,7 @@ limit_options = together(
 
 
 @click.command("check")
-@click.argument("files", nargs=-1, metavar="[FILE|FOLDER|GLOB]...")
+@click.argument("files", nargs=-1, metavar="[FILE|FOLDER|GLOB]...", shell_complete=complete_file)
 @click.option(
     "--format", "--output-format", "style", type=click.Choice(STYLES), default="terminal", show_default=True,
     help="How to print the findings.",

@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from urdfkin.cli.arguments import load_robot, robot_argument, together, verify_option
+from urdfkin.cli.arguments import load_robot, path_options, robot_argument, together, verify_option
+from urdfkin.cli.completing import complete_table
 from urdfkin.cli.endings import form_of
 from urdfkin.cli.idle import refuse_idle, typed
 from urdfkin.cli.numbers import Number, Whole
@@ -40,9 +41,8 @@ def _columns(_context: click.Context, _option: click.Parameter, value: str) -> t
     return names
 
 
-path_options = together(
-    click.option("--base", metavar="NAME", help="A link or joint. Default: the robot's base frame."),
-    click.option("--tip", metavar="NAME", help="A link or joint. Default: the robot's tip."),
+part_options = together(
+    path_options,
     click.option("--all", "all_", is_flag=True, help="A table for each leaf of the robot."),
     click.option("--tree", is_flag=True, help="Khalil and Kleinfinger's parameters of the whole robot."),
 )
@@ -67,6 +67,7 @@ choice_options = together(
     click.option(
         "--like",
         metavar="TABLE",
+        shell_complete=complete_table,
         help="The URDF's numbers in the frames, senses and zeros of a published table (as for --compare).",
     ),
 )
@@ -74,6 +75,7 @@ compare_options = together(
     click.option(
         "--compare",
         metavar="TABLE",
+        shell_complete=complete_table,
         help="Hold the URDF against a table: a file (as for ROBOT), or the name of a shipped one.",
     ),
     click.option(
@@ -143,7 +145,7 @@ def _refuse_idle(context: click.Context, is_table: bool, options: dict[str, Any]
 
 @click.command(epilog=f"Example: {EXAMPLE}")
 @robot_argument
-@path_options
+@part_options
 @choice_options
 @compare_options
 @form_options

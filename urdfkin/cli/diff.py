@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from urdfkin.cli.arguments import load_robot, xacro_option
+from urdfkin.cli.completing import complete_robot
 from urdfkin.cli.door import say_file
 from urdfkin.cli.output import compiling, console, write_file
 from urdfkin.cli.reports import check_writable
@@ -16,8 +17,8 @@ EXAMPLE = "urdfkin diff arm.urdf my.urdf --markdown comment.md"
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")
-@click.argument("a", metavar="OLD")
-@click.argument("b", metavar="NEW")
+@click.argument("a", metavar="OLD", shell_complete=complete_robot)
+@click.argument("b", metavar="NEW", shell_complete=complete_robot)
 @click.option(
     "--effects/--no-effects", default=True, help="Whether to bound how far changes move frames (the default)."
 )

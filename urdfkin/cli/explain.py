@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import click
 
+from urdfkin.cli.completing import complete_topic
 from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.lint.explain import explain
 from urdfkin.lint.pages import RULES, find_rule, page
 
 
 @click.command("explain")
-@click.argument("topic", metavar="CODE|EQUATION", required=False)
+@click.argument("topic", metavar="CODE|EQUATION", required=False, shell_complete=complete_topic)
 def command(topic: str | None) -> None:
     """Explain a code: why it matters, a bad and a good example, and what other programs do with it.
 

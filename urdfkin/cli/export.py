@@ -13,6 +13,7 @@ from urdfkin.cli.arguments import (
     robot_options,
     verify_option,
 )
+from urdfkin.cli.completing import complete_robot
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.output import check_line, exit_code, write_file
@@ -23,7 +24,7 @@ EXAMPLE = "urdfkin export panda --frame panda_hand --to c -o panda_hand.c"
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")
-@click.argument("robot", metavar="[ROBOT]", required=False)
+@click.argument("robot", metavar="[ROBOT]", required=False, shell_complete=complete_robot)
 @robot_options
 @frame_option
 @click.option(

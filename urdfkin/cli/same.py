@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.arguments import load_robot, xacro_option
+from urdfkin.cli.completing import complete_robot
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.numbers import NumberFrom
 from urdfkin.cli.output import compiling, console, write_file
@@ -23,8 +24,8 @@ _PATH = click.Path(path_type=Path, dir_okay=False)
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")
-@click.argument("a", metavar="A", required=False)
-@click.argument("b", metavar="B", required=False)
+@click.argument("a", metavar="A", required=False, shell_complete=complete_robot)
+@click.argument("b", metavar="B", required=False, shell_complete=complete_robot)
 @click.option(
     "--map",
     "pairs",

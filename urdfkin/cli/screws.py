@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from urdfkin.cli.arguments import load_robot, robot_argument, verify_option
+from urdfkin.cli.arguments import load_robot, path_options, robot_argument, verify_option
 from urdfkin.cli.numbers import Whole
 from urdfkin.cli.output import output_option
 
@@ -15,8 +15,7 @@ FORMS = ("terminal", "latex", "toml", "json", "numpy", "matlab")
 
 @click.command(epilog="Example: urdfkin screws ur5 --tip tool0")
 @robot_argument
-@click.option("--base", metavar="NAME", help="A link or joint. Default: the robot's base frame.")
-@click.option("--tip", metavar="NAME", help="A link or joint. Default: the robot's tip.")
+@path_options
 @click.option(
     "--format", "format_", type=click.Choice(FORMS), default="terminal", show_default=True, help="Form."
 )

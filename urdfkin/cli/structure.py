@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from urdfkin.cli.arguments import load_robot, robot_argument, verify_option
+from urdfkin.cli.arguments import load_robot, path_options, robot_argument, verify_option
 from urdfkin.cli.numbers import Number
 
 if TYPE_CHECKING:
@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 @click.command(epilog="Example: urdfkin structure ur5 --tip tool0")
 @robot_argument
-@click.option("--base", metavar="NAME", help="A link or joint. Default: the robot's base frame.")
-@click.option("--tip", metavar="NAME", help="A link or joint. Default: the robot's tip.")
+@path_options
 @click.option(
     "--opw",
     type=Number(),

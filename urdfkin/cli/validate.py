@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import click
 
 from urdfkin.cli.arguments import xacro_args, xacro_option
+from urdfkin.cli.completing import complete_robot
 from urdfkin.cli.door import say
 from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.judgement import judge_all
@@ -31,7 +32,7 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")
-@click.argument("robots", nargs=-1, metavar="[ROBOT]...")
+@click.argument("robots", nargs=-1, metavar="[ROBOT]...", shell_complete=complete_robot)
 @click.option("--all", "all_", is_flag=True, help="Every robot of example-robot-data in the catalogue.")
 @click.option("--samples", type=Whole(0), default=1000, show_default=True, help="For each robot.")
 @click.option(

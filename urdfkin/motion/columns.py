@@ -58,6 +58,11 @@ def read_columns(
     return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
 
 
+def width_of(text: str, where: str) -> int:
+    """How many cells the first line has that counts; 0 where there is none."""
+    return len(next(_rows(text, where), (0, []))[1])
+
+
 def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[float]:
     """One number for each name.
 

@@ -75,7 +75,7 @@ def print_named(
 
 
 def fits(out: Console, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
-    """Whether a table is no wider than the terminal: a blank behind each cell, and one between two columns."""
+    """Whether a table is no wider than the terminal: a blank behind each cell, one between two columns."""
     return sum(width + 2 for width in _widths(columns, rows)) - 1 <= out.width
 
 

@@ -1,0 +1,202 @@
+"""What a shell offers as one types, asked as its script asks, and in the shells themselves."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import re
+import select
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import urdfkin as library
+from tests.attacks.hostile import IN_XML, chain_of_all
+from tests.cli.running import urdfkin
+from urdfkin.cli import commands
+from urdfkin.dh.references import references
+from urdfkin.kinematics.registry import equations
+from urdfkin.lint.pages import RULES
+from urdfkin.urdf.catalogue import catalogue
+
+Offered = Callable[[str], list[str]]
+
+
+@pytest.fixture
+def offered(monkeypatch: pytest.MonkeyPatch) -> Offered:
+    """What is offered for a line that ends where the key is pressed, as bash asks; `file` means files."""
+
+    def ask(line: str) -> list[str]:
+        words = f"urdfkin {line}"
+        monkeypatch.setenv("_URDFKIN_COMPLETE", "bash_complete")
+        monkeypatch.setenv("COMP_WORDS", words)
+        monkeypatch.setenv("COMP_CWORD", str(len(words.split(" ")) - 1))
+        done = urdfkin()
+        assert (done.code, done.err) == (0, "")
+        items = [item.split(",", 1) for item in done.text.splitlines() if item]
+        return [value if kind == "plain" else kind for kind, value in items]
+
+    return ask
+
+
+def test_commands_options_and_choices_are_offered(offered: Offered) -> None:
+    assert offered("") == list(commands())
+    assert offered("jaco") == ["jacobian", "jacobian-rate"]
+    assert offered("jacobian panda --refe") == ["--reference"]
+    assert offered("jacobian panda --reference lo") == ["local", "local_world_aligned"]
+
+
+@pytest.mark.parametrize("line", ["info ", "validate ur5 ", "diff ur5 ", "same ur5 ", "export ", "dh "])
+def test_robots_are_files_and_the_catalogues_names(offered: Offered, line: str) -> None:
+    assert offered(line) == ["file", *catalogue()]
+    assert offered(f"{line}pand") == ["file", "panda", "panda_collision"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["jacobian ROBOT --frame", "placement ROBOT --relative-to", "dh ROBOT --tip", "chain ROBOT --base"],
+)
+def test_frames_are_those_of_the_robot_on_the_line(offered: Offered, words: str, tmp_path: Path) -> None:
+    own = tmp_path / "own.urdf"
+    own.write_text(library.load("planar_two_link", verify=False).urdf)
+    for source in ("panda", str(own)):
+        names = set(library.load(source, verify=False).frame_names)
+        assert set(offered(f"{words.replace('ROBOT', source)} ")) == names
+    assert offered(f"{words.replace('ROBOT', 'panda')} panda_lef") == ["panda_leftfinger"]
+
+
+def test_frames_of_an_mjcf_file_are_its_bodies_sites_and_joints(offered: Offered, tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="upper"><joint name="hinge"/><geom name="skin" size="1"/>'
+        '<body name="lower"><site name="grip"/></body></body></worldbody></mujoco>'
+    )
+    assert offered(f"jacobian {path} --frame ") == ["upper", "hinge", "lower", "grip"]
+
+
+def test_codes_equations_and_tables_are_offered(offered: Offered) -> None:
+    slugs = {rule.slug for rule in RULES.values()}
+    assert set(offered("explain ")) == {*RULES, *slugs, *equations()}
+    assert offered("explain 7.13") == ["7.13", "7.130"]
+    assert set(offered("check --ignore ")) == {*RULES, *slugs}
+    assert set(offered("dh ur5 --compare ")) == {"file", *references()}
+    assert offered("check ") == ["file"]
+
+
+def test_no_name_is_offered_that_a_shell_would_carry_out(offered: Offered, tmp_path: Path) -> None:
+    """What is completed stands on the command line, and the next key may be the return."""
+    path = tmp_path / "hostile.urdf"
+    harmful = (
+        *IN_XML.values(),
+        "$(reboot)",
+        "`reboot`",
+        "a;reboot",
+        "a b",
+        "-o",
+        "a'b",
+        "*",
+        "~x",
+        "a\\b",
+        "!x",
+    )
+    path.write_text(chain_of_all([*dict.fromkeys(harmful), "fine.name-1"]), encoding="utf-8")
+    assert set(offered(f"jacobian {path} --frame ")) == {"base", "fine.name-1", "__proto__"}
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        "nowhere.urdf",
+        "BROKEN",
+        "PIPE",
+        "FOLDER",
+        "-",
+        "arm.xacro",
+        "'",
+        "<robot/>",
+        "/dev/zero",
+        "no such name",
+    ],
+)
+def test_what_cannot_be_read_offers_nothing_and_says_nothing(
+    offered: Offered, robot: str, tmp_path: Path
+) -> None:
+    made = {name: tmp_path / name.lower() for name in ("BROKEN", "PIPE", "FOLDER")}
+    made["BROKEN"].write_text("<robot><link name='a'/>")
+    os.mkfifo(made["PIPE"])
+    made["FOLDER"].mkdir()
+    begin = time.monotonic()
+    assert offered(f"jacobian {made.get(robot, robot)} --frame ") in ([], ["file", *catalogue()])
+    assert time.monotonic() - begin < 5.0  # a pipe is not waited for
+
+
+def test_an_unknown_command_offers_no_robots_and_says_nothing(offered: Offered) -> None:
+    assert offered("nonsense x") == []
+
+
+def test_completing_imports_nothing_heavy() -> None:
+    env = {"_URDFKIN_COMPLETE": "bash_complete", "COMP_CWORD": "4"}
+    env["COMP_WORDS"] = "urdfkin jacobian talos --frame arm_left_1"
+    code = (
+        "import sys\nfrom urdfkin.cli import main\nsys.argv = ['urdfkin']\n"
+        "try: main()\nfinally: print({'numpy', 'numba', 'pinocchio', 'yourdfpy', 'rich'} & set(sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | env, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.splitlines()[:2] == ["plain,arm_left_1_link", "plain,arm_left_1_joint"]
+    assert done.stdout.endswith("set()\n")
+
+
+# -- in the shells -------------------------------------------------------------------------------------
+
+_PATH = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+#: How each is started without a person's own settings, and told to complete.
+SHELLS = {
+    "bash": (["bash", "--norc", "--noprofile", "-i"], 'eval "$(urdfkin completion bash)"'),
+    "zsh": (
+        ["zsh", "-f", "-i"],
+        'autoload -Uz compinit; compinit -u -D; eval "$(urdfkin completion zsh)"',
+    ),
+    "fish": (["fish", "--no-config", "-i"], "urdfkin completion fish | source"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shell", SHELLS)
+def test_a_real_shell_completes_a_frame_and_runs_the_line(shell: str, tmp_path: Path) -> None:
+    """Typed into the shell itself: the last word is completed, and the command is carried out."""
+    if shutil.which(shell) is None:
+        pytest.skip(f"{shell} is not installed")
+    words, setup = SHELLS[shell]
+    pid, screen = pty.fork()
+    if pid == 0:
+        os.environ.update(PATH=_PATH, TERM="xterm", HOME=str(tmp_path), XDG_CONFIG_HOME=str(tmp_path))
+        os.chdir(tmp_path)
+        os.execvp(words[0], words)
+    try:
+        type_in(screen, f"{setup}; echo re''ady\n", r"ready")
+        type_in(screen, "urdfkin screws panda --tip panda_leftf\t", r"panda_leftfinger")
+        type_in(screen, "--no-verify --format json > out.json; echo d''one\n", r"done")
+    finally:
+        os.close(screen)
+        os.waitpid(pid, 0)
+    assert json.loads((tmp_path / "out.json").read_text())["tip_frame"] == "panda_leftfinger"
+
+
+def type_in(screen: int, keys: str, wanted: str) -> None:
+    """Type, and wait until the screen has what is wanted."""
+    os.write(screen, keys.encode())
+    shown, end = "", time.monotonic() + 60.0
+    while time.monotonic() < end:
+        if select.select([screen], [], [], 0.2)[0]:
+            shown += os.read(screen, 65536).decode(errors="replace")
+            if re.search(wanted, re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown)):
+                return
+    raise AssertionError(f"no {wanted!r} after {keys!r}: {shown!r}")
