@@ -25,6 +25,7 @@ from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
 from urdfkin.errors.demands import choice, real_number, shown, switch, whole_number, word, words
 from urdfkin.export import QUANTITIES as EXPORTED
+from urdfkin.kinematics.bodies.frames import seen_from
 from urdfkin.kinematics.bodies.representation import QUATERNION
 from urdfkin.kinematics.inputs import scalars, vectors
 from urdfkin.kinematics.rotation.euler_rates import NEAREST
@@ -49,6 +50,7 @@ from urdfkin.verify.quantities import (
     JACOBIAN,
     PLACEMENT,
     QUANTITIES,
+    RELATIVE_PLACEMENT,
     quantity,
     walked,
 )
@@ -320,6 +322,50 @@ class Robot:
             return one
         return self._computed("placement", (q,), frame, _ALIGNED, base, out, verify, threads)
 
+    def relative_placement(
+        self,
+        q: ArrayLike,
+        frame: str | Sequence[str],
+        relative_to: str,
+        *,
+        out: FloatArray | None = None,
+        verify: Verify | None = None,
+        threads: int | None = None,
+    ) -> FloatArray:
+        """(..., 4, 4) T_other_frame, the pose of a frame as it is seen from another, wherever the base is.
+
+        T_other_frame = T_world_other^-1 T_world_frame, eq. 7.77 twice; Pinocchio is asked for both.
+
+        Args:
+            q: (..., nq) rad, m.
+            frame: As in `placement`.
+            relative_to: The name of the link or joint that it is seen from.
+            out: As in `placement`.
+            verify: As in `placement`.
+            threads: As in `placement`.
+
+        Raises:
+            InputError: as `placement`.
+            UnknownNameError: no such frame.
+            VerificationError: Pinocchio computes something else.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> q = [0.3, 0.4]
+        >>> T = arm.relative_placement(q, arm.tip_frame, arm.tip_frame)
+        >>> bool(abs(T - np.eye(4)).max() < 1e-15)
+        True
+        """
+        name = word(relative_to, "relative_to")
+        call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=str(name))
+        to = call.flat(out, (4, 4))
+        self.verifier.ready(verify)
+        T_world = call.compute(PLACEMENT.ours, call.plan, (call.q,), None, threads=threads)
+        T = seen_from(T_world[:, -1:], T_world[:, :-1], to)
+        result = call.in_shape(T) if out is None else out
+        self.verifier.check(RELATIVE_PLACEMENT, call, result, verify)
+        return result
+
     def velocity(
         self,
         q: ArrayLike,
@@ -578,7 +624,7 @@ class Robot:
             VerificationError: Pinocchio computes something else.
         """
         representation, nearest = word(representation, "representation"), real_number(nearest, "nearest")
-        options = {"representation": representation, "nearest": nearest}
+        options: dict[str, Any] = {"representation": representation, "nearest": nearest}
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,), **options)
         self.verifier.ready(verify)
         if self.verifier.wanted(verify):
@@ -926,7 +972,7 @@ class Robot:
         out: FloatArray | None,
         verify: Verify | None,
         threads: int | None,
-        **options: object,
+        **options: Any,
     ) -> FloatArray:
         row = QUANTITIES[name]
         call = Call(self.tree, self.plan, frame, reference, base, inputs, **options)

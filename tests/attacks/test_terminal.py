@@ -26,7 +26,12 @@ FILE = "\x1b[31m\n::error::forged\u202e ##vso[x]"
 
 ROBOT = {
     "info": [[], ["--format", "json"]],
-    "placement": [[], ["--format", "json"], ["--format", "csv"], ["--frame", "FRAME"]],
+    "placement": [
+        [], ["--format", "json"], ["--format", "csv"], ["--frame", "FRAME"], ["--relative-to", "FRAME"],
+        ["--as", "rpy"], ["--base-placement", FILE],
+    ],
+    "analytical-jacobian": [[], ["--format", "csv"], ["--representation", FILE]],
+    "chain": [["--no-mimic"], ["--format", "json"], ["--format", "csv"], ["--base", FILE]],
     "velocity": [[], ["--q", "random:3"], ["--q", "\x1b[31mx"]],
     "jacobian": [[], ["--format", "json"], ["--format", "csv"], ["--frame", FILE]],
     "jacobian-rate": [[], ["--format", "csv"]],

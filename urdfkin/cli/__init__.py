@@ -30,11 +30,16 @@ _BEFORE: dict[str, tuple[str, str]] = {
     "info": ("urdfkin.cli.info", "joints, limits, frames and coordinates of a robot"),
 }
 _AFTER: dict[str, tuple[str, str]] = {
+    "analytical-jacobian": (
+        "urdfkin.cli.analytical_jacobian",
+        "derivatives of a frame's position and orientation angles",
+    ),
     "imu": ("urdfkin.cli.imu", "what an accelerometer and a gyroscope in a frame read"),
     "manipulability": (
         "urdfkin.cli.manipulability",
         "singular values of a Jacobian between bounds; their product",
     ),
+    "chain": ("urdfkin.cli.chain", "the joint axes between two frames: where they stand and how they point"),
     "dh": ("urdfkin.cli.dh", "Denavit-Hartenberg tables, checked, compared, in many forms"),
     "diff": ("urdfkin.cli.diff", "what changed between two versions of a description, and what that moves"),
     "same": ("urdfkin.cli.same", "whether two models are the same robot, proven"),
@@ -53,7 +58,7 @@ _AFTER: dict[str, tuple[str, str]] = {
     "compare": ("urdfkin.cli.compare", "what changed between two validations"),
 }
 #: The module that makes a command of a row of the quantities' table; rows whose command has more to it.
-_QUANTITY, _OWN = "urdfkin.cli.quantity", dict[str, str]()
+_QUANTITY, _OWN = "urdfkin.cli.quantity", {"placement": "urdfkin.cli.placement"}
 
 
 def commands() -> dict[str, tuple[str, str]]:

@@ -156,6 +156,7 @@ def _as_json(
     if inputs.t is not None:
         document["t"] = inputs.t.tolist()
     document |= {letter: getattr(inputs, letter).tolist() for letter in quantity.inputs}
+    document |= inputs.said
     document["result"] = result.tolist()
     document["verified"] = certificate.verified
     document["check"] = check_line(certificate)
@@ -202,7 +203,9 @@ def _print_table(
     inputs: Inputs, quantity: Quantity, reference: str | None, result: FloatArray, certificate: Certificate
 ) -> None:
     out = console()
-    where = f", {reference}" if reference else ""
+    how = [f"{name.replace('_', ' ')} {word}" for name, word in inputs.said.items() if isinstance(word, str)]
+    where = "".join(f", {said}" for said in ([reference] if reference else []) + how)
+    where += ", moving base" if inputs.base is not None else ""
     out.print(f"{inputs.robot.name}: {quantity.name} of {inputs.frame}{where}", style="bold")
     for k, value in enumerate(result[:_SHOWN]):
         if len(result) > 1:
@@ -210,7 +213,7 @@ def _print_table(
         if quantity.columns:
             _print_columns(out, quantity, inputs.robot.rate_names, value)
         else:
-            out.print(_table(quantity, value))
+            out.print(_table(inputs, quantity, value))
     if len(result) > _SHOWN:
         out.print(f"... and {len(result) - _SHOWN} more samples: --format csv, json or npy has them all")
     out.print(check_line(certificate), style="green" if certificate.verified else "bold yellow")
@@ -228,12 +231,20 @@ def _print_columns(out: Console, quantity: Quantity, rates: Sequence[str], value
     print_named(out, ["column", "changed by", *quantity.labels], rows, left=(0, 1))
 
 
-def _table(quantity: Quantity, value: FloatArray) -> Table:
+def _table(inputs: Inputs, quantity: Quantity, value: FloatArray) -> Table:
     if not quantity.units:
         return make_table(
-            ["axis of the world", "x of frame", "y of frame", "z of frame", "position [m]"],
+            [
+                f"axis of {inputs.said.get('relative_to', 'the world')}",
+                "x of frame",
+                "y of frame",
+                "z of frame",
+                "position [m]",
+            ],
             ((axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)),
         )
+    if len(value) != 3 * len(quantity.units):  # a quaternion
+        return make_table(quantity.labels, [value.tolist()], left=())
     names = [f"{name} [{unit}]" for name, unit in quantity.units.items()]
     rows = zip(names, value.reshape(-1, 3).tolist(), strict=True)
     return make_table(["", "x", "y", "z"], ((name, *row) for name, row in rows))

@@ -20,6 +20,7 @@ from urdfkin.cli.arguments import (
     v_option,
     verify_option,
 )
+from urdfkin.cli.base import base_options, with_base
 from urdfkin.cli.breakdown import emit_breakdown
 from urdfkin.cli.endings import form_of
 from urdfkin.cli.output import ENDINGS, compiling, emit, exit_code, format_option, output_option
@@ -56,6 +57,9 @@ def command_of(quantity: Quantity) -> click.Command:
         q: str,
         v: str = "neutral",
         a: str = "neutral",
+        base_placement: str | None = None,
+        base_velocity: str | None = None,
+        base_acceleration: str | None = None,
         reference: str = "local_world_aligned",
         explain: bool = False,
     ) -> None:
@@ -63,20 +67,22 @@ def command_of(quantity: Quantity) -> click.Command:
         check_writable(output)
         loaded = load_robot(robot, mimic, root_joint, verify=verify, oracle=oracle)
         x = read_inputs(loaded, frame, seed, q, v, a)
+        x = with_base(x, base_placement, base_velocity, base_acceleration)
         if explain:
             with compiling():
-                parts = loaded.acceleration_breakdown(x.q, x.v, x.a, x.frame, reference)
+                parts = loaded.acceleration_breakdown(x.q, x.v, x.a, x.frame, reference, base=x.base)
             emit_breakdown(x, reference, parts, format_, output)
         else:
             inputs = [getattr(x, letter) for letter in quantity.inputs]
             with compiling():
-                result = loaded.compute(quantity.name, inputs, x.frame, reference)
+                result = loaded.compute(quantity.name, inputs, x.frame, reference, base=x.base)
             emit(x, quantity, reference if quantity.referred else None, result, format_, output)
         context.exit(exit_code(loaded.certificate()))
 
     rates = [option for letter, option in (("v", v_option), ("a", a_option)) if letter in quantity.inputs]
     options = together(
         *(robot_argument, frame_option, *([reference_option] if quantity.referred else []), q_option, *rates),
+        base_options(quantity.inputs),
         *(
             seed_option,
             verify_option,

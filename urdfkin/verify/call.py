@@ -54,6 +54,7 @@ class Call:
         reference: A member or its name.
         base: How the root link moves; None if it stands still.
         inputs: q, v and a, as far as the quantity needs them.
+        also: Frames that the walk meets besides, after the others; they are no results.
         options: What else the call was given, by the method's names for it.
 
     Raises:
@@ -69,6 +70,7 @@ class Call:
         reference: Reference | str,
         base: BaseMotion | None,
         inputs: Sequence[ArrayLike],
+        also: Sequence[str] = (),
         **options: object,
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
@@ -78,7 +80,7 @@ class Call:
         self.question = Question(frame, reference, base, inputs)
         self.reference = Reference.of(reference)
         self.links = tuple(tree.frame_link(name) for name in self.frames)
-        self.plan = plan(self.links)
+        self.plan = plan((*self.links, *(tree.frame_link(name) for name in also)))
         given = [shaped(tree, x, name) for x, name in zip(inputs, "qva", strict=False)]
         self.shape = self._batch_shape(given)
         self.n = math.prod(self.shape)

@@ -189,8 +189,15 @@ PLACEMENT = Quantity(
     labels=(),
     command="placement",
     summary="pose of a frame",
-    page="Prints T_world_frame: the frame's axes and its origin in the world, in metres.",
     example="urdfkin placement panda --q 0,-0.5,0,-2,0,1.5,0.8,0.02",
+)
+RELATIVE_PLACEMENT = replace(
+    PLACEMENT,
+    name="relative placement",
+    title="placement in another frame",
+    against=partial(later("urdfkin.verify.relative:held_against"), PLACEMENT.bound),
+    walked=False,
+    command="",
 )
 VELOCITY = Quantity(
     name="velocity",
@@ -347,6 +354,7 @@ QUANTITIES = {
     row.name: row
     for row in (
         PLACEMENT,
+        RELATIVE_PLACEMENT,
         VELOCITY,
         JACOBIAN,
         JACOBIAN_RATE,

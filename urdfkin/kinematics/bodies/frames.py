@@ -87,3 +87,13 @@ def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
         The last frame in frame 0.
     """
     return reduce(compose, frames, MovingFrame(np.eye(3), np.zeros(3)))
+
+
+def seen_from(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = None) -> FloatArray:
+    """(..., 4, 4) T_1_2 = T_0_1^-1 T_0_2: frame 2 in frame 1, both given in frame 0 (7.77)."""
+    T = np.empty(np.broadcast_shapes(T_0_1.shape, T_0_2.shape)) if out is None else out
+    back = T_0_1[..., :3, :3].swapaxes(-1, -2)
+    T[..., :3, :3] = back @ T_0_2[..., :3, :3]
+    T[..., :3, 3] = turned(back, T_0_2[..., :3, 3] - T_0_1[..., :3, 3])
+    T[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
+    return T

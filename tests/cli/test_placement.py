@@ -1,0 +1,190 @@
+"""`urdfkin placement` in other forms and frames, `analytical-jacobian`, and a base that moves."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import urdfkin as library
+from tests.cli.running import urdfkin
+from urdfkin.cli import placement
+from urdfkin.cli.analytical_jacobian import REPRESENTATIONS
+from urdfkin.kinematics.rotation import SEQUENCES
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.tree import FloatArray
+
+#: 30 degrees about the world's z, 1 m up.
+MOVED = "0,0,1,0,0,0.5235987755982988"
+
+
+@pytest.mark.parametrize("written", ["rpy", "quaternion"])
+@pytest.mark.parametrize("relative_to", [None, "forearm_link"])
+def test_few_numbers_are_the_same_pose(written: str, relative_to: str | None) -> None:
+    words = [] if relative_to is None else ["--relative-to", relative_to]
+    ask = ["placement", "ur5", "--q", "random:3", *words, "--format", "json"]
+    T = np.array(urdfkin(*ask).data["result"])
+    done = urdfkin(*ask, "--as", written)
+    found = np.array(done.data["result"])
+    assert done.data["verified"] is True
+    assert done.data.get("relative_to") == relative_to
+    np.testing.assert_array_equal(found[:, :3], T[:, :3, 3])
+    turn = Rotation.from_euler("xyz", found[:, 3:]) if written == "rpy" else Rotation.from_quat(found[:, 3:])
+    np.testing.assert_allclose(turn.as_matrix(), T[:, :3, :3], atol=1e-15)
+    rows = list(csv.reader(io.StringIO(urdfkin(*ask[:-1], "csv", "--as", written).text)))
+    assert rows[0] == ["sample", *done.data["rows"]]
+    np.testing.assert_array_equal(np.array(rows[1:], dtype=float)[:, 1:], found)
+
+
+def test_the_table_says_from_where_and_in_which_units() -> None:
+    text = urdfkin("placement", "ur5", "--relative-to", "forearm_link").text
+    assert "ur5: placement of tool0, relative to forearm_link" in text
+    assert "axis of forearm_link" in text
+    text = urdfkin("placement", "ur5", "--as", "rpy").text
+    assert "roll, pitch, yaw [rad]" in text
+    assert "qw" in urdfkin("placement", "ur5", "--as", "quaternion").text
+
+
+def test_numbers_of_another_rotation_are_a_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
+    from urdfkin.kinematics import rotation  # noqa: PLC0415
+
+    right = rotation.rpy_of
+    monkeypatch.setattr(rotation, "rpy_of", lambda R: right(R)[..., ::-1])
+    done = urdfkin("placement", "ur5", "--q", "random", "--as", "rpy")
+    assert (done.code, done.out) == (1, b"")
+    assert "the orientation of tool0 (rpy) disagrees with Pinocchio's" in done.err
+    (again,) = [
+        line.partition("reproduce it with: ")[2] for line in done.err.splitlines() if "reproduce" in line
+    ]
+    monkeypatch.undo()
+    assert urdfkin(*again.split()[1:]).code == 0
+
+
+def test_where_roll_and_yaw_turn_about_one_axis_the_numbers_are_right_all_the_same() -> None:
+    """A vertical pitch is where many arms rest: the two angles are not determined, the rotation is."""
+    half = "1.5707963267948966"
+    done = urdfkin("placement", "ur5", "--base-placement", f"0,0,0,0.3,{half},0.2", "--frame", "base_link",
+                   "--as", "rpy", "--format", "json")  # fmt: skip
+    assert done.code == 0, done.err
+    turn = Rotation.from_euler("xyz", done.data["result"][0][3:]).as_matrix()
+    np.testing.assert_allclose(
+        turn, Rotation.from_euler("xyz", [0.3, float(half), 0.2]).as_matrix(), atol=1e-15
+    )
+
+
+def test_a_base_does_nothing_to_a_relative_placement_and_that_is_said() -> None:
+    done = urdfkin("placement", "ur5", "--relative-to", "base_link", "--base-placement", MOVED)
+    assert done.code == 2
+    assert "--base-placement does nothing with --relative-to" in done.err
+
+
+# -- the analytical Jacobian ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("representation", ["ZYZ", "xyz", "quaternion"])
+def test_the_analytical_jacobian_is_the_librarys_with_its_rows_named(representation: str) -> None:
+    words = ["analytical-jacobian", "ur5", "--q", "random:2", "--representation", representation]
+    done = urdfkin(*words, "--format", "json")
+    assert (done.code, done.data["representation"]) == (0, representation)
+    J = library.load("ur5").analytical_jacobian(done.data["q"], "tool0", representation)
+    assert done.data["result"] == J.tolist()
+    assert len(done.data["rows"]) == J.shape[-2]
+    assert done.data["rows"][3] == {"ZYZ": "Z1", "xyz": "roll", "quaternion": "qx"}[representation]
+    assert done.data["rows"][3] in urdfkin(*words).text
+
+
+def test_it_knows_every_sequence() -> None:
+    assert set(REPRESENTATIONS) == {"quaternion", *SEQUENCES}
+
+
+def test_a_representational_singularity_is_told_with_the_cure() -> None:
+    done = urdfkin("analytical-jacobian", "planar_two_link", "--q", "0.3,0.4")
+    assert done.code == 2
+    assert "representational singularity" in done.err
+    assert "another sequence or by a quaternion" in done.err
+
+
+# -- a base that moves ---------------------------------------------------------------------------------
+
+
+def base() -> BaseMotion:
+    T = np.eye(4)
+    T[:3, :3], T[2, 3] = Rotation.from_euler("z", 30, degrees=True).as_matrix(), 1.0
+    return BaseMotion(T, np.array([0.1, 0.2, 0.3, 0.0, 0.0, 1.0]), np.array([0.0, 0.0, 9.81, 0.5, 0.0, 0.0]))
+
+
+RATES = ["--base-velocity", "0.1,0.2,0.3,0,0,1"]
+SECOND = ["--base-acceleration", "0,0,9.81,0.5,0,0"]
+#: Of each command, what it takes of the base's motion.
+TAKES: dict[str, list[str]] = {
+    "placement": [], "jacobian": [], "hessian": [], "analytical-jacobian": ["--representation", "xyz"],
+    "velocity": RATES, "jacobian-rate": RATES, "acceleration": [*RATES, *SECOND],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("command", TAKES)
+def test_every_quantity_takes_what_it_needs_of_the_bases_motion(command: str) -> None:
+    given = [f"--{x}" for x in "va" if command in ("velocity", "jacobian-rate", "acceleration")][
+        : len(TAKES[command]) // 2
+    ]
+    words = [command, "ur5", "--q", "random", *(word for x in given for word in (x, "random"))]
+    done = urdfkin(*words, "--base-placement", MOVED, *TAKES[command], "--format", "json")
+    assert done.code == 0, done.err
+    data, robot = done.data, library.load("ur5")
+    inputs: list[Any] = [np.array(data[x]) for x in "qva" if x in data]
+    method = getattr(robot, command.replace("-", "_"))
+    how: dict[str, Any] = {"representation": "xyz"} if command.startswith("analytical") else {}
+    np.testing.assert_allclose(data["result"], method(*inputs, "tool0", base=base(), **how), atol=1e-13)
+    assert np.shape(data["base_placement"]) == (1, 4, 4)
+    still = urdfkin(*words, *(how and ["--representation", "xyz"]), "--format", "json").data["result"]
+    assert np.abs(np.array(still) - data["result"]).max() > 1e-3
+
+
+def test_an_explained_acceleration_has_the_bases_part() -> None:
+    done = urdfkin("acceleration", "ur5", "--explain", "--base-acceleration", "0,0,9.81,0,0,0")
+    assert done.code == 0, done.err
+    assert [line.split()[-4] for line in done.text.splitlines() if line.startswith("base ")] == ["9.81"]
+
+
+def test_a_batch_of_bases_goes_with_one_configuration_and_with_as_many(tmp_path: Path) -> None:
+    rows = np.random.default_rng(1).standard_normal((4, 7))
+    rows[:, 3:] /= np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
+    path = tmp_path / "base.csv"
+    names = ["x", "y", "z", "qx", "qy", "qz", "qw"]
+    path.write_text("\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]))
+    T = np.tile(np.eye(4), (4, 1, 1))
+    T[:, :3, :3], T[:, :3, 3] = Rotation.from_quat(rows[:, 3:]).as_matrix(), rows[:, :3]
+    robot = library.load("ur5")
+    for q in ("neutral", "random:4"):
+        done = urdfkin("placement", "ur5", "--q", q, "--base-placement", f"@{path}", "--format", "json")
+        assert done.code == 0, done.err
+        expected: FloatArray = robot.placement(done.data["q"], "tool0", base=BaseMotion(T))
+        np.testing.assert_allclose(done.data["result"], expected, atol=1e-14)
+    done = urdfkin("placement", "ur5", "--q", "random:3", "--base-placement", f"@{path}")
+    assert done.code == 2
+    assert "batches of q, v, a and of the base have different lengths: found 3, 3, 3, 4, 1, 1" in done.err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--base-placement", "0,0,0"], "6 numbers are expected (x, y, z, roll, pitch, yaw)"),
+        (["--base-placement", "0,0,0,0,0,0,2"], "must be a unit quaternion: found norm 2"),
+        (["--base-velocity", "0,0,0,0,0,x"], "--base-velocity, wz: not a finite number: found 'x'"),
+        (["--base-acceleration", "0,0,0,0,0,0"], "No such option"),
+        (["--base-velocity", "@nowhere.csv"], "nowhere.csv: cannot be read"),
+    ],
+)
+def test_a_base_that_is_none_is_refused_with_its_option(words: list[str], message: str) -> None:
+    done = urdfkin("velocity", "ur5", *words)
+    assert (done.code, done.out) == (2, b"")
+    assert message in done.err
+
+
+def test_the_forms_are_told_apart_by_their_rows() -> None:
+    assert [len(row.labels) for row in placement._FORMS.values()] == [6, 7]

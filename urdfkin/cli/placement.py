@@ -1,0 +1,140 @@
+"""`urdfkin placement`: the pose of a frame, in the world or in another, as a matrix or in few numbers."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from urdfkin.cli.arguments import (
+    Inputs,
+    frame_name,
+    frame_option,
+    load_robot,
+    oracle_option,
+    q_option,
+    read_inputs,
+    robot_argument,
+    seed_option,
+    verify_option,
+)
+from urdfkin.cli.base import base_options, with_base
+from urdfkin.cli.endings import form_of
+from urdfkin.cli.idle import refuse_idle
+from urdfkin.cli.output import ENDINGS, compiling, emit, exit_code, format_option, output_option
+from urdfkin.cli.reports import check_writable
+from urdfkin.verify.quantities import PLACEMENT
+from urdfkin.verify.replay import replay_line
+from urdfkin.verify.witnesses import WitnessName
+
+if TYPE_CHECKING:
+    from urdfkin.model.tree import FloatArray
+
+_POSITION = ("x", "y", "z")
+#: How a pose is written, besides as a matrix.
+_FORMS = {
+    "rpy": replace(
+        PLACEMENT,
+        shape=(6,),
+        labels=(*_POSITION, "roll", "pitch", "yaw"),
+        units={"x, y, z": "m", "roll, pitch, yaw": "rad"},
+    ),
+    "quaternion": replace(
+        PLACEMENT,
+        shape=(7,),
+        labels=(*_POSITION, "qx", "qy", "qz", "qw"),
+        units={"x, y, z": "m", "qx, qy, qz, qw": "1"},
+    ),
+}
+
+
+@click.command("placement", epilog=f"Example: {PLACEMENT.example}")
+@robot_argument
+@frame_option
+@frame_name("--relative-to", "Seen from this link or joint. Default: the world.")
+@click.option(
+    "--as",
+    "written",
+    type=click.Choice(["matrix", *_FORMS]),
+    default="matrix",
+    show_default=True,
+    help="rpy: x, y, z, roll, pitch, yaw as in a URDF's origin; quaternion: x, y, z, qx, qy, qz, qw.",
+)
+@q_option
+@base_options(PLACEMENT.inputs)
+@seed_option
+@verify_option
+@oracle_option
+@format_option
+@output_option
+@click.pass_context
+def command(
+    context: click.Context,
+    robot: str,
+    mimic: bool | None,
+    root_joint: str | None,
+    frame: str | None,
+    relative_to: str | None,
+    written: str,
+    q: str,
+    base_placement: str | None,
+    seed: int,
+    verify: bool,
+    oracle: WitnessName,
+    format_: str,
+    output: Path | None,
+) -> None:
+    """Pose of a frame (eq. 7.77): its axes and its origin in the world, or in another frame, in metres.
+
+    As a matrix T; with --as rpy or quaternion as few numbers, of which Pinocchio makes the same rotation.
+
+    ROBOT is a path (a table, .toml, .json or .csv, is made a robot), a name that `urdfkin robots` lists, or -
+    for standard input.
+    """
+    format_ = form_of(context, output, ENDINGS, "csv")
+    check_writable(output)
+    if relative_to is not None:
+        refuse_idle(context, ("base_placement",), "with --relative-to, which moves with the base")
+    loaded = load_robot(robot, mimic, root_joint, verify=verify, oracle=oracle)
+    x = with_base(read_inputs(loaded, frame, seed, q), base_placement)
+    with compiling():
+        if relative_to is None:
+            T = loaded.placement(x.q, x.frame, base=x.base)
+        else:
+            T = loaded.relative_placement(x.q, x.frame, relative_to)
+            x = x.saying(relative_to=relative_to)
+    if written == "matrix":
+        emit(x, PLACEMENT, None, T, format_, output)
+    else:
+        x = x.saying(written_as=written)
+        emit(x, _FORMS[written], None, _numbers(x, T, written, verify=verify), format_, output)
+    context.exit(exit_code(loaded.certificate()))
+
+
+def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
+    """(n, 6 or 7) position and orientation, confirmed by Pinocchio where the poses were checked."""
+    import numpy as np  # noqa: PLC0415  keeps --help fast
+
+    from urdfkin.kinematics.rotation import quaternion_of, rpy_of  # noqa: PLC0415
+
+    of: Callable[[Any], FloatArray] = rpy_of if written == "rpy" else quaternion_of
+    orientation = of(R := T[:, :3, :3])
+    if verify and x.robot.certificate().verified:
+        from urdfkin.verify.orientation import demand_the_orientations  # noqa: PLC0415
+
+        demand_the_orientations(orientation, R, x.frame, lambda k: _again(x, k, written))
+    return np.hstack((T[:, :3, 3], orientation))
+
+
+def _again(x: Inputs, k: int, written: str) -> str:
+    """The command that computes sample `k` again."""
+    line = replay_line(x.robot.origin, "placement", x.frame, None, {"q": x.q[k].tolist()})
+    given = click.get_current_context().params
+    for name in ("relative_to", "base_placement"):
+        if given[name] is not None:
+            line += f" --{name.replace('_', '-')} {shlex.quote(given[name])}"
+    return f"{line} --as {written}"
