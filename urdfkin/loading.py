@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping
+from types import ModuleType
+from typing import Any, cast
 
 from urdfkin.dh.doubts import doubts
 from urdfkin.dh.read import is_table_file, read_table_or_screws
@@ -21,14 +23,18 @@ from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home
+from urdfkin.urdf.descriptions import described
 from urdfkin.urdf.mjcf import Listed, is_mjcf, read_mjcf
 from urdfkin.urdf.origin import Origin
+from urdfkin.urdf.pinocchio_model import is_model, tree_of_model
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.remembering import remembered_tree
 from urdfkin.urdf.sources import Source, Text, as_word, read_source
+from urdfkin.urdf.trees import XmlElement, XmlTree, text_of
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.choosing import Verify, checked_choice
 from urdfkin.verify.made_of_mjcf import demand_the_mjcfs
+from urdfkin.verify.made_of_model import demand_the_models
 from urdfkin.verify.made_of_table import demand_the_tables
 from urdfkin.verify.screws import check_screws
 from urdfkin.verify.witnesses import WitnessName, witness_of
@@ -38,7 +44,7 @@ _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
 def load(
-    source: Source | DHTable | Screws,
+    source: Source | DHTable | Screws | ModuleType | XmlElement | XmlTree,
     *,
     verify: Verify = True,
     mimic: bool | None = None,
@@ -53,7 +59,10 @@ def load(
             (`urdfkin robots` lists them), URDF or MJCF text, bytes, an open file, or `-` for standard input;
             or a Denavit-Hartenberg table, as it is or as a file (.toml, .json, .csv, .tsv, .md, .tex, .txt):
             its base frame is the root, its tip the leaf; or a product of exponentials
-            (`urdfkin.dh.screws`), as it is or as a file with M and screws.
+            (`urdfkin.dh.screws`), as it is or as a file with M and screws; or what another library holds: a
+            `pinocchio.Model` (or RobotWrapper), a `yourdfpy.URDF`, an ElementTree of Python's or of lxml's, a
+            module of robot_descriptions or, where that package is installed, its name, such as
+            "panda_description".
         verify: Whether every result is held against Pinocchio's; "sample" has 100 configurations of each
             call checked.
         mimic: Whether mimic joints follow their leaders, as the URDF says; False lets each move freely.
@@ -80,16 +89,20 @@ def load(
     >>> float(robot.placement([0.0, 0.0], "tip")[0, 3])
     0.7
     """
+    how: dict[str, Any] = {"verify": verify, "mimic": mimic, "root_joint": root_joint, "oracle": oracle}
+    if (found := described(source)) is not None:
+        source = found.path
+        xacro_args = {**found.xacro_args, **(xacro_args or {})}
     if isinstance(source, DHTable | Screws) or is_table_file(source):
-        return _load_table(
-            source, xacro_args, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle
-        )
+        return _load_table(source, xacro_args, **how)
     if is_mjcf(source):
-        return _load_mjcf(
-            source, xacro_args, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle
-        )
-    text = read_source(source, xacro_args=xacro_args)
-    return robot_of(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle)
+        return _load_mjcf(source, xacro_args, **how)
+    if is_model(source):
+        return _load_model(source, xacro_args, **how)
+    if (written := text_of(source)) is not None:
+        _refuse_arguments(xacro_args, written[1])
+        return robot_of(Text(written[0].encode(), written[1], written[1]), **how)
+    return robot_of(read_source(cast("Source", source), xacro_args=xacro_args), **how)
 
 
 def _load_table(
@@ -101,8 +114,7 @@ def _load_table(
     root_joint: str | None,
     oracle: WitnessName,
 ) -> Robot:
-    if xacro_args:
-        raise InputError("xacro_args go with the path of a .xacro file", found="a table")
+    _refuse_arguments(xacro_args, "a table")
     table: DHTable | Screws
     if isinstance(source, DHTable | Screws):
         table, name = source, "<table>"
@@ -136,8 +148,7 @@ def _load_mjcf(
     root_joint: str | None,
     oracle: WitnessName,
 ) -> Robot:
-    if xacro_args:
-        raise InputError("xacro_args go with the path of a .xacro file", found="MJCF")
+    _refuse_arguments(xacro_args, "MJCF")
     read = read_mjcf(source)
     path = None if read.is_text else at_home(source)
     name = "<text>" if path is None else as_word(path)
@@ -151,6 +162,31 @@ def _load_mjcf(
         verifier = (robot if plain else robot_of(text, listed=listed, made=True)).verifier
         robot.verifier.reading = demand_the_mjcfs(verifier, read, None if path is None else str(path))
     return robot
+
+
+def _load_model(
+    source: Any,
+    xacro_args: Mapping[str, object] | None,
+    *,
+    verify: Verify,
+    mimic: bool | None,
+    root_joint: str | None,
+    oracle: WitnessName,
+) -> Robot:
+    _refuse_arguments(xacro_args, "a pinocchio.Model")
+    read = tree_of_model(source)
+    text = Text(write_urdf(read.tree).encode(), "<pinocchio.Model>", "<pinocchio.Model>")
+    robot = robot_of(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, made=True)
+    if checked_choice(verify):
+        plain = root_joint is None
+        verifier = (robot if plain else robot_of(text, made=True)).verifier
+        robot.verifier.reading = demand_the_models(verifier, read, source)
+    return robot
+
+
+def _refuse_arguments(xacro_args: Mapping[str, object] | None, found: str) -> None:
+    if xacro_args:
+        raise InputError("xacro_args go with the path of a .xacro file", found=found)
 
 
 def _listed(one: Listed, file: str) -> Finding:

@@ -243,6 +243,30 @@ class Robot:
             self.tree, configuration.checked(self.tree, q, "q"), mimic=switch(mimic, "mimic")
         )
 
+    def pinocchio_model(self, *, mimic: bool = False) -> Any:
+        """A new `pinocchio.Model` of this robot, as Pinocchio reads its URDF; `to_pinocchio(q)` are its q.
+
+        With a root joint it stands on Pinocchio's, a free-flyer or a planar joint.
+
+        Args:
+            mimic: Whether followers follow in the model; Pinocchio 4.1 refuses some robots so.
+
+        Raises:
+            OracleError: Pinocchio does not accept this robot.
+
+        >>> import urdfkin
+        >>> import pinocchio
+        >>> robot = urdfkin.load("ur5")
+        >>> model = robot.pinocchio_model()
+        >>> q = robot.sample(1)[0]
+        >>> data = model.createData()
+        >>> pinocchio.framesForwardKinematics(model, data, robot.to_pinocchio(q))
+        >>> T = data.oMf[model.getFrameId("tool0")].homogeneous
+        >>> bool(abs(T - robot.placement(q, "tool0")).max() < 1e-14)
+        True
+        """
+        return self.verifier.model(mimic=switch(mimic, "mimic"))
+
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """The inverse of `to_pinocchio`; angles of continuous joints come back in (-pi, pi]."""
         return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=switch(mimic, "mimic"))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from urdfkin.model.tree import (
 )
 from urdfkin.urdf.records import RobotRecord
 from urdfkin.urdf.skeleton import skeleton
+from urdfkin.urdf.writer import to_urdf
 
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
@@ -46,16 +48,32 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
         UnknownNameError: a mimic joint names a leader that does not exist.
     """
     robot = _parse(urdf)
-    links = {link.name for link in robot.links}
-    roots = links - {joint.child for joint in robot.joints}
-    if len(roots) != 1:
-        raise InputError(
-            "a robot has one root link", where=robot.name, found=", ".join(sorted(roots)) or "none"
-        )
     rules = _rules(robot.joints) if mimic else {}
     rows = [(_joint(joint, rules.get(joint.name)), joint.parent, joint.child) for joint in robot.joints]
-    tree = build_tree(robot.name, roots.pop(), rows)
+    tree = build_tree(robot.name, _root(robot), rows)
     return tree if root_joint is None else with_root_joint(tree, _root_kind(root_joint))
+
+
+def urdf_of(robot: yourdf.Robot) -> str:
+    """The URDF of a robot that yourdfpy holds; its own writer (0.0.60) leaves mimic rules out.
+
+    Axes are written as they are, so that the checks see their lengths.
+
+    Raises:
+        InputError: the joints make no tree, a mimic joint cannot follow, or limits that a URDF needs are
+            missing.
+        UnknownNameError: a mimic joint names a leader that does not exist.
+    """
+    rules = _rules(robot.joints)
+    rows = [
+        (replace(_joint(joint, rules.get(joint.name)), axis=_written(joint)), joint.parent, joint.child)
+        for joint in robot.joints
+    ]
+    return to_urdf(build_tree(robot.name, _root(robot), rows))
+
+
+def _written(joint: yourdf.Joint) -> FloatArray:
+    return np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.array(joint.axis, dtype=np.float64)
 
 
 def _parse(urdf: RobotRecord) -> yourdf.Robot:
@@ -64,6 +82,15 @@ def _parse(urdf: RobotRecord) -> yourdf.Robot:
 
     text = io.BytesIO(skeleton(urdf))
     return URDF.load(text, build_scene_graph=False, load_meshes=False).robot
+
+
+def _root(robot: yourdf.Robot) -> str:
+    roots = {link.name for link in robot.links} - {joint.child for joint in robot.joints}
+    if len(roots) != 1:
+        raise InputError(
+            "a robot has one root link", where=robot.name, found=", ".join(sorted(roots)) or "none"
+        )
+    return str(roots.pop())
 
 
 def _root_kind(word: str) -> JointKind:

@@ -46,6 +46,51 @@ _CARTESIAN = 7
 _BASE = "base"
 
 
+def build_model(text: str, tree: KinematicTree, root_joint: str | None = None, *, mimic: bool = False) -> Any:
+    """Pinocchio's model of a text; what would end the process, for want of memory or stack, never happens.
+
+    Args:
+        text: The URDF.
+        tree: urdfkin's reading of it, for its size.
+        root_joint: `"floating"` or `"planar"` to stand it on such a joint.
+        mimic: Whether followers follow in the model.
+
+    Raises:
+        OracleError: Pinocchio does not accept the text.
+        InstallationError: Pinocchio is missing, or another project goes by its name.
+    """
+    rates = sum(joint.kind.nv for joint in tree.joints)
+    if rates > MOST_RATES:
+        raise OracleError(
+            f"Pinocchio's memory grows with the cube of the rates; urdfkin asks it up to {MOST_RATES}",
+            where=tree.name,
+            found=f"{rates}, which would take {64e-9 * rates**3:.0f} GB",
+        )
+    depth = depth_of(tree)
+    if depth < _SHALLOW:
+        return _parse(text, tree, root_joint, mimic)
+    return with_stack(depth * _STACK_FOR_A_LINK, lambda: _parse(text, tree, root_joint, mimic))
+
+
+def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) -> Any:
+    pin = pinocchio()
+    roots = {"floating": pin.JointModelFreeFlyer, "planar": pin.JointModelPlanar}
+    try:
+        if root_joint is not None:
+            return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
+        return pin.buildModelFromXML(text, mimic=mimic)
+    except (ValueError, RuntimeError) as error:
+        # What `check` knows to be refused is not asked about: this, it has overlooked.
+        raise OracleError(
+            "Pinocchio does not accept this robot",
+            where=tree.name,
+            found=str(error).strip(),
+            remedy="with mimic=False it may"
+            if mimic
+            else "`urdfkin check` knows no reason: please report this as its error, with the URDF",
+        ) from error
+
+
 class Oracle:
     """Pinocchio's answers for one robot, in urdfkin's layout of q, v and Jacobian columns.
 
@@ -77,8 +122,7 @@ class Oracle:
         self._pin = pin = pinocchio()
         self._tree = tree
         self._moving_base = moving_base
-        self._root_joint = root_joint
-        self._model = self._build(text)
+        self._model = build_model(text, tree, root_joint)
         names = list(self._model.names)[1:]
         self._frames = Frames(self._model, pin, stands_on_world=root_joint is not None)
         joints, self._index = list(range(1, len(names) + 1)), list(range(self._model.nframes))
@@ -88,20 +132,6 @@ class Oracle:
         self._layout = Layout(self._model, joints, names, rules)
         self._demand_the_same_joints(names)
         self._local = threading.local()
-
-    def _build(self, text: str) -> Any:
-        """The model; what would end the process, for want of memory or stack, is refused or avoided."""
-        rates = sum(joint.kind.nv for joint in self._tree.joints)
-        if rates > MOST_RATES:
-            raise OracleError(
-                f"Pinocchio's memory grows with the cube of the rates; urdfkin asks it up to {MOST_RATES}",
-                where=self._tree.name,
-                found=f"{rates}, which would take {64e-9 * rates**3:.0f} GB",
-            )
-        depth = depth_of(self._tree)
-        if depth < _SHALLOW:
-            return self._parse(text)
-        return with_stack(depth * _STACK_FOR_A_LINK, lambda: self._parse(text))
 
     def _rules(self, text: str, joints: Sequence[str]) -> dict[str, Mimic]:
         """The text's own mimic rules; urdfkin's reading of them is under test too."""
@@ -122,24 +152,6 @@ class Oracle:
             if list(other) != own:
                 found = ", ".join(sorted(set(other) ^ set(own))[:5]) or "the same in another order"
                 raise OracleError(f"Pinocchio finds {what} in this robot", where=self._tree.name, found=found)
-
-    def _parse(self, text: str) -> Any:
-        pin, tree = self._pin, self._tree
-        roots = {"floating": pin.JointModelFreeFlyer, "planar": pin.JointModelPlanar}
-        try:
-            if self._root_joint is not None:
-                model = pin.buildModelFromXML(text, roots[self._root_joint](), mimic=False)
-            else:
-                model = pin.buildModelFromXML(text, mimic=False)
-        except (ValueError, RuntimeError) as error:
-            # What `check` knows to be refused is not asked about: this, it has overlooked.
-            raise OracleError(
-                "Pinocchio does not accept this robot",
-                where=tree.name,
-                found=str(error).strip(),
-                remedy="`urdfkin check` knows no reason: please report this as its error, with the URDF",
-            ) from error
-        return model
 
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Have the model carried by a joint that can be given the base's motion; a root joint moves on top.

@@ -28,7 +28,7 @@ from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate, Comparison, Ledger, VerificationError, compare
 from urdfkin.verify.choosing import SAMPLE, Verify, checked_choice, parts
 from urdfkin.verify.magnitudes import magnitudes
-from urdfkin.verify.pinocchio import Oracle, OracleError
+from urdfkin.verify.pinocchio import Oracle, OracleError, build_model
 from urdfkin.verify.pinocchio_module import own_version, pinocchio, version
 from urdfkin.verify.quantities import Quantity
 from urdfkin.verify.replay import replay_line
@@ -97,6 +97,16 @@ class Verifier:
                 self.text, self.tree, mimic=self.mimic, moving_base=key[1], root_joint=self.origin.root_joint
             )
         return self._oracles[key]
+
+    def model(self, *, mimic: bool) -> Any:
+        """A new model of Pinocchio's, for others to work with.
+
+        Raises:
+            OracleError: Pinocchio does not accept the text, or reads another robot in it.
+        """
+        if self.unverifiable is not None:
+            raise OracleError(self.unverifiable, where=self.tree.name)
+        return build_model(self.text, self.tree, self.origin.root_joint, mimic=mimic)
 
     def cannot(self, base: BaseMotion | None = None, by: Witness = PINOCCHIO) -> str | None:
         """Why a witness cannot check this robot; None if it can."""

@@ -1,0 +1,305 @@
+"""Robots that another library holds: the same robot as from the file, or one clear line."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import yourdfpy
+from lxml import etree
+
+import urdfkin
+from urdfkin import InputError, SourceError, UnknownNameError, UrdfError
+from urdfkin.errors import OracleError
+from urdfkin.robot import Robot
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.verify import made_of_model
+
+#: Straight and forked, with axes askew, with followers, with continuous joints, with a frame without a joint.
+ROBOTS = ("panda", "talos", "ur5", "polar", "kinova")
+
+
+def file(name: str) -> str:
+    return str(catalogue()[name].path)
+
+
+def loaded(source: Any, **how: Any) -> Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        robot: Robot = urdfkin.load(source, **how)
+    return robot
+
+
+def yourdfpys(path: str) -> yourdfpy.URDF:
+    return yourdfpy.URDF.load(path, build_scene_graph=False, load_meshes=False)
+
+
+HOLDERS: dict[str, Callable[[str], Any]] = {
+    "yourdfpy": yourdfpys,
+    "yourdfpy's robot": lambda path: yourdfpys(path).robot,
+    "ElementTree": ElementTree.parse,
+    "an element": lambda path: ElementTree.parse(path).getroot(),
+    "lxml": etree.parse,
+    "lxml's element": lambda path: etree.parse(path).getroot(),
+}
+
+
+def demand_the_same(one: Robot, other: Robot) -> None:
+    assert other.coordinate_names == one.coordinate_names
+    q = one.sample(3, seed=1)
+    frames = one.link_frames
+    theirs = other.placement(q, frames)
+    np.testing.assert_allclose(theirs, one.placement(q, frames), atol=3e-14)
+    for ours, their in zip(one.tree.joints, other.tree.joints, strict=True):
+        assert (ours.name, ours.kind, ours.mimic, ours.limit) == (
+            their.name,
+            their.kind,
+            their.mimic,
+            their.limit,
+        )
+    assert other.certificate().verified
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("holder", HOLDERS)
+def test_a_robot_that_another_library_holds_is_the_files(holder: str, name: str) -> None:
+    demand_the_same(loaded(file(name)), loaded(HOLDERS[holder](file(name))))
+
+
+def test_comments_and_instructions_of_a_tree_are_no_matter_and_findings_are_told() -> None:
+    text = '<?x y?><robot name="r"><!-- arm --><link name="a"/><link name="b"/></robot>'
+    for tree in (etree.fromstring(text), ElementTree.fromstring(text)):
+        with pytest.raises(UrdfError, match=r"<ElementTree>.*URDF411"):
+            urdfkin.load(tree)
+
+
+@pytest.mark.parametrize("value", [1.5, "a\0b"])
+def test_a_tree_that_is_no_xml_is_one_clear_error(value: Any) -> None:
+    with pytest.raises(urdfkin.UrdfkinError):
+        urdfkin.load(ElementTree.Element("robot", {"name": value}))
+
+
+def test_an_axis_of_another_length_is_told_when_it_comes_from_yourdfpy() -> None:
+    """Yourdfpy moves such a joint twice as far; who comes from there must hear of it."""
+    robot = yourdfpys(file("polar"))
+    slide = next(joint for joint in robot.robot.joints if joint.type == "prismatic")
+    slide.axis = 2.0 * np.asarray(slide.axis)
+    with pytest.warns(urdfkin.UrdfWarning, match="URDF50"):
+        urdfkin.load(robot)
+
+
+def test_a_yourdfpy_robot_in_two_pieces_is_refused() -> None:
+    robot = yourdfpys(file("polar"))
+    robot.robot.joints.pop()
+    with pytest.raises(InputError, match="a robot has one root link"):
+        urdfkin.load(robot)
+
+
+# -- Pinocchio's models --------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*ROBOTS, "tiago_dual", "anymal"])
+def test_a_model_is_the_robot_it_was_built_from(name: str) -> None:
+    robot = loaded(file(name), mimic=False)
+    model = pin.buildModelFromUrdf(file(name))
+    made = loaded(model)
+    assert made.frame_names == robot.frame_names
+    assert made.tree.links == robot.tree.links
+    assert [joint.parent for joint in made.tree.joints] == [joint.parent for joint in robot.tree.joints]
+    for ours, theirs in zip(robot.tree.joints, made.tree.joints, strict=True):
+        np.testing.assert_allclose(theirs.T_parent_joint, ours.T_parent_joint, atol=1e-15)
+        assert (theirs.kind, theirs.limit) == (ours.kind, ours.limit)
+    q, v, a = robot.sample(3, seed=2), *np.random.default_rng(1).standard_normal((2, 3, robot.nv))
+    found = made.acceleration(q, v, a, made.tip_frame)
+    np.testing.assert_allclose(found, robot.acceleration(q, v, a, made.tip_frame), rtol=1e-10, atol=1e-10)
+    assert "the model itself places" in str(made.certificate())
+
+
+def test_a_model_made_by_hand_with_frames_and_joints_in_any_order_is_held_against_itself() -> None:
+    model = pin.Model()
+    model.name = "by hand"
+    generator = np.random.default_rng(3)
+    pin.seed(3)
+    last = model.addJoint(0, pin.JointModelPlanar(), pin.SE3.Random(), "z")
+    model.addJoint(last, pin.JointModelRevoluteUnaligned(*_unit(generator)), pin.SE3.Random(), "b")
+    last = model.addJoint(last, pin.JointModelRUBY(), pin.SE3.Random(), "a")
+    model.addJoint(last, pin.JointModelPrismaticUnaligned(*_unit(generator)), pin.SE3.Random(), "slide")
+    model.addFrame(pin.Frame("tool", last, 0, pin.SE3.Random(), pin.FrameType.OP_FRAME))
+    model.addFrame(pin.Frame("tool", last, model.nframes - 1, pin.SE3.Random(), pin.FrameType.SENSOR))
+    made = loaded(model)
+    assert made.joint_names == ("z", "a", "slide", "b")  # Pinocchio's order for a URDF
+    q = made.sample(1, seed=4)[0]
+    full = np.zeros(model.nq)
+    value = dict(zip(made.coordinate_names, q, strict=True))
+    for j in range(1, model.njoints):
+        joint, name = model.joints[j], model.names[j]
+        own = [value[f"z.{x}"] for x in ("x", "y")] if name == "z" else [] if joint.nq == 2 else [value[name]]
+        angle = value["z.angle"] if name == "z" else value.get(name, 0.0)
+        own += [math.cos(angle), math.sin(angle)] if joint.nq > 1 else []
+        full[joint.idx_q : joint.idx_q + joint.nq] = own
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, full)
+    for frame, link in ((model.nframes - 2, "tool"), (model.nframes - 1, "tool_")):
+        np.testing.assert_allclose(made.placement(q, link), data.oMf[frame].homogeneous, atol=1e-13)
+
+
+def _unit(generator: np.random.Generator) -> list[float]:
+    axis = generator.standard_normal(3)
+    found: list[float] = (axis / np.linalg.norm(axis)).tolist()
+    return found
+
+
+def test_a_floating_base_of_the_model_stays_one() -> None:
+    model = pin.buildModelFromUrdf(file("a1"), pin.JointModelFreeFlyer())
+    made = loaded(pin.RobotWrapper(model))
+    assert (made.nq, made.nv) == (model.nq, model.nv)
+    assert made.coordinate_names == loaded(file("a1"), root_joint="floating").coordinate_names
+
+
+@pytest.mark.parametrize(
+    ("joint", "message"),
+    [
+        (pin.JointModelSpherical, "no URDF can hold this joint"),
+        (pin.JointModelTranslation, "no URDF can hold"),
+    ],
+)
+def test_a_joint_that_no_urdf_has_is_told_by_its_name(joint: Any, message: str) -> None:
+    model = pin.Model()
+    model.addJoint(0, joint(), pin.SE3.Identity(), "wrist")
+    with pytest.raises(InputError, match=f"joint wrist: {message}"):
+        urdfkin.load(model)
+
+
+def test_a_model_with_followers_is_refused_with_the_cure() -> None:
+    with pytest.raises(InputError, match=r"mimic joint.*build the model with mimic=False"):
+        urdfkin.load(pin.buildModelFromUrdf(file("panda"), mimic=True))
+
+
+def test_a_reading_that_is_not_the_models_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = made_of_model._placements
+
+    def moved(*arguments: Any) -> Any:
+        T = right(*arguments)
+        T[..., 0, 3] += 1e-12
+        return T
+
+    monkeypatch.setattr(made_of_model, "_placements", moved)
+    with pytest.raises(OracleError, match=r"made of a pinocchio.Model is not the model's"):
+        urdfkin.load(pin.buildModelFromUrdf(file("ur5")))
+
+
+@pytest.mark.parametrize(
+    ("name", "root_joint"), [("ur5", None), ("kinova", None), ("a1", "floating"), ("a1", "planar")]
+)
+def test_the_model_that_comes_back_takes_the_robots_configurations(name: str, root_joint: str | None) -> None:
+    robot = loaded(file(name), root_joint=root_joint)
+    model, again = robot.pinocchio_model(), robot.pinocchio_model()
+    assert model is not again  # what is done to one is nobody else's matter
+    q = robot.sample(1, seed=5)[0]
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, robot.to_pinocchio(q))
+    frame = model.getFrameId(robot.tip_frame)
+    np.testing.assert_allclose(data.oMf[frame].homogeneous, robot.placement(q, robot.tip_frame), atol=1e-13)
+
+
+def test_followers_follow_in_the_model_where_that_is_wanted() -> None:
+    robot = urdfkin.load("panda")
+    model = robot.pinocchio_model(mimic=True)
+    assert model.nq == robot.nq == robot.pinocchio_model().nq - 1
+    q = robot.sample(1)[0]
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, robot.to_pinocchio(q, mimic=True))
+    T = data.oMf[model.getFrameId("panda_rightfinger")].homogeneous
+    np.testing.assert_allclose(T, robot.placement(q, "panda_rightfinger"), atol=1e-14)
+
+
+def test_a_robot_that_pinocchio_refuses_has_no_model() -> None:
+    with pytest.warns(urdfkin.UrdfWarning):
+        robot = urdfkin.load('<robot name="r"><?x y?><link name="a"/></robot>')
+    with pytest.raises(OracleError, match="Pinocchio refuses the file"):
+        robot.pinocchio_model()
+
+
+# -- robot_descriptions --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package as robot_descriptions is, with one robot that is there and one that cannot be fetched."""
+    folder = tmp_path / "robot_descriptions"
+    folder.mkdir()
+    names = ["toy_description", "far_description", "empty_description"]
+    (folder / "__init__.py").write_text(f"DESCRIPTIONS = dict.fromkeys({names!r})")
+    (folder / "toy_description.py").write_text(f"URDF_PATH = {file('polar')!r}")
+    (folder / "far_description.py").write_text("raise RuntimeError('clone failed\\nfatal: no route to host')")
+    (folder / "empty_description.py").write_text("")
+    (folder / "other_description.py").write_text("raise AssertionError('imported')")
+    monkeypatch.syspath_prepend(tmp_path)
+    for name in [name for name in sys.modules if name.startswith("robot_descriptions")]:
+        monkeypatch.delitem(sys.modules, name)
+    return folder
+
+
+def test_a_description_is_loaded_by_its_name_and_by_its_module(package: Path) -> None:
+    import importlib  # noqa: PLC0415
+
+    assert urdfkin.load("toy_description").name == "polar"
+    assert urdfkin.load(importlib.import_module("robot_descriptions.toy_description")).name == "polar"
+    for name in ("toy_description", "far_description", "empty_description"):
+        sys.modules.pop(f"robot_descriptions.{name}", None)
+    sys.modules.pop("robot_descriptions")
+
+
+def test_a_description_that_is_not_there_is_told_and_nothing_else_is_imported(package: Path) -> None:
+    with pytest.raises(
+        UnknownNameError, match="unknown robot description 'toys_description'; did you mean toy_desc"
+    ):
+        urdfkin.load("toys_description")
+    with pytest.raises(UnknownNameError):
+        urdfkin.load("other_description")  # a module, but not listed
+    with pytest.raises(SourceError, match=r"cannot be fetched: found fatal: no route to host; .*the network"):
+        urdfkin.load("far_description")
+    with pytest.raises(InputError, match="URDF_PATH, XACRO_PATH or MJCF_PATH"):
+        urdfkin.load("empty_description")
+    sys.modules.pop("robot_descriptions")
+
+
+def test_a_module_with_a_xacro_file_brings_its_arguments(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf.xacro"
+    path.write_text(
+        '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+        '<xacro:arg name="tool" default="none"/>'
+        '<link name="base_$(arg tool)"/></robot>'
+    )
+    module = ModuleType("arm_description")
+    module.__dict__.update(XACRO_PATH=str(path), XACRO_ARGS={"tool": "gripper"})
+    assert urdfkin.load(module).link_names == ("base_gripper",)
+    assert urdfkin.load(module, xacro_args={"tool": "saw"}).link_names == ("base_saw",)
+
+
+def test_without_the_package_its_name_says_what_to_install() -> None:
+    code = (
+        "import sys\nsys.modules['robot_descriptions'] = None\nimport importlib.util as u\n"
+        "find = u.find_spec\nu.find_spec = lambda name: None if name.startswith('robot_d') else find(name)\n"
+        "import urdfkin\ntry: urdfkin.load('panda_description')\nexcept urdfkin.InputError as e: print(e)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("panda_description: robot_descriptions is not installed; pip install")
+
+
+def test_a_file_of_such_a_name_is_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("my_description").write_text(urdfkin.load("polar", verify=False).urdf)
+    assert urdfkin.load("my_description").name == "polar"

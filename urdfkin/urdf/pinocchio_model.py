@@ -1,0 +1,171 @@
+"""A `pinocchio.Model` to a kinematic tree, from its joints and frames; Pinocchio itself is not needed for it.
+
+A model keeps no URDF. Its joints are taken as they stand; a frame of a body that lies on a joint is that
+joint's child link, every other frame is fixed to where it lies, so that each can be asked for by its name.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from urdfkin.errors import InputError
+from urdfkin.model.chain import inverse
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.urdf.mjcf import UNBOUNDED
+
+_ROOT = "universe"
+#: Joints about, or along, an axis of their frame, and about another, whose model says which.
+_ALIGNED = re.compile(r"JointModel(R|RUB|P)([XYZ])")
+_KINDS = {
+    "R": JointKind.REVOLUTE,
+    "RUB": JointKind.CONTINUOUS,
+    "P": JointKind.PRISMATIC,
+    "JointModelRevoluteUnaligned": JointKind.REVOLUTE,
+    "JointModelRevoluteUnboundedUnaligned": JointKind.CONTINUOUS,
+    "JointModelPrismaticUnaligned": JointKind.PRISMATIC,
+    "JointModelFreeFlyer": JointKind.FLOATING,
+    "JointModelPlanar": JointKind.PLANAR,
+}
+#: What Pinocchio writes where there is no limit is the largest double.
+_ENDLESS = 1e300
+
+
+@dataclass(frozen=True, slots=True)
+class Modelled:
+    """A tree, and which of the model's frames each of its links is."""
+
+    tree: KinematicTree
+    frames: dict[str, int]
+
+
+def is_model(source: object) -> TypeGuard[Any]:
+    """Whether something is Pinocchio's, told by its class, so that nothing is imported for others."""
+    kinds = [(kind.__module__.partition(".")[0], kind.__name__) for kind in type(source).__mro__]
+    return ("pinocchio", "Model") in kinds or ("pinocchio", "RobotWrapper") in kinds
+
+
+def tree_of_model(source: Any) -> Modelled:
+    """The tree of a model, or of a `RobotWrapper`'s.
+
+    Raises:
+        InputError: a joint that no URDF can hold.
+    """
+    model = getattr(source, "model", source)
+    return _Reading(model).modelled()
+
+
+class _Reading:
+    def __init__(self, model: Any) -> None:
+        self.model = model
+        self.frames = list(model.frames)
+        self.kinds = [str(frame.type) for frame in self.frames]
+        self.names: dict[str, set[str]] = {"link": set(), "joint": set(map(str, model.names))}
+        self.places = [np.array(frame.placement.homogeneous) for frame in self.frames]
+        self.bodies = dict(self._bodies_on_joints())
+        joints = range(int(model.njoints))
+        names = {j: self.frames[self.bodies[j]].name if j in self.bodies else self._made(j) for j in joints}
+        self.carriers = {j: self._new("link", name) for j, name in names.items()}
+        self.links: dict[int, str] = {}
+        self.rows: list[tuple[Joint, str, str]] = []
+
+    def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
+        """The first body that lies on each joint, and its frame."""
+        for i in reversed(range(len(self.frames))):
+            if self.kinds[i] == "BODY" and (self.places[i] == np.eye(4)).all():
+                yield int(self.frames[i].parentJoint), i
+
+    def _made(self, joint: int) -> str:
+        return f"{self.model.names[joint]}_link" if joint else _ROOT
+
+    def _new(self, kind: str, name: str) -> str:
+        """The name, or one like it where it is taken."""
+        while name in self.names[kind]:
+            name += "_"
+        self.names[kind].add(name)
+        return name
+
+    def modelled(self) -> Modelled:
+        """Frames first, in their order, which has parents before children; then the joints that move."""
+        for i in range(len(self.frames)):
+            self._frame(i)
+        own = {
+            int(f.parentJoint): f for f, kind in zip(self.frames, self.kinds, strict=True) if kind == "JOINT"
+        }
+        for j in range(1, int(self.model.njoints)):
+            parent = int(self.model.parents[j])
+            link, T = self._hung(own.get(j), parent, np.array(self.model.jointPlacements[j].homogeneous))
+            self.rows.append((self._joint(j, T), link, self.carriers[j]))
+        tree = build_tree(str(self.model.name) or "robot", self.carriers[0], self.rows)
+        at = {link: i for i, link in reversed(self.links.items()) if self.kinds[i] != "FIXED_JOINT"}
+        return Modelled(tree, at)
+
+    def _hung(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
+        """From which link something hangs that lies at T on a joint, and where it lies there."""
+        i = -1 if frame is None else int(frame.parentFrame)
+        if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
+            return self.carriers[joint], T
+        return self.links[i], inverse(self.places[i]) @ T
+
+    def _frame(self, i: int) -> None:
+        frame, kind = self.frames[i], self.kinds[i]
+        joint, above = int(frame.parentJoint), int(frame.parentFrame)
+        if i == 0 or kind == "JOINT" or self.bodies.get(joint) == i:
+            self.links[i] = self.carriers[joint]
+            return
+        fixed = self.kinds[above] == "FIXED_JOINT" and above > 0
+        if kind == "BODY" and fixed and (self.places[i] == self.places[above]).all() and above in self.links:
+            self.links[i] = self.links[above]
+            return
+        link, T = self._hung(frame, joint, self.places[i])
+        if kind == "FIXED_JOINT":
+            body = next((f for f in self.frames[i + 1 :] if int(f.parentFrame) == i), None)
+            child, name = self._new("link", body.name if body is not None else frame.name), frame.name
+        else:
+            child, name = self._new("link", frame.name), f"{frame.name}_fixed"
+        held = Joint(self._new("joint", name), JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0]))
+        self.rows.append((held, link, child))
+        self.links[i] = child
+
+    def _joint(self, j: int, T: FloatArray) -> Joint:
+        model = self.model
+        joint, name = model.joints[j], str(model.names[j])
+        shown = str(joint.shortname())
+        aligned = _ALIGNED.fullmatch(shown)
+        kind = _KINDS.get(aligned[1] if aligned else shown)
+        if kind is None:
+            mimics = shown.endswith("Mimic")
+            what = (
+                "Python cannot see what moves in a mimic joint" if mimics else "no URDF can hold this joint"
+            )
+            raise InputError(
+                f"{what} of a pinocchio.Model",
+                where=f"joint {name}",
+                found=shown,
+                remedy="build the model with mimic=False" if mimics else "give the robot as a URDF",
+            )
+        axis = np.eye(3)["XYZ".index(aligned[2])] if aligned else np.array([1.0, 0.0, 0.0])
+        if shown.endswith("Unaligned"):
+            axis = np.array(joint.extract().axis)
+        if not kind.has_axis:
+            return Joint(name, kind, 0, T, axis)
+        q, v = int(joint.idx_q), int(joint.idx_v)
+        speed, effort = (_finite(x[v]) for x in (model.upperVelocityLimit, model.upperEffortLimit))
+        lower, upper = -math.inf, math.inf
+        if kind is not JointKind.CONTINUOUS:
+            lower, upper = _finite(model.lowerPositionLimit[q]), _finite(model.upperPositionLimit[q])
+        if math.isinf(lower) or math.isinf(upper):
+            if kind.turns:
+                kind = JointKind.CONTINUOUS
+            else:
+                lower, upper = max(lower, -UNBOUNDED), min(upper, UNBOUNDED)
+        return Joint(name, kind, 0, T, axis, Limit(lower, upper, speed, effort))
+
+
+def _finite(value: float) -> float:
+    return math.copysign(math.inf, value) if abs(value) > _ENDLESS else float(value)

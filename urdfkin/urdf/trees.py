@@ -1,0 +1,69 @@
+"""URDF text from what other libraries hold: an ElementTree, of Python's or of lxml's, or yourdfpy's robot.
+
+Told apart by what they have and not by their classes, so that no library is imported for another one's sake.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+from xml.etree import ElementTree
+
+from urdfkin.errors import InputError
+from urdfkin.errors.demands import shown
+
+
+class XmlElement(Protocol):
+    """An element of Python's ElementTree or of lxml's."""
+
+    @property
+    def tag(self) -> Any:
+        """Its name."""
+
+    @property
+    def attrib(self) -> Any:
+        """Names and values."""
+
+
+class XmlTree(Protocol):
+    """A tree of such elements."""
+
+    def getroot(self) -> Any:
+        """Its first element."""
+
+
+def text_of(source: Any) -> tuple[str, str] | None:
+    """The text, and what to call it in messages; None for any other source.
+
+    Raises:
+        InputError: an element holds what XML cannot, or a yourdfpy robot is no tree.
+    """
+    if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
+        from urdfkin.urdf.reader import urdf_of  # noqa: PLC0415  the door of yourdfpy
+
+        return urdf_of(getattr(source, "robot", source)), "<yourdfpy>"
+    root = source.getroot() if hasattr(source, "getroot") else source
+    if hasattr(root, "tag") and hasattr(root, "attrib") and hasattr(root, "iter"):
+        return _text(root), "<ElementTree>"
+    return None
+
+
+def _text(root: Any) -> str:
+    """Elements, attributes and text; comments, whose tag is no name, are left out."""
+    copy = ElementTree.Element(_tag(root), dict(root.attrib))
+    open_ = [(root, copy)]
+    while open_:
+        element, made = open_.pop()
+        made.text = element.text
+        for child in element:
+            if isinstance(child.tag, str):
+                open_.append((child, ElementTree.SubElement(made, child.tag, dict(child.attrib))))
+    try:
+        return ElementTree.tostring(copy, encoding="unicode")
+    except (TypeError, RecursionError) as error:
+        raise InputError("an ElementTree that cannot be written as XML", found=str(error)) from None
+
+
+def _tag(root: Any) -> str:
+    if not isinstance(root.tag, str):
+        raise InputError("an ElementTree whose root is no element", found=shown(root.tag))
+    return root.tag
