@@ -12,6 +12,11 @@ from urdfkin.model.tree import Joint, JointKind, KinematicTree, Mimic, build_tre
 from urdfkin.urdf.writer import to_urdf
 
 
+@pytest.fixture(autouse=True)
+def _on_a_wide_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+
+
 def joint(name: str, kind: JointKind = JointKind.CONTINUOUS, **more: object) -> Joint:
     given: dict[str, object] = {"axis": np.array([0.0, 0.0, 1.0])} | more
     return Joint(name, kind, 0, np.eye(4), **given)  # type: ignore[arg-type]

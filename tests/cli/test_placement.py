@@ -123,13 +123,13 @@ SECOND = ["--base-acceleration", "0,0,9.81,0.5,0,0"]
 #: Of each command, what it takes of the base's motion.
 TAKES: dict[str, list[str]] = {
     "placement": [], "jacobian": [], "hessian": [], "analytical-jacobian": ["--representation", "xyz"],
-    "velocity": RATES, "jacobian-rate": RATES, "acceleration": [*RATES, *SECOND],
+    "velocity": RATES, "jacobian-rate": RATES, "acceleration": [*RATES, *SECOND], "imu": [*RATES, *SECOND],
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("command", TAKES)
 def test_every_quantity_takes_what_it_needs_of_the_bases_motion(command: str) -> None:
-    given = [f"--{x}" for x in "va" if command in ("velocity", "jacobian-rate", "acceleration")][
+    given = [f"--{x}" for x in "va" if command in ("velocity", "jacobian-rate", "acceleration", "imu")][
         : len(TAKES[command]) // 2
     ]
     words = [command, "ur5", "--q", "random", *(word for x in given for word in (x, "random"))]

@@ -21,6 +21,7 @@ from urdfkin.cli.arguments import (
     v_option,
     verify_option,
 )
+from urdfkin.cli.base import base_options, with_base
 from urdfkin.cli.door import say
 from urdfkin.cli.endings import form_of
 from urdfkin.cli.idle import refuse_idle
@@ -29,7 +30,6 @@ from urdfkin.verify.quantities import IMU
 from urdfkin.verify.witnesses import WitnessName
 
 if TYPE_CHECKING:
-    from urdfkin.model.base_motion import BaseMotion
     from urdfkin.robot import Robot
 
 _TRAJECTORY = f"{TRAJECTORY_HELP[:-1]}, base_placement, base_velocity, base_acceleration."
@@ -45,6 +45,7 @@ _TRAJECTORY = f"{TRAJECTORY_HELP[:-1]}, base_placement, base_velocity, base_acce
 @q_option
 @v_option
 @a_option
+@base_options(IMU.inputs)
 @seed_option
 @verify_option
 @oracle_option
@@ -62,6 +63,9 @@ def command(
     q: str,
     v: str,
     a: str,
+    base_placement: str | None,
+    base_velocity: str | None,
+    base_acceleration: str | None,
     seed: int,
     verify: bool,
     oracle: WitnessName,
@@ -72,27 +76,29 @@ def command(
 
     The proper acceleration, m/s^2: the second derivative of the frame's position less gravity, so that a
     sensor at rest reads 9.81 upwards; and the angular velocity, rad/s. For one configuration --q with its
-    rates --v and their rates --a, for batches of them, or along a --trajectory. A base that moves is
-    --root-joint floating, whose pose is then among the coordinates, or stands in the .npz file.
+    rates --v and their rates --a, for batches of them, or along a --trajectory. A base that moves is said by
+    --base-velocity and the like, stands in the .npz file, or is --root-joint floating, whose pose is then
+    among the coordinates.
     """
     from urdfkin.motion.columns import numbers  # noqa: PLC0415  keeps --help fast
 
     format_ = form_of(context, output, ENDINGS, "csv")
     loaded = load_robot(robot, mimic, root_joint, verify=verify, oracle=oracle)
-    base = None
     if trajectory is None:
         x = read_inputs(loaded, frame, seed, q, v, a)
+        x = with_base(x, base_placement, base_velocity, base_acceleration)
     else:
-        refuse_idle(context, ("q", "v", "a", "seed"), "along a --trajectory")
-        x, base = _along(loaded, frame, trajectory)
+        moved = ("base_placement", "base_velocity", "base_acceleration")
+        refuse_idle(context, ("q", "v", "a", *moved, "seed"), "along a --trajectory")
+        x = _along(loaded, frame, trajectory)
     g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
     with compiling():
-        result = loaded.imu(x.q, x.v, x.a, x.frame, gravity=g, base=base)
+        result = loaded.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base)
     emit(x, IMU, None, result, format_, output)
     context.exit(exit_code(loaded.certificate()))
 
 
-def _along(robot: Robot, frame: str | None, path: Path) -> tuple[Inputs, BaseMotion | None]:
+def _along(robot: Robot, frame: str | None, path: Path) -> Inputs:
     from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415
 
     motion = read_trajectory(robot, path, with_base=True)
@@ -100,4 +106,4 @@ def _along(robot: Robot, frame: str | None, path: Path) -> tuple[Inputs, BaseMot
         say(f"warning: {note}", err=True)
     if motion.rates != "as given":
         say(f"rates {motion.rates}", err=True)
-    return Inputs(robot, frame or robot.tip_frame, motion.q, motion.v, motion.a, motion.t), motion.base
+    return Inputs(robot, frame or robot.tip_frame, motion.q, motion.v, motion.a, motion.t, motion.base)

@@ -60,7 +60,7 @@ def print_named(
         if cell_len(first) > room - 1:
             out.print(first, soft_wrap=True, style=style)
             first = ""
-        out.print(padded(0, first, room) + rest.rstrip(), soft_wrap=True, style=style)
+        out.print((padded(0, first, room) + rest).rstrip(), soft_wrap=True, style=style)
 
     def padded(i: int, cell: str, width: int) -> str:
         gap = " " * (width - cell_len(cell))
