@@ -90,6 +90,34 @@ def test_a_tree_that_is_no_xml_is_one_clear_error(value: Any) -> None:
         urdfkin.load(ElementTree.Element("robot", {"name": value}))
 
 
+@pytest.mark.parametrize(
+    "wrong", [{"type": "ball"}, {"name": None}, {"axis": np.ones(2)}, {"limit": None}, {"origin": 1}]
+)
+def test_a_yourdfpy_robot_that_is_no_urdf_is_one_clear_error(wrong: dict[str, Any]) -> None:
+    robot = yourdfpys(file("polar"))
+    for name, value in wrong.items():
+        setattr(robot.robot.joints[0], name, value)
+    with pytest.raises(urdfkin.UrdfkinError):
+        urdfkin.load(robot)
+
+
+@pytest.mark.parametrize("joints", [0, 2])
+def test_a_model_without_bodies_is_held_against_its_joints(joints: int) -> None:
+    model = pin.Model()
+    for k in range(joints):
+        model.addJoint(k, pin.JointModelRX(), pin.SE3.Random(), f"turn_{k}")
+    made = loaded(model)
+    assert made.link_names == ("universe", "turn_0_link", "turn_1_link")[: joints + 1]
+    assert f"places {joints + 1} links likewise" in made.verifier.reading
+
+
+def test_a_model_whose_workspace_would_fill_the_memory_is_not_asked() -> None:
+    model = pin.Model()
+    for k in range(320):
+        model.addJoint(k, pin.JointModelRX(), pin.SE3.Identity(), f"turn_{k}")
+    assert "was not asked: it has 320 rates" in loaded(model).verifier.reading
+
+
 def test_an_axis_of_another_length_is_told_when_it_comes_from_yourdfpy() -> None:
     """Yourdfpy moves such a joint twice as far; who comes from there must hear of it."""
     robot = yourdfpys(file("polar"))

@@ -38,9 +38,10 @@ _ENDLESS = 1e300
 
 @dataclass(frozen=True, slots=True)
 class Modelled:
-    """A tree, and which of the model's frames each of its links is."""
+    """A tree, and which of the model's joints each of its links lies on, or which of its frames it is."""
 
     tree: KinematicTree
+    joints: dict[str, int]
     frames: dict[str, int]
 
 
@@ -102,8 +103,8 @@ class _Reading:
             link, T = self._hung(own.get(j), parent, np.array(self.model.jointPlacements[j].homogeneous))
             self.rows.append((self._joint(j, T), link, self.carriers[j]))
         tree = build_tree(str(self.model.name) or "robot", self.carriers[0], self.rows)
-        at = {link: i for i, link in reversed(self.links.items()) if self.kinds[i] != "FIXED_JOINT"}
-        return Modelled(tree, at)
+        joints = {link: j for j, link in self.carriers.items()}
+        return Modelled(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
     def _hung(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
         """From which link something hangs that lies at T on a joint, and where it lies there."""

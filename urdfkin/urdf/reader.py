@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -60,16 +60,21 @@ def urdf_of(robot: yourdf.Robot) -> str:
     Axes are written as they are, so that the checks see their lengths.
 
     Raises:
-        InputError: the joints make no tree, a mimic joint cannot follow, or limits that a URDF needs are
-            missing.
+        InputError: the joints make no tree, a mimic joint cannot follow, limits that a URDF needs are
+            missing, or something stands where a name or a number should.
         UnknownNameError: a mimic joint names a leader that does not exist.
     """
-    rules = _rules(robot.joints)
-    rows = [
-        (replace(_joint(joint, rules.get(joint.name)), axis=_written(joint)), joint.parent, joint.child)
-        for joint in robot.joints
-    ]
-    return to_urdf(build_tree(robot.name, _root(robot), rows))
+    try:
+        rules = _rules(robot.joints)
+        rows = [
+            (replace(_joint(joint, rules.get(joint.name)), axis=_written(joint)), joint.parent, joint.child)
+            for joint in robot.joints
+        ]
+        return to_urdf(build_tree(robot.name, _root(robot), rows))
+    except UrdfkinError:
+        raise
+    except (TypeError, ValueError, AttributeError) as error:
+        raise InputError("yourdfpy's robot cannot be written as a URDF", found=str(error)) from error
 
 
 def _written(joint: yourdf.Joint) -> FloatArray:

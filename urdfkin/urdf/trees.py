@@ -49,21 +49,17 @@ def text_of(source: Any) -> tuple[str, str] | None:
 
 def _text(root: Any) -> str:
     """Elements, attributes and text; comments, whose tag is no name, are left out."""
-    copy = ElementTree.Element(_tag(root), dict(root.attrib))
-    open_ = [(root, copy)]
-    while open_:
-        element, made = open_.pop()
-        made.text = element.text
-        for child in element:
-            if isinstance(child.tag, str):
-                open_.append((child, ElementTree.SubElement(made, child.tag, dict(child.attrib))))
-    try:
-        return ElementTree.tostring(copy, encoding="unicode")
-    except (TypeError, RecursionError) as error:
-        raise InputError("an ElementTree that cannot be written as XML", found=str(error)) from None
-
-
-def _tag(root: Any) -> str:
     if not isinstance(root.tag, str):
         raise InputError("an ElementTree whose root is no element", found=shown(root.tag))
-    return root.tag
+    try:
+        copy = ElementTree.Element(root.tag, dict(root.attrib))
+        open_ = [(root, copy)]
+        while open_:
+            element, made = open_.pop()
+            made.text = element.text
+            for child in element:
+                if isinstance(child.tag, str):
+                    open_.append((child, ElementTree.SubElement(made, child.tag, dict(child.attrib))))
+        return ElementTree.tostring(copy, encoding="unicode")
+    except (TypeError, AttributeError, RecursionError) as error:
+        raise InputError("an ElementTree that cannot be written as XML", found=str(error)) from None

@@ -16,6 +16,7 @@ from urdfkin.urdf.pinocchio_model import Modelled
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.certificate import compare
 from urdfkin.verify.magnitudes import magnitudes
+from urdfkin.verify.pinocchio import MOST_RATES
 from urdfkin.verify.pinocchio_module import pinocchio, version
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.sampling import sample
@@ -37,11 +38,13 @@ def demand_the_models(verifier: Verifier, made: Modelled, source: Any) -> str:
         OracleError: the model places a frame elsewhere than the tree does.
     """
     model, tree = getattr(source, "model", source), verifier.tree
+    if model.nv > MOST_RATES:  # its workspace grows with the cube
+        return f"the model itself was not asked: it has {model.nv} rates, more than {MOST_RATES}"
     q = np.vstack((neutral(tree), sample(tree, _SAMPLES, np.random.default_rng(0))))
-    names = list(made.frames)
+    names = [*made.joints, *made.frames]
     plan = make_plan(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
-    theirs = _placements(model, _configurations(model, tree, q), list(made.frames.values()))
+    theirs = _placements(model, _configurations(model, tree, q), made)
     # Both readings round, and so do the angles of the URDF between them.
     bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
@@ -53,18 +56,20 @@ def demand_the_models(verifier: Verifier, made: Modelled, source: Any) -> str:
             remedy="please report this as an error of urdfkin, with the model",
         )
     return (
-        f"the model itself places {len(names)} frames likewise in {len(q)} configurations"
+        f"the model itself places {len(names)} links likewise in {len(q)} configurations"
         f" ({found.share:.1%} of the bound)"
     )
 
 
-def _placements(model: Any, q: FloatArray, frames: list[int]) -> FloatArray:
+def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
+    """(n, links, 4, 4) of joints, then of frames."""
     pin = pinocchio()
     data = model.createData()
-    out = np.empty((len(q), len(frames), 4, 4))
+    out = np.empty((len(q), len(made.joints) + len(made.frames), 4, 4))
     for k, q_k in enumerate(q):
         pin.framesForwardKinematics(model, data, q_k)
-        out[k] = [data.oMf[i].homogeneous for i in frames]
+        placed = [data.oMi[j] for j in made.joints.values()] + [data.oMf[i] for i in made.frames.values()]
+        out[k] = [one.homogeneous for one in placed]
     return out
 
 
