@@ -20,7 +20,7 @@ from urdfkin.lint.rules.axes import tilts
 from urdfkin.lint.rules.dialect import NEWER_VERSION
 from urdfkin.lint.rules.mimic import MIMIC_CONTINUOUS
 from urdfkin.lint.runner import read_urdf
-from urdfkin.model.tree import with_tilts
+from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home
 from urdfkin.urdf.descriptions import described
@@ -235,6 +235,8 @@ def robot_of(
     tree = read(urdf, mimic=mimic, root_joint=root_joint)
     if tilted := tilts(urdf):
         tree = with_tilts(tree, tilted)
+    if text.entry is not None and text.entry.poses:
+        tree = with_poses(tree, text.entry.poses)
     return Robot(
         tree,
         text.data.decode("utf-8-sig"),

@@ -35,6 +35,7 @@ from urdfkin.model import configuration
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.frame_names import LinkFrame
+from urdfkin.model.given import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.urdf.catalogue import catalogue
@@ -76,7 +77,9 @@ class Robot:
     """A robot that was loaded; make one with `urdfkin.load`.
 
     Configurations `q` are (..., nq), rates `v` and `a` (..., nv), with any leading batch shape; the three
-    broadcast against each other. Joint order and rates are Pinocchio's.
+    broadcast against each other. Joint order and rates are Pinocchio's. Each may also be given by name, as a
+    mapping `{"elbow": 0.5, "wrist": "30deg"}` whose values may be batches, or as text `"elbow=0.5, wrist=2"`,
+    `"ready"`, `"ready, elbow=0.5"` with a pose out of `poses`; a name that is missing is an error.
 
     Attributes:
         tree: Links and joints.
@@ -220,6 +223,17 @@ class Robot:
         """(nq,) zeros, and the identity quaternion for floating joints."""
         return configuration.neutral(self.tree)
 
+    @property
+    def poses(self) -> dict[str, FloatArray]:
+        """Named configurations (nq,): `neutral`; `ready`, within all limits; the catalogue's.
+
+        >>> import urdfkin
+        >>> robot = urdfkin.load("panda")
+        >>> robot.limit_violations("ready"), robot.limit_violations("neutral")
+        ([], ['joint panda_joint4: 0 is outside [-3.0718, -0.0698]'])
+        """
+        return configuration.poses(self.tree)
+
     def sample(self, n: int, seed: int = 0) -> FloatArray:
         """(n, nq) configurations within limits, followers' too; the same seed gives the same ones.
 
@@ -233,11 +247,11 @@ class Robot:
         seed = whole_number(seed, "seed", 0)
         return sample(self.tree, n, np.random.default_rng(seed))
 
-    def limit_violations(self, q: ArrayLike) -> list[str]:
+    def limit_violations(self, q: Given) -> list[str]:
         """One line for each joint that leaves its bounds somewhere in `q` (..., nq)."""
         return configuration.limit_violations(self.tree, configuration.checked(self.tree, q, "q"))
 
-    def to_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
+    def to_pinocchio(self, q: Given, *, mimic: bool = False) -> FloatArray:
         """(..., nq) to the configuration of `pinocchio.buildModelFromUrdf(path, mimic=mimic)`."""
         return configuration.to_pinocchio(
             self.tree, configuration.checked(self.tree, q, "q"), mimic=switch(mimic, "mimic")
@@ -276,7 +290,7 @@ class Robot:
     def compute(
         self,
         name: str,
-        inputs: Sequence[ArrayLike],
+        inputs: Sequence[Given],
         frame: str | Sequence[str],
         reference: Reference | str = _ALIGNED,
         *,
@@ -311,7 +325,7 @@ class Robot:
 
     def placement(
         self,
-        q: ArrayLike,
+        q: Given,
         frame: str | Sequence[str],
         *,
         base: BaseMotion | None = None,
@@ -392,8 +406,8 @@ class Robot:
 
     def velocity(
         self,
-        q: ArrayLike,
-        v: ArrayLike,
+        q: Given,
+        v: Given,
         frame: str | Sequence[str],
         reference: Reference | str = _ALIGNED,
         *,
@@ -413,7 +427,7 @@ class Robot:
 
     def jacobian(
         self,
-        q: ArrayLike,
+        q: Given,
         frame: str | Sequence[str],
         reference: Reference | str = _ALIGNED,
         *,
@@ -436,8 +450,8 @@ class Robot:
 
     def jacobian_rate(
         self,
-        q: ArrayLike,
-        v: ArrayLike,
+        q: Given,
+        v: Given,
         frame: str | Sequence[str],
         reference: Reference | str = _ALIGNED,
         *,
@@ -457,7 +471,7 @@ class Robot:
 
     def hessian(
         self,
-        q: ArrayLike,
+        q: Given,
         frame: str | Sequence[str],
         reference: Reference | str = _ALIGNED,
         *,
@@ -490,9 +504,9 @@ class Robot:
 
     def acceleration(
         self,
-        q: ArrayLike,
-        v: ArrayLike,
-        a: ArrayLike,
+        q: Given,
+        v: Given,
+        a: Given,
         frame: str | Sequence[str],
         reference: Reference | str = _ALIGNED,
         *,
@@ -515,9 +529,9 @@ class Robot:
 
     def imu(
         self,
-        q: ArrayLike,
-        v: ArrayLike,
-        a: ArrayLike,
+        q: Given,
+        v: Given,
+        a: Given,
         frame: str | Sequence[str],
         *,
         gravity: ArrayLike = GRAVITY,
@@ -563,7 +577,7 @@ class Robot:
 
     def singular_values(
         self,
-        q: ArrayLike,
+        q: Given,
         frame: str,
         rows: str = "all",
         *,
@@ -609,7 +623,7 @@ class Robot:
 
     def analytical_jacobian(
         self,
-        q: ArrayLike,
+        q: Given,
         frame: str | Sequence[str],
         representation: str = "ZYZ",
         *,
@@ -680,9 +694,9 @@ class Robot:
 
     def acceleration_breakdown(
         self,
-        q: ArrayLike,
-        v: ArrayLike,
-        a: ArrayLike,
+        q: Given,
+        v: Given,
+        a: Given,
         frame: str,
         reference: Reference | str = _ALIGNED,
         *,
@@ -713,9 +727,9 @@ class Robot:
 
     def enclose(
         self,
-        q: ArrayLike,
-        v: ArrayLike,
-        a: ArrayLike,
+        q: Given,
+        v: Given,
+        a: Given,
         frame: str,
         reference: Reference | str = _ALIGNED,
         *,
@@ -853,7 +867,7 @@ class Robot:
         """
         return chain(self.tree, choice(tip, self.tip_frame, "tip"), choice(base, self.base_frame, "base"))
 
-    def select(self, path: FrameChain | DHTable, q: ArrayLike) -> FloatArray:
+    def select(self, path: FrameChain | DHTable, q: Given) -> FloatArray:
         """(..., coordinates) of a path or table out of the robot's `q` (..., nq).
 
         Raises:
@@ -989,7 +1003,7 @@ class Robot:
     def _computed(
         self,
         name: str,
-        inputs: Sequence[ArrayLike],
+        inputs: Sequence[Given],
         frame: str | Sequence[str],
         reference: Reference | str,
         base: BaseMotion | None,

@@ -99,10 +99,17 @@ def test_a_followers_leader_is_a_coordinate_wherever_it_stands(walker: Kinematic
 
 def test_coordinates_can_be_given_by_name(walker: KinematicTree) -> None:
     path = chain(walker, "left_foot")
-    by_name = path.placement({"left_knee": 0.4})
-    np.testing.assert_array_equal(by_name, path.placement([0.0, 0.4]))
+    np.testing.assert_array_equal(
+        path.placement({"left_knee": 0.4, "left_hip": 0.1}), path.placement([0.1, 0.4])
+    )
+    np.testing.assert_array_equal(path.placement("neutral, left_knee=0.4"), path.placement([0.0, 0.4]))
     with pytest.raises(UnknownNameError, match="left_knee"):
         path.placement({"left_nee": 0.4})
+
+
+def test_a_name_that_is_missing_is_said_and_never_zero_in_silence(walker: KinematicTree) -> None:
+    with pytest.raises(InputError, match=r"no value for left_hip; .*'neutral, left_knee=\.\.\.'"):
+        chain(walker, "left_foot").placement({"left_knee": 0.4})
 
 
 def test_interorigin_vectors_add_up_from_the_first_joint_to_the_tip(walker: KinematicTree) -> None:
@@ -136,5 +143,5 @@ def test_an_unknown_frame_offers_the_nearest_names(walker: KinematicTree) -> Non
 def test_the_wrong_number_of_coordinates_names_the_right_ones(walker: KinematicTree) -> None:
     with pytest.raises(InputError, match="left_hip, left_knee"):
         chain(walker, "left_foot").placement(np.zeros(3))
-    with pytest.raises(InputError, match="walker needs"):
+    with pytest.raises(InputError, match="numbers for walker"):
         chain(walker, "left_foot").coupling.select(walker, np.zeros(3))

@@ -18,9 +18,10 @@ import pytest
 import urdfkin
 from tests.report.browser import Browser, opened, require_chromium
 from urdfkin.errors import InputError
+from urdfkin.model.configuration import checked
 from urdfkin.view.opening import opened_page
 from urdfkin.view.server import new_server
-from urdfkin.view.sliders import coordinate_rows, read, within_limits
+from urdfkin.view.sliders import coordinate_rows, within_limits
 from urdfkin.view.viewer import Viewer
 
 viser = pytest.importorskip("viser")
@@ -81,7 +82,7 @@ def test_every_slider_equals_q_however_q_was_set(viewer: Viewer, units: str) -> 
         np.testing.assert_allclose(shown(viewer), q, rtol=1e-15)
         viewer.sliders.handles[seed].value = 0.25
         np.testing.assert_allclose(shown(viewer), viewer.q, rtol=1e-15)
-        assert read(viewer.words_of_q.value, viewer.robot.coordinate_names).tolist() == viewer.q.tolist()
+        assert checked(viewer.robot.tree, viewer.words_of_q.value, "q").tolist() == viewer.q.tolist()
     far = np.full(viewer.robot.nq, 7.0)  # beyond every limit of a UR5
     viewer.set_q(far)
     np.testing.assert_allclose(shown(viewer), far, rtol=1e-15)

@@ -118,7 +118,10 @@ oracle_option = click.option(
 seed_option = click.option(
     "--seed", type=Whole(0), default=0, show_default=True, help="What `random` is drawn from."
 )
-_VALUES = "Numbers '0,0.5,...', '@FILE.csv' for a batch, 'neutral', 'random' or 'random:N'."
+_VALUES = (
+    "Numbers '0,30deg,pi/2', by name 'shoulder=30deg,elbow=0.5', a pose 'neutral' or 'ready', with joints"
+    " moved 'ready,elbow=0.5', '@FILE.csv' for a batch, 'random' or 'random:N'."
+)
 q_option = click.option("--q", metavar="VALUES", default="neutral", show_default=True, help=_VALUES)
 v_option = click.option("--v", metavar="VALUES", default="neutral", help="Rates, likewise; neutral is zero.")
 a_option = click.option("--a", metavar="VALUES", default="neutral", help="Rates of the rates, likewise.")
@@ -194,22 +197,17 @@ def read_inputs(
 
 def _values(robot: Robot, letter: str, text: str, rng: Any) -> FloatArray:
     """(n, width) for one option."""
-    import numpy as np  # noqa: PLC0415
-
+    from urdfkin.model.configuration import places  # noqa: PLC0415  keeps --help fast
     from urdfkin.verify.sampling import sample  # noqa: PLC0415
 
     names = robot.coordinate_names if letter == "q" else robot.rate_names
-    if text == "neutral":
-        return robot.neutral()[None] if letter == "q" else np.zeros((1, len(names)))
     word, _, count = text.partition(":")
     if word == "random":
         n = _count(letter, count) if count else _RANDOM_SAMPLES
         return sample(robot.tree, n, rng) if letter == "q" else rng.standard_normal((n, len(names)))
     if text.startswith("@"):
         return read_batch(Path(text[1:]), f"--{letter}", (names,))[0]
-    from urdfkin.motion.columns import numbers  # noqa: PLC0415
-
-    return np.array([numbers(text.split(","), f"--{letter}", names)])
+    return places(robot.tree, letter).read(text, f"--{letter}")[None]
 
 
 def _count(letter: str, text: str) -> int:

@@ -40,7 +40,7 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
 @reference_option
 @click.option("--trajectory", type=click.Path(path_type=Path), help=TRAJECTORY_HELP)
 @click.option("--from", "start", default="neutral", show_default=True, help="Where a line begins, as --q.")
-@click.option("--to", "end", help="Where a line ends: numbers, 'neutral' or 'random'.")
+@click.option("--to", "end", help="Where a line ends, likewise.")
 @click.option("--duration", type=Number(), default=1.0, show_default=True, help="Of a line, seconds.")
 @click.option("--samples", type=Whole(3), default=201, show_default=True, help="Of a line.")
 @seed_option

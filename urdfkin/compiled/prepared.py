@@ -12,10 +12,10 @@ from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from urdfkin.compiled.plan import Plan
 from urdfkin.compiled.task import Task
+from urdfkin.model.given import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.forking import importing
@@ -87,39 +87,37 @@ class PreparedFrame:
 
     # The functions count what they hand out themselves, for the ledger.
 
-    def placement(self, q: ArrayLike, out: FloatArray | None = None) -> FloatArray:
+    def placement(self, q: Given, out: FloatArray | None = None) -> FloatArray:
         """(4, 4) T_world_frame: eq. 7.77."""
         if (pose := self._placement(q, out)) is not None:
             return pose
         return self._robot.placement(q, self.frame, out=out, verify=False, threads=1)
 
-    def velocity(self, q: ArrayLike, v: ArrayLike, out: FloatArray | None = None) -> FloatArray:
+    def velocity(self, q: Given, v: Given, out: FloatArray | None = None) -> FloatArray:
         """(6,) [linear; angular] m/s, rad/s: eq. 7.127, 7.128."""
         if (six := self._velocity(q, v, out)) is not None:
             return six
         return self._robot.velocity(q, v, self.frame, self.reference, out=out, verify=False, threads=1)
 
-    def jacobian(self, q: ArrayLike, out: FloatArray | None = None) -> FloatArray:
+    def jacobian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
         """(6, nv): eq. 7.85."""
         if (J := self._jacobian(q, out)) is not None:
             return J
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=False, threads=1)
 
-    def hessian(self, q: ArrayLike, out: FloatArray | None = None) -> FloatArray:
+    def hessian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
         """(6, nv, nv): the derivatives of `jacobian` by each rate."""
         if (H := self._hessian(q, out)) is not None:
             return H
         return self._robot.hessian(q, self.frame, self.reference, out=out, verify=False, threads=1)
 
-    def acceleration(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: FloatArray | None = None
-    ) -> FloatArray:
+    def acceleration(self, q: Given, v: Given, a: Given, out: FloatArray | None = None) -> FloatArray:
         """(6,) [linear; angular] m/s^2, rad/s^2, classical: eq. 7.129, 7.130."""
         if (six := self._acceleration(q, v, a, out)) is not None:
             return six
         return self._robot.acceleration(q, v, a, self.frame, self.reference, out=out, verify=False, threads=1)
 
-    def _first(self, quantity: str, q: ArrayLike, *others: object) -> FloatArray | None:
+    def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
         """Make what computes a quantity, and compute."""
         with importing:
             from urdfkin.compiled.single import arrays_are_known, single  # noqa: PLC0415  loads Numba

@@ -11,13 +11,8 @@ import math
 import re
 from dataclasses import dataclass
 
-#: Units by the names that people give them -> the short one.
-UNITS = {
-    **dict.fromkeys(("rad", "radian", "radians"), "rad"),
-    **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),
-    **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), "m"),
-    **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), "mm"),
-}
+from urdfkin.errors.measured import UNITS
+
 #: Signs and letters of pages, PDFs and LaTeX -> what they mean.
 _SAME = str.maketrans(
     {

@@ -8,16 +8,15 @@ joints there, and the coupling values = G q + g is applied outside: J = J_rows G
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from urdfkin.compiled.evaluate import accelerations, jacobians, velocities
 from urdfkin.compiled.plan import Plan, make_plan
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.to_tree import free_tree
+from urdfkin.model.given import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
@@ -31,7 +30,7 @@ def plan_of(table: DHTable) -> Plan:
 
 def jacobian(
     table: DHTable,
-    q: ArrayLike | Mapping[str, float],
+    q: Given,
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FloatArray:
     """(..., 6, coordinates) Jacobian of the tip in the base frame, [linear; angular]: 7.85.
@@ -51,8 +50,8 @@ def jacobian(
 
 def velocity(
     table: DHTable,
-    q: ArrayLike | Mapping[str, float],
-    v: ArrayLike,
+    q: Given,
+    v: Given,
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FloatArray:
     """(..., 6) velocity of the tip in the base frame, [linear; angular]: 7.127, 7.128.
@@ -72,9 +71,9 @@ def velocity(
 
 def acceleration(
     table: DHTable,
-    q: ArrayLike | Mapping[str, float],
-    v: ArrayLike,
-    a: ArrayLike,
+    q: Given,
+    v: Given,
+    a: Given,
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FloatArray:
     """(..., 6) classical acceleration of the tip in the base frame, [linear; angular]: 7.129, 7.130.
@@ -95,7 +94,7 @@ def acceleration(
     return found.reshape(*shape, 6)
 
 
-def _rates(table: DHTable, rates: ArrayLike, what: str) -> FloatArray:
+def _rates(table: DHTable, rates: Given, what: str) -> FloatArray:
     """(..., rows) rates of all joints from rates of the coordinates."""
     return table.coupling.checked(rates, what) @ table.coupling.matrix.T
 

@@ -24,6 +24,7 @@ from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.kinematics.roundings import EPS, ROW
 from urdfkin.model.chain import FrameChain, motion_about_z
 from urdfkin.model.coupling import Coupling, coupling_of
+from urdfkin.model.given import Given
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -85,7 +86,7 @@ class Screws:
     @cached_property
     def coupling(self) -> Coupling:
         """How the path's coordinates move its joints."""
-        return coupling_of([(joint.name, joint.mimic) for joint in self.joints])
+        return coupling_of([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
 
     @property
     def points(self) -> FloatArray:
@@ -96,7 +97,7 @@ class Screws:
             found.append(here)
         return np.array(found).reshape(-1, 3)
 
-    def placement(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+    def placement(self, q: Given) -> FloatArray:
         """(..., 4, 4) the tip in the base for `q` (..., coordinates), in the order of `coupling.names`.
 
         Raises:
@@ -108,7 +109,7 @@ class Screws:
             T = T @ exp_screw(self.space[i], values[..., i])
         return np.ascontiguousarray(T @ self.M)
 
-    def jacobian(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+    def jacobian(self, q: Given) -> FloatArray:
         """(6, joints) the space Jacobian in the book's order, [angular; linear], of every joint (5.11)."""
         T, columns = np.eye(4), list[FloatArray]()
         for screw, value in zip(self.space, self.coupling.values(q), strict=True):
@@ -117,7 +118,7 @@ class Screws:
             T = T @ exp_screw(screw, value)
         return np.array(columns).reshape(-1, 6).T
 
-    def rounding(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+    def rounding(self, q: Given) -> FloatArray:
         """(...,) metres: what rounding may do to `placement(q)`: that of two rows for each exponential."""
         values = np.abs(self.coupling.values(q))
         turns = np.array([joint.kind.turns for joint in self.joints], dtype=bool)

@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.expression import UNITS, Cell, NoCellError, cell_of, spelled
+from urdfkin.dh.expression import Cell, NoCellError, cell_of, spelled
 from urdfkin.dh.written_row import ORDER
 from urdfkin.errors import InputError
+from urdfkin.errors.measured import UNITS
 from urdfkin.errors.printable import from_csv_cell
 
 #: What may be said in a line of its own, `convention: modified`, with or without a comment mark.

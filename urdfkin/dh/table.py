@@ -13,7 +13,6 @@ d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -25,6 +24,7 @@ from urdfkin.dh.statement import SnapStatement
 from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.coupling import Coupling, coupling_of
+from urdfkin.model.given import Given
 from urdfkin.model.tree import FloatArray, frozen
 
 
@@ -75,7 +75,7 @@ class DHTable:
     @cached_property
     def coupling(self) -> Coupling:
         """How the table's coordinates move its joints."""
-        return coupling_of([(row.joint, row.mimic) for row in self.rows])
+        return coupling_of([(row.joint, row.mimic, row.kind) for row in self.rows])
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -95,7 +95,7 @@ class DHTable:
         lengths = sum(abs(row.a) + abs(row.d) for row in self.rows)
         return lengths + math.hypot(*self.tool[:3, 3])
 
-    def rounding(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+    def rounding(self, q: Given) -> FloatArray:
         """(...,) metres: what rounding may do to `placement(q)`; divided by `span`, radians.
 
         What the rows round (`urdfkin.kinematics.roundings`), and their angles, times the lever arm.
@@ -106,7 +106,7 @@ class DHTable:
         lever = self.span + values[..., ~turns].sum(axis=-1) + float(np.linalg.norm(self.base[:3, 3]))
         return np.asarray(EPS * (of_rows(len(self.rows)) + angle) * lever)
 
-    def tolerance(self, q: ArrayLike | Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
+    def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
         """(...,) metres and (...,) radians: how far `placement(q)` may be from the URDF's.
 
         That is rounding for an exact table; what snapping declares is added.
@@ -121,11 +121,12 @@ class DHTable:
 
     # -- placement -----------------------------------------------------------------------------------
 
-    def frames(self, q: ArrayLike | Mapping[str, float] | None = None) -> FloatArray:
+    def frames(self, q: Given | None = None) -> FloatArray:
         """(..., n + 1, 4, 4) poses of the frames 0 ... n in the base frame.
 
         Args:
-            q: (..., coordinates) in the order of `joint_names`, or a mapping by name; None is all zero.
+            q: (..., coordinates) in the order of `joint_names`, or by name, as a mapping or text;
+                None is all zero.
 
         Raises:
             InputError: `q` has the wrong length.
@@ -139,11 +140,11 @@ class DHTable:
             poses[..., i + 1, :, :] = poses[..., i, :, :] @ step
         return poses
 
-    def placement(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+    def placement(self, q: Given) -> FloatArray:
         """(..., 4, 4) T_base_tip: base, rows and tool multiplied.
 
         Args:
-            q: (..., coordinates) in the order of `joint_names`, rad or m, or a mapping by name.
+            q: (..., coordinates) in the order of `joint_names`, rad or m, or by name, as a mapping or text.
 
         Raises:
             InputError: `q` has the wrong length.

@@ -13,6 +13,7 @@ from numbers import Real
 
 from urdfkin.dh.expression import cell_of
 from urdfkin.errors import InputError
+from urdfkin.errors.measured import in_radians
 
 
 class Angles(StrEnum):
@@ -168,7 +169,4 @@ def cell_in_si(name: str, number: float, units: Units) -> float:
     """A cell, by its name a length or an angle, in metres or radians; 90 degrees are pi/2 to the bit."""
     if name in ("a", "d"):
         return number / 1000.0 if units.counts_millimetres else number
-    if units.angles is Angles.RADIANS:
-        return number
-    twelfths = number / 15.0
-    return twelfths * math.pi / 12.0 if twelfths == round(twelfths) else math.radians(number)
+    return number if units.angles is Angles.RADIANS else in_radians(number)

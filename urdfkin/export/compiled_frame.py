@@ -12,7 +12,6 @@ from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from urdfkin.compiled.batch import in_blocks
 from urdfkin.compiled.plan import Plan
@@ -21,6 +20,7 @@ from urdfkin.compiled.task import Task
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.export.code import bare
 from urdfkin.export.library import NoCompilerError, library
+from urdfkin.model.given import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.forking import importing, lock_over_forks
@@ -83,32 +83,28 @@ class CompiledFrame:
         # It holds addresses of this process.
         return self._robot.compiled, (self.frame, self.reference)
 
-    def placement(
-        self, q: ArrayLike, out: FloatArray | None = None, *, threads: int | None = None
-    ) -> FloatArray:
+    def placement(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
         """(..., 4, 4) T_world_frame: eq. 7.77. Arguments and errors as `Robot.placement`."""
         if threads is None and (one := self._placement(q, out)) is not None:
             return one
         return self._computed("placement", (q,), out, threads)
 
     def velocity(
-        self, q: ArrayLike, v: ArrayLike, out: FloatArray | None = None, *, threads: int | None = None
+        self, q: Given, v: Given, out: FloatArray | None = None, *, threads: int | None = None
     ) -> FloatArray:
         """(..., 6) [linear; angular] m/s, rad/s: eq. 7.127, 7.128."""
         if threads is None and (one := self._velocity(q, v, out)) is not None:
             return one
         return self._computed("velocity", (q, v), out, threads)
 
-    def jacobian(
-        self, q: ArrayLike, out: FloatArray | None = None, *, threads: int | None = None
-    ) -> FloatArray:
+    def jacobian(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
         """(..., 6, nv): eq. 7.85."""
         if threads is None and (one := self._jacobian(q, out)) is not None:
             return one
         return self._computed("jacobian", (q,), out, threads)
 
     def jacobian_rate(
-        self, q: ArrayLike, v: ArrayLike, out: FloatArray | None = None, *, threads: int | None = None
+        self, q: Given, v: Given, out: FloatArray | None = None, *, threads: int | None = None
     ) -> FloatArray:
         """(..., 6, nv): eq. 7.126."""
         if threads is None and (one := self._jacobian_rate(q, v, out)) is not None:
@@ -117,9 +113,9 @@ class CompiledFrame:
 
     def acceleration(
         self,
-        q: ArrayLike,
-        v: ArrayLike,
-        a: ArrayLike,
+        q: Given,
+        v: Given,
+        a: Given,
         out: FloatArray | None = None,
         *,
         threads: int | None = None,
@@ -131,7 +127,7 @@ class CompiledFrame:
 
     # -- inside --------------------------------------------------------------------------------------------
 
-    def _first(self, name: str, q: ArrayLike, *others: object) -> FloatArray | None:
+    def _first(self, name: str, q: Given, *others: object) -> FloatArray | None:
         """Make what computes one configuration, and compute."""
         with importing:
             from urdfkin.compiled.single import arrays_are_known, called  # noqa: PLC0415  loads Numba
@@ -171,11 +167,11 @@ class CompiledFrame:
         verifier.check(row, call, call.in_shape(self._run(made, row, call, None, 1)), verifier.wanted(None))
         return made
 
-    def _call(self, inputs: Sequence[ArrayLike]) -> Call:
+    def _call(self, inputs: Sequence[Given]) -> Call:
         return Call(self._tree, self._robot.plan, self.frame, self.reference, None, inputs)
 
     def _computed(
-        self, name: str, inputs: Sequence[ArrayLike], out: FloatArray | None, threads: int | None
+        self, name: str, inputs: Sequence[Given], out: FloatArray | None, threads: int | None
     ) -> FloatArray:
         """Any batch, in parts for several threads."""
         row = QUANTITIES[name]

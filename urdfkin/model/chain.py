@@ -9,16 +9,15 @@ reversed, so that its coordinate keeps the sign of the URDF:  (Rz(q))^-1 about z
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.model.coupling import Coupling, coupling_of
+from urdfkin.model.given import Given
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, frozen
 
 
@@ -73,7 +72,7 @@ class FrameChain:
     @cached_property
     def coupling(self) -> Coupling:
         """How the path's coordinates move its joints."""
-        return coupling_of([(joint.name, joint.mimic) for joint in self.joints])
+        return coupling_of([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -90,7 +89,7 @@ class FrameChain:
         """Metres: the sum of the constant offsets between joints, tip included, base offset not."""
         return float(self.lengths[1:].sum())
 
-    def frames(self, q: ArrayLike | Mapping[str, float] | None = None) -> FloatArray:
+    def frames(self, q: Given | None = None) -> FloatArray:
         """(..., n + 1, 4, 4) poses in the base: each joint's frame before its own motion, then the tip.
 
         Args:
@@ -108,19 +107,19 @@ class FrameChain:
         poses[..., -1, :, :] = T_base_here @ self.T_last_tip
         return poses
 
-    def placement(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+    def placement(self, q: Given) -> FloatArray:
         """(..., 4, 4) T_base_tip for `q` (..., coordinates); raises InputError for a wrong length."""
         return np.ascontiguousarray(self.frames(q)[..., -1, :, :])
 
-    def axes(self, q: ArrayLike | Mapping[str, float] | None = None) -> FloatArray:
+    def axes(self, q: Given | None = None) -> FloatArray:
         """(..., n, 3) unit axes z_{i-1} in the base; at zero coordinates when `q` is None."""
         return np.ascontiguousarray(self.frames(q)[..., :-1, :3, 2])
 
-    def origins(self, q: ArrayLike | Mapping[str, float] | None = None) -> FloatArray:
+    def origins(self, q: Given | None = None) -> FloatArray:
         """(..., n + 1, 3) joint origins O_{i-1} in the base, metres; the last is the tip's."""
         return np.ascontiguousarray(self.frames(q)[..., :3, 3])
 
-    def interorigin(self, q: ArrayLike | Mapping[str, float] | None = None) -> FloatArray:
+    def interorigin(self, q: Given | None = None) -> FloatArray:
         """(..., n, 3) interorigin vectors d_{i-1,i} in the base, metres; the last leads to the tip."""
         return np.ascontiguousarray(np.diff(self.origins(q), axis=-2))
 

@@ -7,40 +7,99 @@ gives followers a coordinate of their own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, unit_quaternions
+from urdfkin.model.given import Given, Places
+from urdfkin.model.ranges import coordinate_ranges
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: How far (rad or m) a follower's coordinate, or a (cos, sin) pair's norm, may be off in `from_pinocchio`.
 _FOLLOWS_TO = 1e-9
 
 
+#: What is put behind the name of a joint that has several numbers, and what they are measured in.
+_OF_Q = {
+    JointKind.PLANAR: {".x": "m", ".y": "m", ".angle": "rad"},
+    JointKind.FLOATING: {".x": "m", ".y": "m", ".z": "m", ".qx": "", ".qy": "", ".qz": "", ".qw": ""},
+}
+_OF_RATES = {
+    JointKind.PLANAR: {".vx": "m", ".vy": "m", ".wz": "rad"},
+    JointKind.FLOATING: {".vx": "m", ".vy": "m", ".vz": "m", ".wx": "rad", ".wy": "rad", ".wz": "rad"},
+}
+
+
 def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
     """A name for each number of `q`: the joint's, with a suffix where a joint has several."""
-    suffixes = {
-        JointKind.PLANAR: (".x", ".y", ".angle"),
-        JointKind.FLOATING: (".x", ".y", ".z", ".qx", ".qy", ".qz", ".qw"),
-    }
-    return tuple(
-        joint.name + suffix for joint in tree.joints if joint.nq for suffix in suffixes.get(joint.kind, ("",))
-    )
+    return tuple(name for name, _ in _named(tree, _OF_Q))
 
 
 def rate_names(tree: KinematicTree) -> tuple[str, ...]:
     """A name for each number of `v` and `a`; several where a joint has several, in the moving frame."""
-    suffixes = {
-        JointKind.PLANAR: (".vx", ".vy", ".wz"),
-        JointKind.FLOATING: (".vx", ".vy", ".vz", ".wx", ".wy", ".wz"),
-    }
-    return tuple(
-        joint.name + suffix for joint in tree.joints if joint.nv for suffix in suffixes.get(joint.kind, ("",))
+    return tuple(name for name, _ in _named(tree, _OF_RATES))
+
+
+def _named(tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]) -> Iterator[tuple[str, str]]:
+    """A name and a unit for each number."""
+    for joint in tree.joints:
+        if joint.nv:
+            own = of.get(joint.kind, {"": "rad" if joint.kind.turns else "m"})
+            yield from ((joint.name + suffix, unit) for suffix, unit in own.items())
+
+
+def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
+    """What each number of "q", "v" or "a" is measured in, rates aside: "rad", "m", or "" for none."""
+    return tuple(unit for _, unit in _named(tree, _OF_Q if what == "q" else _OF_RATES))
+
+
+def places(tree: KinematicTree, what: str) -> Places:
+    """How the numbers of "q", "v" or "a" are called and measured, for those who give them by name."""
+    is_q = what == "q"
+    own = [joint for joint in tree.joints if joint.nv]
+    return Places(
+        what,
+        _names(tree, what),
+        units(tree, what),
+        poses(tree) if is_q else {"neutral": np.zeros(tree.nv)},
+        spans={
+            joint.name: (at, joint.nq if is_q else joint.nv)
+            for joint, at in zip(tree.joints, tree.q_index if is_q else tree.v_index, strict=True)
+            if joint in own and joint.nv > 1
+        },
+        otherwise={
+            joint.name: f"it follows {joint.mimic.leader}: give that, or load with mimic=False (--no-mimic)"
+            if joint.mimic
+            else "it is fixed: leave it out"
+            for joint in tree.joints
+            if not joint.nv
+        },
+        lengths=_other_lengths(tree, what),
     )
+
+
+def _other_lengths(tree: KinematicTree, what: str) -> dict[int, str]:
+    """Pinocchio's lengths where they differ from ours, and what to do about them."""
+    follow = any(joint.mimic for joint in tree.joints)
+    free = "mimic joints follow their leaders: leave them out, or load with mimic=False (--no-mimic)"
+    of_followers = sum(joint.kind.nv for joint in tree.joints if joint.mimic)
+    found: dict[int, str] = {}
+    if what == "q":
+        for mimic in (False, True):
+            length = _pinocchio_length(tree, mimic=mimic)
+            asks = f", mimic={mimic}" if follow else ""
+            found[length] = f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) gives urdfkin's"
+        if follow:
+            both = found.get(tree.nq + of_followers)
+            found[tree.nq + of_followers] = f"{both}; or {free}" if both else free
+    elif follow:
+        found[tree.nv + of_followers] = f"Pinocchio's {what} has that length: {free}"
+    found.pop(len(_names(tree, what)), None)
+    return found
 
 
 def neutral(tree: KinematicTree) -> FloatArray:
@@ -50,6 +109,25 @@ def neutral(tree: KinematicTree) -> FloatArray:
         if joint.kind is JointKind.FLOATING:
             q[at + 6] = 1.0
     return q
+
+
+def poses(tree: KinematicTree) -> dict[str, FloatArray]:
+    """Named configurations (nq,): `neutral`; `ready`, within the limits; and what else the tree has.
+
+    `ready` is the tree's own where it has one (the catalogue gives some robots one), and otherwise the
+    neutral one with every joint that may not be at 0 in the middle of its range.
+    """
+    ready = neutral(tree)
+    for name, (lower, upper) in coordinate_ranges(tree).items():
+        if not lower <= 0.0 <= upper:
+            ready[tree.q_index[tree.joint_index(name)]] = (lower + upper) / 2.0
+    found = {"neutral": neutral(tree), "ready": ready}
+    for pose, values in tree.poses.items():
+        q = ready.copy() if pose == "ready" else neutral(tree)
+        for name, value in values.items():
+            q[tree.q_index[tree.joint_index(name)]] = value
+        found[pose] = q
+    return found
 
 
 def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
@@ -67,18 +145,28 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
     return q
 
 
-def shaped(tree: KinematicTree, value: ArrayLike, what: str) -> FloatArray:
-    """q, v or a as float64 with the right last axis, quaternions of norm 1; raises InputError."""
+def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
+    """q, v or a as float64 with the right last axis, as they are given (`urdfkin.model.given`)."""
+    if isinstance(value, Mapping | str):
+        return places(tree, what).read(value)
     array, width = floats(value, what), tree.nq if what == "q" else tree.nv
     if array.shape[-1:] != (width,):
         names = ", ".join(_names(tree, what)) or "none, nothing moves"
         raise InputError(
-            f"{what} needs {width} numbers for {tree.name}: {names}", found=f"shape {array.shape}"
+            f"{what} needs {width} numbers for {tree.name}: {names}",
+            found=f"shape {array.shape}",
+            remedy=_other_lengths(tree, what).get(array.shape[-1]) if array.ndim else None,
         )
+    return array
+
+
+def shaped(tree: KinematicTree, value: Given, what: str) -> FloatArray:
+    """The same, quaternions of norm 1; raises InputError."""
+    array = numbers(tree, value, what)
     return with_unit_quaternions(tree, array) if what == "q" else array
 
 
-def checked(tree: KinematicTree, value: ArrayLike, what: str) -> FloatArray:
+def checked(tree: KinematicTree, value: Given, what: str) -> FloatArray:
     """The same, and every number finite; raises NotFiniteError too."""
     array = shaped(tree, value, what)
     if not np.isfinite(array).all():
@@ -105,8 +193,17 @@ def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
         if outside.max() > 0.0:
             worst = float(values.flat[outside.argmax()])
             bounds = f"[{joint.limit.lower:.6g}, {joint.limit.upper:.6g}]"
-            lines.append(f"joint {joint.name}: {worst:.6g} is outside {bounds}")
+            lines.append(f"joint {joint.name}: {worst:.6g} is outside {bounds}{_degrees(joint, worst)}")
     return lines
+
+
+def _degrees(joint: Joint, value: float) -> str:
+    """A question, where a value looks like degrees: beyond a turn, typed, and within the limits if it is."""
+    typed = f"{value:.6g}"
+    if not (joint.kind.turns and joint.limit and abs(value) > math.tau and float(typed) == value):
+        return ""
+    allowed = joint.limit.lower <= math.radians(value) <= joint.limit.upper
+    return f"; degrees? write {typed}deg" if allowed else ""
 
 
 def _own_values(tree: KinematicTree, q: FloatArray) -> Iterator[FloatArray | None]:
@@ -142,12 +239,26 @@ def pinocchio_blocks(tree: KinematicTree, q: FloatArray, *, mimic: bool) -> Iter
             built with `mimic=True`.
     """
     for i, (joint, at) in enumerate(zip(tree.joints, tree.q_index, strict=True)):
-        if joint.kind.nq == 0 or (mimic and joint.mimic):
+        if not _in_pinocchio(joint, mimic=mimic):
             continue
         own = q[..., at : at + joint.kind.nq]
         if joint.mimic:
             own = joint.mimic.multiplier * own + joint.mimic.offset
         yield i, pinocchio_coordinates(joint, own)
+
+
+_SIZES = {JointKind.CONTINUOUS: 2, JointKind.PLANAR: 4}
+
+
+def _in_pinocchio(joint: Joint, *, mimic: bool) -> bool:
+    """Whether a joint takes coordinates in Pinocchio's model, which is built with or without followers."""
+    return joint.kind.nq > 0 and not (mimic and joint.mimic)
+
+
+def _pinocchio_length(tree: KinematicTree, *, mimic: bool) -> int:
+    """How many coordinates Pinocchio's model has."""
+    present = (joint.kind for joint in tree.joints if _in_pinocchio(joint, mimic=mimic))
+    return sum(_SIZES.get(kind, kind.nq) for kind in present)
 
 
 def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
@@ -163,19 +274,22 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
         InputError: wrong length, a (cos, sin) pair that is no unit vector, or a follower that does not
             follow its leader.
     """
-    sizes = {JointKind.CONTINUOUS: 2, JointKind.PLANAR: 4}
-    present = [i for i, joint in enumerate(tree.joints) if joint.kind.nq and not (mimic and joint.mimic)]
-    length = sum(sizes.get(tree.joints[i].kind, tree.joints[i].kind.nq) for i in present)
+    length = _pinocchio_length(tree, mimic=mimic)
     if q.shape[-1:] != (length,):
+        other = q.ndim and q.shape[-1] == _pinocchio_length(tree, mimic=not mimic)
         raise InputError(
             "a Pinocchio configuration has the wrong length",
             where=tree.name,
             found=f"{q.shape}, expected (..., {length})",
+            remedy=f"mimic={not mimic} is for one of buildModelFromUrdf(..., mimic={not mimic})"
+            if other
+            else None,
         )
     own, followers, at = np.zeros((*q.shape[:-1], tree.nq)), [], 0
-    for i in present:
-        joint = tree.joints[i]
-        size = sizes.get(joint.kind, joint.kind.nq)
+    for i, joint in enumerate(tree.joints):
+        if not _in_pinocchio(joint, mimic=mimic):
+            continue
+        size = _SIZES.get(joint.kind, joint.kind.nq)
         values = _angle_back(joint, q[..., at : at + size])
         at += size
         if joint.mimic:

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.model.tree import FloatArray, KinematicTree, Mimic, frozen
+from urdfkin.errors import InputError
+from urdfkin.model.configuration import numbers
+from urdfkin.model.given import Given, Places
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, frozen
 
 
 @dataclass(frozen=True)
@@ -25,15 +26,18 @@ class Coupling:
     Attributes:
         joints: Every joint of the path that moves, base to tip.
         mimics: Whom each of them follows, None for a joint with a coordinate of its own.
+        kinds: How each of them moves.
 
     Example:
-        >>> couple = Coupling(("a", "b"), (None, Mimic("a", 2.0, 0.5)))
-        >>> couple.names, couple.values([1.0]).tolist()
-        (('a',), [1.0, 2.5])
+        >>> turn = JointKind.REVOLUTE
+        >>> couple = Coupling(("a", "b"), (None, Mimic("a", 2.0, 0.5)), (turn, turn))
+        >>> couple.names, couple.values([1.0]).tolist(), couple.values({"a": "180deg"}).round(2).tolist()
+        (('a',), [1.0, 2.5], [3.14, 6.78])
     """
 
     joints: tuple[str, ...]
     mimics: tuple[Mimic | None, ...]
+    kinds: tuple[JointKind, ...]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -55,24 +59,34 @@ class Coupling:
         """(joints,) g: where each joint stands when every coordinate is zero."""
         return frozen([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
-    def values(self, q: ArrayLike | Mapping[str, float]) -> FloatArray:
+    def places(self, what: str = "q") -> Places:
+        """How the numbers of a path's q, v or a are called and measured, for those who give them by name."""
+        rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
+        units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
+        # A leader that is not on the path may be of any kind.
+        own = tuple(map(units.get, self.names))
+        follow = {joint: f"it follows {mimic.leader}: give that" for joint, mimic, _ in rules if mimic}
+        return Places(what, self.names, own, {"neutral": np.zeros(len(self.names))}, otherwise=follow)
+
+    def values(self, q: Given) -> FloatArray:
         """(..., joints) values of all joints, rad or m.
 
         Args:
-            q: (..., coordinates) in the order of `names`, or one configuration as a mapping by name.
+            q: (..., coordinates) in the order of `names`, or a mapping by name, or text
+                (`urdfkin.model.given`).
 
         Raises:
-            InputError: the last axis has another length than `names`.
-            UnknownNameError: the mapping has a name that is no coordinate of the path.
+            InputError: the last axis has another length than `names`, or a name is missing.
+            UnknownNameError: a name that is no coordinate of the path.
         """
-        if isinstance(q, Mapping):
-            q = self._from_mapping(q)
         coordinates = self.checked(q, "q")
         # One multiplication and one addition for each joint, so that G's zeros cost no rounding.
         return np.asarray(coordinates[..., self._leader_index] * self._multiplier + self.offset)
 
-    def checked(self, array: ArrayLike, what: str) -> FloatArray:
-        """`array` as float64 with the path's number of coordinates on its last axis."""
+    def checked(self, array: Given, what: str) -> FloatArray:
+        """`array`, "q", "v" or "a", as float64 with the path's number of coordinates on its last axis."""
+        if isinstance(array, Mapping | str):
+            return self.places(what).read(array)
         values = np.asarray(array, dtype=np.float64)
         if values.ndim == 0 or values.shape[-1] != len(self.names):
             raise InputError(
@@ -81,12 +95,6 @@ class Coupling:
                 remedy="pick these out of the robot's own coordinates, for instance with select()",
             )
         return values
-
-    def _from_mapping(self, q: Mapping[str, float]) -> FloatArray:
-        for name in q:
-            if name not in self.names:
-                raise UnknownNameError("coordinate", name, self.names)
-        return np.array([q.get(name, 0.0) for name in self.names], dtype=np.float64)
 
     @cached_property
     def _leader_index(self) -> list[int]:
@@ -106,20 +114,16 @@ class Coupling:
         """Where the path's rates stand in the rates `v` of the whole robot."""
         return tuple(tree.v_index[tree.joint_index(name)] for name in self.names)
 
-    def select(self, tree: KinematicTree, q: ArrayLike) -> FloatArray:
+    def select(self, tree: KinematicTree, q: Given) -> FloatArray:
         """(..., coordinates) of the path out of the whole robot's `q` (..., nq).
 
         Raises:
             InputError: `q` has another length than the robot's.
         """
-        whole = np.asarray(q, dtype=np.float64)
-        if whole.ndim == 0 or whole.shape[-1] != tree.nq:
-            raise InputError(
-                f"q of {tree.name} needs {tree.nq} values on its last axis", found=f"shape {whole.shape}"
-            )
-        return whole[..., list(self.q_index(tree))]
+        return numbers(tree, q, "q")[..., list(self.q_index(tree))]
 
 
-def coupling_of(joints: Sequence[tuple[str, Mimic | None]]) -> Coupling:
-    """The coupling of joints given as (name, whom it follows)."""
-    return Coupling(tuple(name for name, _ in joints), tuple(mimic for _, mimic in joints))
+def coupling_of(joints: Sequence[tuple[str, Mimic | None, JointKind]]) -> Coupling:
+    """The coupling of joints given as (name, whom it follows, how it moves)."""
+    names, mimics, kinds = zip(*joints, strict=True) if joints else ((), (), ())
+    return Coupling(names, mimics, kinds)

@@ -7,7 +7,7 @@ sibling joints by name), so that coordinates and rates can be exchanged with it 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from functools import cached_property
 from typing import Any
@@ -163,6 +163,7 @@ class KinematicTree:
         name: The robot's name.
         links: Link names; `links[0]` is the root and `links[i + 1]` the child of `joints[i]`.
         joints: Every joint, fixed ones too; a joint's parent link always stands before its child link.
+        poses: Named poses: a value for each of some joints. Nothing of the motion.
 
     Raises:
         InputError: when the order, a name or a mimic leader breaks these rules.
@@ -171,6 +172,7 @@ class KinematicTree:
     name: str
     links: tuple[str, ...]
     joints: tuple[Joint, ...]
+    poses: Mapping[str, Mapping[str, float]] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         if len(self.links) != len(self.joints) + 1:
@@ -374,6 +376,13 @@ def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree
     """The tree with the tilts of some joints, by name: see `Joint.tilt`."""
     joints = (replace(joint, tilt=tilts.get(joint.name, 0.0)) for joint in tree.joints)
     return KinematicTree(tree.name, tree.links, tuple(joints))
+
+
+def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
+    """The tree with named poses; what they say of joints that have no single coordinate in it is left out."""
+    own = {joint.name for joint in tree.joints if joint.nq == 1}
+    kept = {pose: {name: x for name, x in of.items() if name in own} for pose, of in poses.items()}
+    return replace(tree, poses=kept)
 
 
 def freed(tree: KinematicTree) -> KinematicTree:

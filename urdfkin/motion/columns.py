@@ -10,9 +10,7 @@ import numpy as np
 from urdfkin.errors import InputError
 from urdfkin.errors.numerals import decimal, remedy
 from urdfkin.kinematics.inputs import FloatArray
-
-#: How many names a message lists.
-_LISTED = 8
+from urdfkin.model.given import listed, wrong_count
 
 
 def read_columns(
@@ -70,12 +68,7 @@ def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[floa
         InputError: another count, or a cell that is no finite number.
     """
     if len(cells) != len(names):
-        without = f", none for {_listed(names[len(cells) :])}" if len(cells) < len(names) else ""
-        raise InputError(
-            f"{len(names)} numbers are expected ({_listed(names) or 'none: nothing moves'})",
-            where=where,
-            found=f"{len(cells)}{without}",
-        )
+        raise wrong_count(names, len(cells), where)
     values = []
     for name, cell in zip(names, cells, strict=True):
         if (value := decimal(cell)) is None:
@@ -112,15 +105,10 @@ def _check_names(
         "twice there": sorted({name for name in names if names.count(name) > 1}),
     }
     if any(wrong.values()):
-        also = f", and if wanted {_listed(optional)}" if optional else ""
+        also = f", and if wanted {listed(optional)}" if optional else ""
         raise InputError(
             f"the first line must name the columns of {what}",
             where=where,
-            found="; ".join(f"{word}: {_listed(found)}" for word, found in wrong.items() if found),
-            remedy=f"name them {_listed(required)}{also}",
+            found="; ".join(f"{word}: {listed(found)}" for word, found in wrong.items() if found),
+            remedy=f"name them {listed(required)}{also}",
         )
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
-    return ", ".join(map(str, names[:_LISTED])) + more

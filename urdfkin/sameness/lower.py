@@ -15,11 +15,11 @@ import numpy as np
 from urdfkin.kinematics.roundings import EPS, FOLLOWER
 from urdfkin.model.chain import inverse
 from urdfkin.model.configuration import neutral
+from urdfkin.model.ranges import WIDEST
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.sameness.alignment import Alignment, FramePair
 from urdfkin.sameness.variables import Line, Variables
-from urdfkin.verify.sampling import WIDEST
 
 SAMPLES, STARTS, ALONG = 512, 4, 13
 #: Frames that climb in one batch.

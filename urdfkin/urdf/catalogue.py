@@ -21,6 +21,7 @@ class Entry:
         limbs: (base frame, tip frame) of each arm, leg or finger; the first one's are the defaults.
         mimic: Whether its mimic joints can be followed.
         reason: Why not.
+        poses: Named poses: a value (rad, m) for each of some joints; the others are at 0.
         own: Whether it is one of urdfkin's own robots, not of example-robot-data.
     """
 
@@ -30,6 +31,7 @@ class Entry:
     limbs: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     mimic: bool = True
     reason: str | None = None
+    poses: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     own: bool = False
 
     @property
@@ -73,6 +75,7 @@ def _read(file: str, *, own: bool) -> dict[str, Entry]:
             limbs={limb: (base, tip) for limb, (base, tip) in row.get("limbs", {}).items()},
             mimic=row.get("mimic", True),
             reason=row.get("reason"),
+            poses=row.get("poses", {}),
             own=own,
         )
         for name, row in table.items()

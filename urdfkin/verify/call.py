@@ -14,7 +14,8 @@ from urdfkin.compiled.plan import IntArray, Plan
 from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.errors.demands import shown
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
-from urdfkin.model.configuration import checked, shaped
+from urdfkin.model.configuration import checked, numbers, shaped
+from urdfkin.model.given import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.asked import Question, Rows
@@ -53,7 +54,7 @@ class Call:
         frame: The name of a link or joint, or several.
         reference: A member or its name.
         base: How the root link moves; None if it stands still.
-        inputs: q, v and a, as far as the quantity needs them.
+        given: q, v and a, as far as the quantity needs them.
         also: Frames that the walk meets besides, after the others; they are no results.
         options: What else the call was given, by the method's names for it.
 
@@ -69,22 +70,27 @@ class Call:
         frame: str | Sequence[str],
         reference: Reference | str,
         base: BaseMotion | None,
-        inputs: Sequence[ArrayLike],
+        given: Sequence[Given],
         also: Sequence[str] = (),
         **options: object,
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
             raise InputError("base is a BaseMotion or None", found=type(base).__name__)
+        # By name they are told from the tree, whose names and order the oracle compares with its own.
+        inputs: list[ArrayLike] = [
+            numbers(tree, x, name) if isinstance(x, Mapping | str) else x
+            for x, name in zip(given, "qva", strict=False)
+        ]
         self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
         self.several, self.frames = _frames(frame)
         self.question = Question(frame, reference, base, inputs)
         self.reference = Reference.of(reference)
         self.links = tuple(tree.frame_link(name) for name in self.frames)
         self.plan = plan((*self.links, *(tree.frame_link(name) for name in also)))
-        given = [shaped(tree, x, name) for x, name in zip(inputs, "qva", strict=False)]
-        self.shape = self._batch_shape(given)
+        arrays = [shaped(tree, x, name) for x, name in zip(inputs, "qva", strict=False)]
+        self.shape = self._batch_shape(arrays)
         self.n = math.prod(self.shape)
-        flat = [self._flat_input(array) for array in given]
+        flat = [self._flat_input(array) for array in arrays]
         self.q, *self.rates = flat
         self.state = STILL_STATE if base is None else base.state(self.shape)
 

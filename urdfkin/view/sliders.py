@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from urdfkin.model.tree import FloatArray, Joint
-from urdfkin.motion.columns import numbers
 from urdfkin.robot import Robot
 
 #: Limits further apart than this are those of wheels: as good as none.
@@ -167,15 +166,5 @@ def within_limits(robot: Robot, q: FloatArray) -> FloatArray:
 
 
 def written(values: FloatArray) -> str:
-    """Numbers as `--q` takes them and `read` reads them back, to the last bit."""
+    """Numbers as `--q` and `set_q` take them, to the last bit."""
     return ",".join(repr(float(value)) for value in values)
-
-
-def read(text: str, names: tuple[str, ...]) -> FloatArray:
-    """What `written` wrote, or somebody typed.
-
-    Raises:
-        InputError: another count of numbers, or something that is none.
-    """
-    cells = [cell.strip() for cell in text.strip().strip("[]()").split(",")] if text.strip() else []
-    return np.array(numbers(cells, "q", names), dtype=np.float64)

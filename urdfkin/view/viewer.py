@@ -6,19 +6,19 @@ import threading
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.printable import markdown_text
 from urdfkin.model.configuration import checked
+from urdfkin.model.given import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.robot import Robot
 from urdfkin.view.overlays import acceleration_arrows, jacobian_arrows, velocity_ellipsoid
 from urdfkin.view.readings import legend, numbers
-from urdfkin.view.sliders import Sliders, coordinate_rows, rate_rows, read, within_limits, written
+from urdfkin.view.sliders import Sliders, coordinate_rows, rate_rows, within_limits, written
 from urdfkin.view.stage import NAMES, SEE_THROUGH, SHAPES, SOLID, Stage
 
 _REFERENCES = tuple(reference.name.lower() for reference in Reference)
@@ -39,7 +39,7 @@ class Viewer:
         motion: The chosen frame's motion in the chosen reference, checked.
     """
 
-    def __init__(self, server: Any, robot: Robot, q: ArrayLike | None = None) -> None:
+    def __init__(self, server: Any, robot: Robot, q: Given | None = None) -> None:
         self.server, self.robot = server, robot
         self.stage = Stage(server, robot)
         self._start = within_limits(robot, robot.neutral())
@@ -63,7 +63,9 @@ class Viewer:
         self.sliders = Sliders(gui, joints, coordinate_rows(robot), "", self._move)
         self.sliders.build(self.q, degrees=False)
         with joints:
-            self.words_of_q = gui.add_text("q, to copy or type", "", hint="In rad and m, as --q takes it.")
+            self.words_of_q = gui.add_text(
+                "q, to copy or type", "", hint="As --q takes it: 0.5, 30deg, ready, ready,elbow=30deg."
+            )
             self.wrong = gui.add_markdown("")
             neutral, random = gui.add_button("neutral, within the limits"), gui.add_button("random")
         with gui.add_folder("Frame"):
@@ -135,7 +137,7 @@ class Viewer:
             self.a[at] = value
             self.update()
 
-    def set_q(self, q: ArrayLike) -> None:
+    def set_q(self, q: Given) -> None:
         """Put the robot into a configuration and every slider with it.
 
         Raises:
@@ -165,8 +167,7 @@ class Viewer:
             return
         with self._lock:
             try:
-                q = read(self.words_of_q.value, self.robot.coordinate_names)
-                self.q = checked(self.robot.tree, q, "q").copy()
+                self.q = checked(self.robot.tree, self.words_of_q.value, "q").copy()
             except UrdfkinError as error:
                 self.wrong.content = markdown_text(str(error))
                 return

@@ -19,6 +19,7 @@ from urdfkin.errors.demands import whole_number, word
 from urdfkin.kinematics.inputs import floats
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import checked
+from urdfkin.model.given import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, frozen
 from urdfkin.verify.call import Call
@@ -136,7 +137,7 @@ class Enclosures:
 def enclose(
     verifier: Verifier,
     plan_of: Callable[[Sequence[int]], Plan],
-    inputs: tuple[ArrayLike, ArrayLike, ArrayLike],
+    inputs: tuple[Given, Given, Given],
     frame: str,
     reference: Reference | str,
     base: BaseMotion | None,

@@ -1,0 +1,209 @@
+"""q, v and a as people give them: each way of writing means the same numbers, or is refused."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import urdfkin
+from tests.robots.odd_urdfs import urdf_of
+from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
+from urdfkin.errors.measured import in_radians, measured
+from urdfkin.model.configuration import places
+from urdfkin.robot import Robot
+
+ARM = (
+    '<robot name="arm"><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/>'
+    '<joint name="lift" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    '<limit lower="0" upper="0.5" effort="1" velocity="1"/></joint>'
+    '<joint name="shoulder" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>'
+    '<limit lower="-3.14" upper="3.14" effort="1" velocity="1"/></joint>'
+    '<joint name="elbow" type="revolute"><parent link="c"/><child link="d"/><axis xyz="0 1 0"/>'
+    '<limit lower="0.5" upper="1.5" effort="1" velocity="1"/></joint>'
+    '<joint name="echo" type="revolute"><parent link="d"/><child link="e"/><axis xyz="0 1 0"/>'
+    '<mimic joint="elbow"/><limit lower="-1" upper="1.25" effort="1" velocity="1"/></joint></robot>'
+)
+Q = [0.005, math.pi / 6, math.pi / 2]
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    return urdfkin.load(ARM, verify=False)
+
+
+def q_of(robot: Robot, text: Any) -> list[float]:
+    return places(robot.tree, "q").read(text).tolist()  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0.005,30deg,pi/2", "0.005 0.5235987755982988 90°", "[5mm, 30 deg, 90 degrees]", "(5 mm 30 deg π/2)",
+        "lift=5mm, shoulder=30deg, elbow=pi/2", "elbow = pi / 2 lift=0.005 shoulder=30 deg",
+        "neutral, elbow=90deg, shoulder=pi/6, lift=.5e-2", " ready,lift=5mm,shoulder=30deg,elbow=0.5*pi,",
+        {"lift": 0.005, "shoulder": "30deg", "elbow": np.pi / 2},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_every_way_of_writing_means_the_same_numbers_to_the_bit(text: Any, arm: Robot) -> None:
+    assert q_of(arm, text) == Q
+    np.testing.assert_array_equal(arm.jacobian(text, "e"), arm.jacobian(Q, "e"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0,0", "q: 3 numbers are expected (lift, shoulder, elbow): found 2, none for elbow"),
+        ("0,0,0,0", "Pinocchio's q has that length: robot.from_pinocchio(q, mimic=False) gives urdfkin's"),
+        ("0,0,0,0", "load with mimic=False"),
+        ("shoulder=1,lift=0", "q: no value for elbow; name it too, or begin with a pose"),
+        ("elbo=1,shoulder=1,lift=0", "unknown coordinate 'elbo'; did you mean elbow?"),
+        ("echo=1,elbow=1,shoulder=1,lift=0", "'echo' is no coordinate; it follows elbow: give that"),
+        ("elbow=1,elbow=2,shoulder=1,lift=0", "found 'elbow' twice"),
+        ("0.1,shoulder=1,elbow=1", "q: unknown pose '0.1'"),
+        ("neutral,0,0", "q, lift: not a finite number: found 'neutral'"),
+        ("0,0,5mm", "q, elbow: a unit that does not fit: found '5mm'; it is in rad or deg"),
+        ("pi,0,0", "q, lift: a unit that does not fit: found 'pi'; it is in m or mm"),
+        ("0,0,1 deg/s", "q, elbow: a unit that does not fit"),
+        ("0,0,1-2", "q, elbow: not a finite number: found '1-2'"),
+        ("0,0,1/0", "q, elbow: not a finite number"),
+        ("0,0,30dge", "q, elbow: not a finite number: found '30dge'; write 0.5, 30deg, pi/2 or 5mm"),
+        ("rady", "q: unknown pose 'rady'; did you mean ready"),
+        ({}, "q: no value for lift, shoulder, elbow"),
+        ({"lift": [0.0, 1.0], "shoulder": [0.0] * 3, "elbow": 0}, "q: batches of different shapes"),
+        ({1: 0.0}, "q: a coordinate is called by its name: found 1"),
+        ({"lift": None, "shoulder": 0, "elbow": 0}, "q, lift must be real numbers: found None"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_meant_is_refused_with_its_place_and_a_remedy(
+    text: Any, message: str, arm: Robot
+) -> None:
+    with pytest.raises(UrdfkinError) as error:
+        arm.placement(text, "e")
+    assert message in str(error.value)
+
+
+def test_a_mapping_may_hold_batches_which_broadcast(arm: Robot) -> None:
+    bend = np.linspace(0.5, 1.5, 7)
+    q = np.stack([np.full(7, 0.1), np.zeros(7), bend], axis=-1)
+    found = arm.placement({"elbow": bend, "lift": 0.1, "shoulder": "0"}, "e")
+    np.testing.assert_array_equal(found, arm.placement(q, "e"))
+
+
+def test_rates_take_their_unit_with_the_seconds_or_without(arm: Robot) -> None:
+    v, a = [0.0, math.pi / 6, 0.1], [0.0, 0.0, math.pi]
+    for rate, second in (("30deg/s", "180 deg/s^2"), ("30deg", "pi rad/s²")):
+        found = arm.acceleration(
+            "ready", f"neutral,shoulder={rate},elbow=0.1", f"neutral,elbow={second}", "e"
+        )
+        np.testing.assert_array_equal(found, arm.acceleration("ready", v, a, "e"))
+    with pytest.raises(InputError, match="v, elbow: a unit that does not fit: found '1 rad/s"):
+        arm.velocity("ready", "neutral,elbow=1 rad/s^2", "e")
+
+
+def test_what_looks_like_degrees_is_asked_about_where_the_limits_allow_it(arm: Robot) -> None:
+    def of_shoulder(value: float) -> str:
+        return next((line for line in arm.limit_violations([0.0, value, 1.0]) if "shoulder" in line), "")
+
+    assert of_shoulder(30.0) == "joint shoulder: 30 is outside [-3.14, 3.14]; degrees? write 30deg"
+    assert of_shoulder(-90.0).endswith("degrees? write -90deg")
+    assert of_shoulder(4.0) == "joint shoulder: 4 is outside [-3.14, 3.14]"
+    assert "degrees" not in of_shoulder(200.0), "they would be outside, too"
+    assert "degrees" not in of_shoulder(math.radians(400.0)), "nobody types that"
+    assert "degrees" not in " ".join(arm.limit_violations([30.0, 0.0, 1.0])), "metres"
+
+
+def test_ready_lies_within_the_limits_of_followers_too(arm: Robot) -> None:
+    assert arm.limit_violations("neutral") != []
+    assert arm.limit_violations("ready") == []
+    assert arm.poses["ready"].tolist() == [0.0, 0.0, pytest.approx((0.5 + 1.25) / 2)]
+
+
+def test_the_numbers_of_a_joint_with_several_go_by_name_or_together() -> None:
+    robot = urdfkin.load(ARM, root_joint="floating", verify=False)
+    place = [0.1, 0.2, 0.3, 0.0, 0.0, 1.0, 0.0]
+    q = robot.neutral()
+    q[:7], q[-1] = place, 1.0
+    expected = robot.placement(q, "e")
+    by_name = (
+        "neutral,root_joint.x=100mm,root_joint.y=.2,root_joint.z=.3,root_joint.qz=1,root_joint.qw=0,elbow=1"
+    )
+    np.testing.assert_array_equal(robot.placement(by_name, "e"), expected)
+    together: dict[str, Any] = {"root_joint": place, "elbow": 1.0, "shoulder": 0.0, "lift": 0.0}
+    np.testing.assert_array_equal(robot.placement(together, "e"), expected)
+    with pytest.raises(InputError, match=r"root_joint: 7 numbers are expected \(root_joint.x, .*found 3"):
+        robot.placement({**together, "root_joint": place[:3]}, "e")
+
+
+def test_a_q_of_pinocchios_length_is_told_what_makes_it_one_of_ours() -> None:
+    with pytest.warns(urdfkin.UrdfWarning, match="URDF"):
+        robot = urdfkin.load(ARM.replace('"revolute"', '"continuous"'), verify=False)
+    for length, word in ((5, "mimic=True"), (7, "mimic=False")):
+        with pytest.raises(InputError, match=rf"robot.from_pinocchio\(q, {word}\)"):
+            robot.placement(np.zeros(length), "e")
+    for call in (robot.velocity, robot.jacobian_rate):
+        with pytest.raises(InputError, match="Pinocchio's v has that length: mimic joints follow"):
+            call(robot.neutral(), np.zeros(4), "e")
+    with pytest.raises(InputError, match=r"mimic=True is for one of buildModelFromUrdf\(..., mimic=True\)"):
+        robot.from_pinocchio(np.zeros(5))
+
+
+def test_a_prepared_frame_and_a_table_take_them_too(arm: Robot) -> None:
+    text = "lift=5mm, shoulder=30deg, elbow=pi/2"
+    fast = arm.prepare("e")
+    for _ in range(2):  # before a kernel was made, and after
+        np.testing.assert_array_equal(fast.jacobian(text), arm.jacobian(Q, "e"))
+        fast.jacobian(np.array(Q))
+    table = arm.dh("e", verify=False)
+    np.testing.assert_array_equal(table.placement(text), table.placement(Q))
+    with pytest.raises(InputError, match="no value for lift, shoulder"):
+        table.placement({"elbow": 1.0})
+    with pytest.raises(InputError, match="lift: a unit that does not fit"):
+        table.placement("lift=5deg, shoulder=0, elbow=0")
+
+
+def test_no_moving_joint_takes_no_number() -> None:
+    robot = urdfkin.load(urdf_of("fixed_only"), verify=False)
+    nothings: list[Any] = ["", "[]", "neutral", "ready", {}]
+    for nothing in nothings:
+        assert q_of(robot, nothing) == []
+    with pytest.raises(InputError, match="none: nothing moves"):
+        q_of(robot, "0")
+
+
+@given(st.floats(-1e6, 1e6), st.sampled_from(["", "rad", " deg", "°", "m", " mm"]))
+@settings(max_examples=200)
+def test_a_printed_number_is_read_back_in_its_unit(value: float, unit: str) -> None:
+    found = measured(f"{value!r}{unit}")
+    assert found is not None
+    scaled = {"deg": in_radians(value), "°": in_radians(value), "mm": value / 1000.0}.get(unit.strip(), value)
+    assert found.value == scaled
+
+
+@given(st.text(max_size=30) | st.from_regex(r"[0-9.eEpi*/+ deg°πms^-]{0,30}", fullmatch=True))
+@settings(max_examples=400)
+def test_any_text_is_finite_numbers_or_an_error_of_our_own(text: str) -> None:
+    found = measured(text)
+    assert found is None or math.isfinite(found.value)
+    robot = urdfkin.load("one_link", verify=False)
+    with contextlib.suppress(UrdfkinError):
+        assert np.isfinite(places(robot.tree, "q").read(text)).all()
+
+
+def test_a_text_of_any_length_is_refused_at_once(arm: Robot) -> None:
+    for text in (
+        " " * 200_000 + "1",
+        "1 " * 50_000,
+        "pi*" * 50_000,
+        "=" * 100_000,
+        "x" * 100_000,
+        "9" * 100_000,
+    ):
+        with pytest.raises((InputError, UnknownNameError)):
+            q_of(arm, text)
