@@ -12,6 +12,9 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from urdfkin.system.asking import answer
+from urdfkin.system.later import later
+
 if TYPE_CHECKING:
     from urdfkin.dh import DHRow, DHTable, read_table, table_from_rows
     from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.sameness.changes import diff
     from urdfkin.sameness.judging import same
+    from urdfkin.urdf.catalogue import robots
     from urdfkin.validation.campaign import validate
     from urdfkin.verify.certificate import Certificate, VerificationError
     from urdfkin.verify.tables import TableError
@@ -51,10 +55,17 @@ _HOMES = {
     "diff": "urdfkin.sameness.changes",
     "load": "urdfkin.loading",
     "read_table": "urdfkin.dh",
+    "robots": "urdfkin.urdf.catalogue",
     "same": "urdfkin.sameness.judging",
     "table_from_rows": "urdfkin.dh",
     "validate": "urdfkin.validation.campaign",
 }
+
+# What an object is asked to show and a higher room draws: no room imports what stands above it.
+answer("a table in a form", later("urdfkin.dh.export:export"))
+answer("a report as a page", later("urdfkin.report.html:as_html"))
+answer("a report as a comment", later("urdfkin.report.markdown:as_markdown"))
+answer("a robot in a cell", later("urdfkin.report.cell:Cell"))
 
 __all__ = [
     "BaseMotion",
@@ -78,6 +89,7 @@ __all__ = [
     "diff",
     "load",
     "read_table",
+    "robots",
     "same",
     "table_from_rows",
     "validate",

@@ -24,20 +24,23 @@ from urdfkin.dh.table import DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
 from urdfkin.errors.demands import choice, real_number, shown, switch, whole_number, word, words
+from urdfkin.errors.showing import Sheet, Shown
 from urdfkin.export import QUANTITIES as EXPORTED
 from urdfkin.kinematics.bodies.frames import seen_from
 from urdfkin.kinematics.bodies.representation import QUATERNION
 from urdfkin.kinematics.inputs import scalars, vectors
 from urdfkin.kinematics.rotation.euler_rates import NEAREST
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.lint import Finding
-from urdfkin.model import configuration
+from urdfkin.lint.finding import Finding, Findings
+from urdfkin.model import configuration, steps
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.described import described
 from urdfkin.model.frame_names import LinkFrame
-from urdfkin.model.given import Given
+from urdfkin.model.given import Given, listed
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.model.tree import FloatArray, Joint, KinematicTree
+from urdfkin.system.asking import ask
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.origin import Origin
 from urdfkin.verify.bounds import nearest_singularity
@@ -69,11 +72,13 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: m/s^2, as Pinocchio and MuJoCo have it.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
+#: Methods and attributes of a robot that are for the package's own parts.
+_INSIDE = {"plan", "verifier"}
 #: More than these no array can hold, on any machine.
 _MOST_NUMBERS = (2**63 - 1) // 8
 
 
-class Robot:
+class Robot(Shown):
     """A robot that was loaded; make one with `urdfkin.load`.
 
     Configurations `q` are (..., nq), rates `v` and `a` (..., nv), with any leading batch shape; the three
@@ -96,7 +101,7 @@ class Robot:
         origin: Origin,
         verify: Verify = True,
         mimic: bool = True,
-        findings: tuple[Finding, ...] = (),
+        findings: Sequence[Finding] = (),
         unverifiable: str | None = None,
         oracle: WitnessName = "pinocchio",
         base_frame: str | None = None,
@@ -106,9 +111,10 @@ class Robot:
         self.verifier = Verifier(
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
-        self.findings = findings
+        self.findings = Findings(findings)
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
+        self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], Plan] = {}
         self._prepared: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
@@ -120,6 +126,31 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>"
+
+    def __dir__(self) -> list[str]:
+        # What the package's own parts ask of a robot is not what people complete names for.
+        return [name for name in super().__dir__() if name not in _INSIDE]
+
+    def _sheet(self) -> Sheet:
+        return described(self.tree, self.base_frame, self.tip_frame)
+
+    def view(self, q: Given = "ready", *, height: int = 480) -> Any:
+        """The robot in three dimensions, with a slider for each joint, in a notebook's cell.
+
+        It needs no network and no server, is kept with the notebook, and moves in the browser by itself: what
+        it draws is for the eye, and not checked. `urdfkin view` checks as it moves.
+
+        Args:
+            q: (nq,) where it begins.
+            height: Of the cell, pixels.
+
+        Raises:
+            InputError: wrong length, a number that is not finite, a batch.
+        """
+        q_0 = configuration.checked(self.tree, q, "q")
+        if q_0.ndim != 1:
+            raise InputError("a view begins at one configuration", found=f"shape {q_0.shape}")
+        return ask("a robot in a cell")(self, q_0, whole_number(height, "height", 1, 10_000))
 
     # -- what it is ----------------------------------------------------------------------------------
 
@@ -219,6 +250,42 @@ class Robot:
             self._tip_frame = self.tree.frame_name(leaf)
         return self._tip_frame
 
+    def _default_frame(self) -> str:
+        """The tip, where there is no choice: the catalogue's, or the one leaf."""
+        if not self._has_one_tip:
+            leaves = [self.tree.frame_name(leaf) for leaf in self.tree.leaves()]
+            raise InputError(
+                "which frame? The robot ends in several",
+                where=self.name,
+                found=listed(leaves),
+                remedy=f"name one, such as robot.tip_frame, {self.tip_frame!r}",
+            )
+        return self.tip_frame
+
+    @property
+    def joints(self) -> dict[str, Joint]:
+        """Every joint by its name, fixed ones too, in Pinocchio's order: kind, axis, limit, mimic rule."""
+        return {joint.name: joint for joint in self.tree.joints}
+
+    @property
+    def frames(self) -> dict[str, str]:
+        """Every frame's name and the link that carries it: a joint's frame is its child link's."""
+        of = zip(self.tree.joints, self.tree.links[1:], strict=True)
+        return {joint.name: link for joint, link in of} | {link: link for link in self.tree.links}
+
+    @property
+    def limits(self) -> FloatArray:
+        """(2, nq) lower and upper bounds of `q`, rad and m; infinite where a joint has none.
+
+        They are the joints' own; `limit_violations` asks the followers' too.
+        """
+        return configuration.limits(self.tree)
+
+    @property
+    def velocity_limits(self) -> FloatArray:
+        """(nv,) the largest rates, rad/s and m/s; infinite where a joint has none."""
+        return configuration.velocity_limits(self.tree)
+
     def neutral(self) -> FloatArray:
         """(nq,) zeros, and the identity quaternion for floating joints."""
         return configuration.neutral(self.tree)
@@ -250,6 +317,44 @@ class Robot:
     def limit_violations(self, q: Given) -> list[str]:
         """One line for each joint that leaves its bounds somewhere in `q` (..., nq)."""
         return configuration.limit_violations(self.tree, configuration.checked(self.tree, q, "q"))
+
+    def integrate(self, q: Given, v: Given) -> FloatArray:
+        """(..., nq) where `q` gets to in a second at the rates `v`, as Pinocchio's `integrate`.
+
+        For a step of another duration give `v * seconds`. Quaternions stay of norm 1; angles of continuous
+        joints count turns.
+
+        Args:
+            q: (..., nq) rad, m.
+            v: (..., nv) rad/s, m/s; those of planar and floating joints in the moving frame.
+
+        Raises:
+            InputError: wrong length, a number that is not finite.
+
+        >>> import urdfkin
+        >>> a1 = urdfkin.load("a1", root_joint="floating", verify=False)
+        >>> q = a1.integrate("neutral", "neutral, root_joint.vx=1, root_joint.wz=180deg/s")
+        >>> q[:7].round(4).tolist()
+        [0.0, 0.6366, 0.0, 0.0, 0.0, 1.0, 0.0]
+        """
+        return steps.integrate(
+            self.tree, configuration.checked(self.tree, q, "q"), configuration.checked(self.tree, v, "v")
+        )
+
+    def difference(self, start: Given, end: Given) -> FloatArray:
+        """(..., nv) the rates that lead from one configuration to another in a second, the shortest way.
+
+        As Pinocchio's `difference`: `integrate(start, difference(start, end))` is where `end` is.
+
+        Args:
+            start: (..., nq) rad, m.
+            end: (..., nq).
+
+        Raises:
+            InputError: wrong length, a number that is not finite.
+        """
+        ends = (configuration.checked(self.tree, q, "q") for q in (start, end))
+        return steps.difference(self.tree, *ends)
 
     def to_pinocchio(self, q: Given, *, mimic: bool = False) -> FloatArray:
         """(..., nq) to the configuration of `pinocchio.buildModelFromUrdf(path, mimic=mimic)`."""
@@ -291,7 +396,7 @@ class Robot:
         self,
         name: str,
         inputs: Sequence[Given],
-        frame: str | Sequence[str],
+        frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
@@ -326,7 +431,7 @@ class Robot:
     def placement(
         self,
         q: Given,
-        frame: str | Sequence[str],
+        frame: str | Sequence[str] | None = None,
         *,
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
@@ -408,7 +513,7 @@ class Robot:
         self,
         q: Given,
         v: Given,
-        frame: str | Sequence[str],
+        frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
@@ -428,7 +533,7 @@ class Robot:
     def jacobian(
         self,
         q: Given,
-        frame: str | Sequence[str],
+        frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
@@ -452,7 +557,7 @@ class Robot:
         self,
         q: Given,
         v: Given,
-        frame: str | Sequence[str],
+        frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
@@ -472,7 +577,7 @@ class Robot:
     def hessian(
         self,
         q: Given,
-        frame: str | Sequence[str],
+        frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
@@ -507,7 +612,7 @@ class Robot:
         q: Given,
         v: Given,
         a: Given,
-        frame: str | Sequence[str],
+        frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
@@ -532,7 +637,7 @@ class Robot:
         q: Given,
         v: Given,
         a: Given,
-        frame: str | Sequence[str],
+        frame: str | Sequence[str] | None = None,
         *,
         gravity: ArrayLike = GRAVITY,
         base: BaseMotion | None = None,
@@ -578,7 +683,7 @@ class Robot:
     def singular_values(
         self,
         q: Given,
-        frame: str,
+        frame: str | None = None,
         rows: str = "all",
         *,
         base: BaseMotion | None = None,
@@ -613,6 +718,7 @@ class Robot:
         which = _ROWS.get(word(rows, "rows"))
         if which is None:
             raise InputError("rows are all, linear or angular", found=shown(rows))
+        frame = self._default_frame() if frame is None else frame
         J = self.jacobian(q, word(frame, "frame"), base=base, verify=verify, threads=threads)
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,))
         size = magnitudes(call.plan, call.q, None, None, call.state)
@@ -624,7 +730,7 @@ class Robot:
     def analytical_jacobian(
         self,
         q: Given,
-        frame: str | Sequence[str],
+        frame: str | Sequence[str] | None = None,
         representation: str = "ZYZ",
         *,
         nearest: float = NEAREST,
@@ -663,6 +769,7 @@ class Robot:
         """
         representation, nearest = word(representation, "representation"), real_number(nearest, "nearest")
         options: dict[str, Any] = {"representation": representation, "nearest": nearest}
+        frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,), **options)
         self.verifier.ready(verify)
         if self.verifier.wanted(verify):
@@ -697,7 +804,7 @@ class Robot:
         q: Given,
         v: Given,
         a: Given,
-        frame: str,
+        frame: str | None = None,
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
@@ -713,6 +820,7 @@ class Robot:
         Returns:
             The parts, with the caller's batch shape in front.
         """
+        frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, word(frame, "frame"), reference, base, (q, v, a))
         self.verifier.ready(verify)
         to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(KINDS), 6))
@@ -730,7 +838,7 @@ class Robot:
         q: Given,
         v: Given,
         a: Given,
-        frame: str,
+        frame: str | None = None,
         reference: Reference | str = _ALIGNED,
         *,
         base: BaseMotion | None = None,
@@ -767,14 +875,16 @@ class Robot:
         """
         from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  loads mpmath
 
+        frame = self._default_frame() if frame is None else frame
         return enclose(self.verifier, self.plan, (q, v, a), frame, reference, base, digits)
 
-    def prepare(self, frame: str, reference: Reference | str = _ALIGNED) -> PreparedFrame:
+    def prepare(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> PreparedFrame:
         """One frame in one reference, for one configuration after the other, without a check: see there.
 
         Raises:
             UnknownNameError: no such frame or reference.
         """
+        frame = self._default_frame() if frame is None else frame
         # The hash of an enumeration's member takes longer than the rest of this. With its type in the key,
         # 1, which is equal to a member, is not taken for it.
         # Nor is `LinkFrame("link:a")` the frame of a link that is called so.
@@ -790,7 +900,7 @@ class Robot:
             prepared = self._prepared[key] = PreparedFrame(self, frame, Reference.of(reference), plan)
         return prepared
 
-    def compiled(self, frame: str, reference: Reference | str = _ALIGNED) -> CompiledFrame:
+    def compiled(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
         """One frame compiled for this robot alone by the system's compiler, the fastest form: see there.
 
         Each quantity is compiled when it is first asked for, some seconds once on a machine, and held against
@@ -802,6 +912,7 @@ class Robot:
         """
         from urdfkin.export.compiled_frame import CompiledFrame  # noqa: PLC0415  seldom wanted
 
+        frame = self._default_frame() if frame is None else frame
         self.tree.frame_link(frame)
         key = type(frame), frame, Reference.of(reference)
         if (found := self._compiled.get(key)) is None:
@@ -1004,7 +1115,7 @@ class Robot:
         self,
         name: str,
         inputs: Sequence[Given],
-        frame: str | Sequence[str],
+        frame: str | Sequence[str] | None,
         reference: Reference | str,
         base: BaseMotion | None,
         out: FloatArray | None,
@@ -1013,6 +1124,7 @@ class Robot:
         **options: Any,
     ) -> FloatArray:
         row = QUANTITIES[name]
+        frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, reference, base, inputs, **options)
         to = call.flat(out, row.own_shape(self.nv))
         self.verifier.ready(verify)
@@ -1023,11 +1135,13 @@ class Robot:
         return result
 
     def _fast(
-        self, frame: str | Sequence[str], reference: Reference | str, verify: Verify | None
+        self, frame: str | Sequence[str] | None, reference: Reference | str, verify: Verify | None
     ) -> PreparedFrame | None:
         """The short way for a single configuration that nobody checks; None where it is not for this call."""
         if verify is not False and (verify is not None or self.verifier.policy is not False):
             return None
+        if frame is None:
+            frame = self._default_frame()
         if not isinstance(frame, str):
             return None
         if reference is _ALIGNED and type(frame) is str and (fast := self._prepared.get(frame)) is not None:

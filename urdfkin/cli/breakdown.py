@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,18 +44,6 @@ def emit_breakdown(
         say(check_line(certificate), err=True)
 
 
-def _rows(parts: AccelerationBreakdown, sample: int) -> Iterator[tuple[str, str, FloatArray]]:
-    """(joint, kind, six numbers) of one sample; parts that are exactly zero are left out."""
-    from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  keeps --help fast
-
-    if parts.base[sample].any():
-        yield "base", "moving base", parts.base[sample]
-    for j, joint in enumerate(parts.joints):
-        for k, kind in enumerate(KINDS):
-            if parts.terms[sample, j, k].any():
-                yield joint, kind, parts.terms[sample, j, k]
-
-
 def _print(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> None:
     out = console()
     out.print(f"{inputs.robot.name}: acceleration of {inputs.frame}, {reference}, by joint", style="bold")
@@ -65,7 +52,7 @@ def _print(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> None
         if len(parts.base) > 1:
             out.print(f"sample {k}")
         noise = 1e-15 * float(abs(parts.terms[k]).max(initial=0.0))
-        rows = [*_rows(parts, k), ("sum", "", parts.total[k])]
+        rows = [*parts.contributions((k,)), ("sum", "", parts.total[k])]
         cells = ((joint, kind, *_cells(six, noise)) for joint, kind, six in rows)
         print_named(out, _COLUMNS, cells, left=range(2))
     if len(parts.base) > _SHOWN:
@@ -108,7 +95,7 @@ def _as_csv(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> byt
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["sample", "joint", "kind", *SIX])
     for sample in range(len(parts.base)):
-        for joint, kind, six in _rows(parts, sample):
+        for joint, kind, six in parts.contributions((sample,)):
             writer.writerow([sample, csv_cell(joint), kind, *map(repr, six.tolist())])
         writer.writerow([sample, "sum", "", *map(repr, parts.total[sample].tolist())])
     return stream.getvalue().encode()

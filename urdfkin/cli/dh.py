@@ -17,12 +17,13 @@ from urdfkin.cli.reports import check_writable
 
 #: Forms of a table. They repeat `urdfkin.dh.export.FORMATS`, whose import --help does not need.
 FORMATS = (
-    *("terminal", "markdown", "latex", "csv", "json", "toml"),
+    *("terminal", "markdown", "html", "latex", "csv", "json", "toml"),
     *("numpy", "matlab", "matlab-rst", "roboticstoolbox", "c", "urdf", "svg"),
 )
 
 ENDINGS = {
-    ".txt": ("terminal",), ".md": ("markdown",), ".tex": ("latex",), ".csv": ("csv",), ".json": ("json",),
+    ".txt": ("terminal",), ".md": ("markdown",), ".html": ("html",), ".tex": ("latex",), ".csv": ("csv",),
+    ".json": ("json",),
     ".toml": ("toml",), ".py": ("numpy", "roboticstoolbox"), ".m": ("matlab", "matlab-rst"), ".c": ("c",),
     ".h": ("c",), ".urdf": ("urdf",), ".svg": ("svg",),
 }  # fmt: skip
@@ -124,7 +125,7 @@ _UNITS = ("degrees", "millimetres", "digits", "columns")
 def _refuse_idle(context: click.Context, is_table: bool, options: dict[str, Any]) -> None:
     """Which options do nothing beside which others."""
     compares, tree, form = options["compare"] is not None, options["tree"], options["format_"]
-    written = ("terminal", "markdown") if tree or compares else ("terminal", "markdown", "latex")
+    written = ("terminal", "markdown") if tree or compares else ("terminal", "markdown", "html", "latex")
     for idle, where, because in (
         (("tolerance", "fit"), not compares, "without --compare"),
         ((*_CHOICES, "verify"), compares, "with --compare"),

@@ -18,7 +18,8 @@ its own angular velocity, under coriolis.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -29,6 +30,7 @@ from urdfkin.compiled.batch import in_parts
 from urdfkin.compiled.evaluate import placements, velocities
 from urdfkin.compiled.plan import Plan, make_plan
 from urdfkin.errors import NotFiniteError, RangeError
+from urdfkin.errors.showing import Sheet, Shown, Table
 from urdfkin.kinematics.arrays import chapter as eq
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
@@ -38,8 +40,12 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 KINDS = ("transverse", "centripetal", "coriolis", "sliding")
 
 
-@dataclass(frozen=True, eq=False)
-class AccelerationBreakdown:
+#: How many samples of a batch are shown.
+_SHOWN = 2
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AccelerationBreakdown(Shown):
     """A frame's acceleration as a sum over joints and kinds.
 
     Attributes:
@@ -51,6 +57,30 @@ class AccelerationBreakdown:
     joints: tuple[str, ...]
     base: FloatArray
     terms: FloatArray
+
+    def __repr__(self) -> str:
+        return f"<AccelerationBreakdown of {len(self.joints)} joints, batch {self.base.shape[:-1]}>"
+
+    def contributions(self, sample: tuple[int, ...] = ()) -> Iterator[tuple[str, str, FloatArray]]:
+        """(joint, kind, six numbers) of one sample; what is exactly zero is left out."""
+        if self.base[sample].any():
+            yield "base", "moving base", self.base[sample]
+        for j, joint in enumerate(self.joints):
+            for k, kind in enumerate(KINDS):
+                if self.terms[(*sample, j, k)].any():
+                    yield joint, kind, self.terms[(*sample, j, k)]
+
+    def _sheet(self) -> Sheet:
+        heads = ("joint", "kind", "lin x", "lin y", "lin z", "ang x", "ang y", "ang z")
+        batch = self.base.shape[:-1]
+        parts: list[str | Table] = ["m/s^2 and rad/s^2; the parts sum to the acceleration (7.125, 7.130)."]
+        for sample in list(np.ndindex(*batch))[:_SHOWN]:
+            parts += [f"sample {list(sample)}"] if sample else []
+            rows = [(joint, kind, *six.tolist()) for joint, kind, six in self.contributions(sample)]
+            parts.append(Table(heads, [*rows, ("sum", "", *self.total[sample].tolist())], left=2))
+        if (more := math.prod(batch) - _SHOWN) > 0:
+            parts.append(f"... and {more} more samples")
+        return Sheet("Acceleration by joint and kind", parts)
 
     @cached_property
     def total(self) -> FloatArray:

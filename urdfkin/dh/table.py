@@ -21,15 +21,18 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.row import Convention, DHRow, convention_of
 from urdfkin.dh.statement import SnapStatement
+from urdfkin.dh.units import Units, units_of
 from urdfkin.errors import InputError
+from urdfkin.errors.showing import Shown
 from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.coupling import Coupling, coupling_of
 from urdfkin.model.given import Given
 from urdfkin.model.tree import FloatArray, frozen
+from urdfkin.system.asking import ask
 
 
-@dataclass(frozen=True, eq=False)
-class DHTable:
+@dataclass(frozen=True, eq=False, repr=False)
+class DHTable(Shown):
     """A Denavit-Hartenberg table: data, and the products of its own matrices.
 
     `urdfkin.load` makes a robot of it; `urdfkin.dh` has its motion and its other forms.
@@ -69,6 +72,48 @@ class DHTable:
                 raise InputError(
                     "two rows name the same joint", where=f"table of {self.robot}", found=repr(name)
                 )
+
+    # -- how it shows itself -------------------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        ends = f"{self.base_frame} to {self.tip_frame}"
+        return f"<DHTable {self.robot}: {ends}, {len(self.rows)} rows, {self.convention}>"
+
+    def __str__(self) -> str:
+        return self._written("terminal", units_of())
+
+    def to_markdown(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
+        """The table in Markdown, for a README or an issue.
+
+        Args:
+            angles: "radians" (pi as a fraction where that is exact) or "degrees".
+            lengths: "metres" or "millimetres".
+            digits: Significant digits.
+
+        Raises:
+            InputError: no such unit.
+        """
+        return self._written("markdown", units_of(angles, lengths, digits))
+
+    def to_latex(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
+        """The table in LaTeX, for a paper; it needs booktabs and amsmath. Arguments as `to_markdown`."""
+        return self._written("latex", units_of(angles, lengths, digits))
+
+    def to_html(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
+        """The table in HTML, to stand in a page. Arguments as `to_markdown`."""
+        return self._written("html", units_of(angles, lengths, digits))
+
+    def _written(self, form: str, units: Units) -> str:
+        return str(ask("a table in a form")(self, form, units)).rstrip("\n")
+
+    def _repr_html_(self) -> str:
+        return self.to_html()
+
+    def _repr_markdown_(self) -> str:
+        return self.to_markdown()
+
+    def _repr_latex_(self) -> str:
+        return self.to_latex()
 
     # -- coordinates ---------------------------------------------------------------------------------
 

@@ -54,6 +54,18 @@ def markdown_code(name: str) -> str:
     return "`" + (printable(name).replace("`", r"\x60").replace("|", r"\x7c") or " ") + "`"
 
 
+_LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+}
+
+
+def latex_text(text: str) -> str:
+    """Text with LaTeX's special characters made harmless, on one line."""
+    return "".join(_LATEX.get(character, character) for character in printable(text))
+
+
 def json_text(data: Any) -> str:
     r"""JSON in ASCII, in which no log finds a command either; what reads it gets the names as they are.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from urdfkin.dh.export.latex import escaped
+from urdfkin.errors.printable import latex_text
 from urdfkin.export.code import Code, Writer
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
@@ -42,12 +42,12 @@ def write(code: Code, to: str = "latex") -> str:
         r"\allowdisplaybreaks",
         r"\begin{document}",
     ]
-    lines += [rf"\section*{{{escaped(code.robot)}, frame {escaped(code.frame)}}}", r"\begin{itemize}"]
+    lines += [rf"\section*{{{latex_text(code.robot)}, frame {latex_text(code.frame)}}}", r"\begin{itemize}"]
     lines += [r"\item In metres, radians and seconds."]
-    lines += [rf"\item joint {k + 1} of the path: {escaped(name)}" for k, name in enumerate(code.joints)]
-    lines += [rf"\item $q_{{{k + 1}}}$: {escaped(name)}" for k, name in enumerate(code.coordinates)]
+    lines += [rf"\item joint {k + 1} of the path: {latex_text(name)}" for k, name in enumerate(code.joints)]
+    lines += [rf"\item $q_{{{k + 1}}}$: {latex_text(name)}" for k, name in enumerate(code.coordinates)]
     lines += [
-        rf"\item $v_{{{k + 1}}}$, $a_{{{k + 1}}}$: {escaped(name)}" for k, name in enumerate(code.rates)
+        rf"\item $v_{{{k + 1}}}$, $a_{{{k + 1}}}$: {latex_text(name)}" for k, name in enumerate(code.rates)
     ]
     lines += [r"\end{itemize}"]
     for function in code.functions:
@@ -61,7 +61,7 @@ def _function(code: Code, function: Function) -> Iterator[str]:
     yield rf"\subsection*{{{function.quantity.title}, eq. {', '.join(function.quantity.equations)}}}"
     for head, lines in writer.statements():
         place, _, numbers = head.partition(": ")
-        yield rf"{escaped(place)}{f' ({numbers})' if numbers else ''}:"
+        yield rf"{latex_text(place)}{f' ({numbers})' if numbers else ''}:"
         yield from _aligned((word, value) for word, value in lines)
     width = (*function.shape, 1)[1]
     letter = _RESULTS[function.name]

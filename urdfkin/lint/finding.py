@@ -13,6 +13,7 @@ from typing import Any
 
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.printable import printable
+from urdfkin.errors.showing import Sheet, Shown, Table
 from urdfkin.lint.edits import Fix
 from urdfkin.lint.escape import shortened
 
@@ -122,6 +123,17 @@ class Finding:
         data["oracle"] = self.oracle.value if self.oracle else None
         data["also"] = list(self.also)
         return data
+
+
+class Findings(list[Finding], Shown):
+    """Findings about one file, by line: a list that shows itself."""
+
+    def _sheet(self) -> Sheet:
+        rows = [(f"{f.file}:{f.line}:{f.column}", f.code, f.severity.value, f.sentence) for f in self]
+        counts = {s: sum(f.count for f in self if f.severity is s) for s in Severity}
+        said = [f"{n} {s.value}{'s' if n > 1 else ''}" for s, n in counts.items() if n]
+        table = [Table(("place", "code", "severity", "what"), rows, left=4)] if rows else []
+        return Sheet(", ".join(said) or "no findings", table)
 
 
 def _lines(lines: tuple[int, ...], shown: int = 4) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from urdfkin.errors.demands import switch, word
-from urdfkin.lint.finding import Finding
+from urdfkin.lint.finding import Finding, Findings
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
 from urdfkin.lint.pages import CODES
 from urdfkin.lint.reporter import Reporter
@@ -42,7 +42,7 @@ def check(
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
     fold: bool = False,
-) -> list[Finding]:
+) -> Findings:
     """Findings about a URDF, by line, without computing anything.
 
     Besides what the text itself tells, packages and files that meshes are said to lie in are looked for; no
@@ -59,8 +59,9 @@ def check(
             hundredth of a kind on into that one.
 
     Returns:
-        The findings that no comment of the file silences; an empty list for a file nothing can be said
-        against. Of each kind 10,000 are written out; `also` of the last holds the lines of the others.
+        The findings that no comment of the file silences, a list that a notebook shows as a table; an empty one
+        for a file nothing can be said against. Of each kind 10,000 are written out; `also` of the last holds
+        the lines of the others.
 
     Raises:
         SourceError: the file cannot be read.
@@ -77,7 +78,7 @@ def check(
         word(root_joint, "root_joint")
     switch(fold, "fold")
     text = read_source(source, limits.bytes, xacro_args)
-    return list(examine(text, limits=limits, mimic=mimic, root_joint=root_joint, fold=fold).findings)
+    return Findings(examine(text, limits=limits, mimic=mimic, root_joint=root_joint, fold=fold).findings)
 
 
 @dataclass(frozen=True, slots=True)

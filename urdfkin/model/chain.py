@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from urdfkin.errors import InputError
+from urdfkin.errors.showing import Sheet, Shown, Table
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.model.coupling import Coupling, coupling_of
 from urdfkin.model.given import Given
@@ -43,8 +44,8 @@ class ChainJoint:
     mimic: Mimic | None = None
 
 
-@dataclass(frozen=True)
-class FrameChain:
+@dataclass(frozen=True, repr=False)
+class FrameChain(Shown):
     """The joints between two frames, base to tip.
 
     Placement:  T_base_tip(q) = A_0 M_1(q_1) A_1 M_2(q_2) ... M_n(q_n) A_n, with the constants A_{i-1} =
@@ -68,6 +69,31 @@ class FrameChain:
     T_last_tip: FloatArray
     lengths: FloatArray
     folded: tuple[int, ...]
+
+    def __repr__(self) -> str:
+        return f"<FrameChain {self.robot}: {self.base} to {self.tip}, {len(self.joints)} joints>"
+
+    def _sheet(self) -> Sheet:
+        heads = ("joint", "kind", "lower", "upper", "x", "y", "z", "axis x", "axis y", "axis z")
+        stand = zip(self.joints, self.origins().tolist(), self.axes().tolist(), strict=False)
+        rows = [
+            (
+                joint.name,
+                " ".join([joint.kind.value, *["backwards"] * joint.backwards, *_follows(joint)]),
+                *("" if joint.limit is None else f"{x:.6g}" for x in _bounds(joint.limit)),
+                *origin,
+                *axis,
+            )
+            for joint, origin, axis in stand
+        ]
+        x, y, z = (self.origins()[-1].round(12) + 0.0).tolist()
+        return Sheet(
+            f"{self.robot}: {self.base} to {self.tip}, {len(self.joints)} joints",
+            (
+                f"With every coordinate at 0, in {self.base} (m); the tip is at ({x:.6g}, {y:.6g}, {z:.6g}).",
+                Table(heads, rows, left=2),
+            ),
+        )
 
     @cached_property
     def coupling(self) -> Coupling:
@@ -122,6 +148,15 @@ class FrameChain:
     def interorigin(self, q: Given | None = None) -> FloatArray:
         """(..., n, 3) interorigin vectors d_{i-1,i} in the base, metres; the last leads to the tip."""
         return np.ascontiguousarray(np.diff(self.origins(q), axis=-2))
+
+
+def _follows(joint: ChainJoint) -> list[str]:
+    """Whom a joint follows, in words."""
+    return [f"= {joint.mimic}"] if joint.mimic else []
+
+
+def _bounds(limit: Limit | None) -> tuple[float, float]:
+    return (-math.inf, math.inf) if limit is None else (limit.lower, limit.upper)
 
 
 def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:

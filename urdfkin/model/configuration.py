@@ -17,7 +17,7 @@ from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, unit_quaternions
 from urdfkin.model.given import Given, Places
 from urdfkin.model.ranges import coordinate_ranges
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, frozen
 
 #: How far (rad or m) a follower's coordinate, or a (cos, sin) pair's norm, may be off in `from_pinocchio`.
 _FOLLOWS_TO = 1e-9
@@ -128,6 +128,24 @@ def poses(tree: KinematicTree) -> dict[str, FloatArray]:
             q[tree.q_index[tree.joint_index(name)]] = value
         found[pose] = q
     return found
+
+
+def limits(tree: KinematicTree) -> FloatArray:
+    """(2, nq) lower and upper bounds of each coordinate; infinite where there is none."""
+    found = np.tile([[-np.inf], [np.inf]], tree.nq)
+    for joint, at in zip(tree.joints, tree.q_index, strict=True):
+        if joint.nq == 1 and joint.limit is not None and joint.kind is not JointKind.CONTINUOUS:
+            found[:, at] = joint.limit.lower, joint.limit.upper
+    return frozen(found)
+
+
+def velocity_limits(tree: KinematicTree) -> FloatArray:
+    """(nv,) the largest rates; infinite where there is none."""
+    found = np.full(tree.nv, np.inf)
+    for joint, at in zip(tree.joints, tree.v_index, strict=True):
+        if joint.nv == 1 and joint.limit is not None:
+            found[at] = joint.limit.velocity
+    return frozen(found)
 
 
 def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:

@@ -103,6 +103,10 @@ class Mimic:
     multiplier: float
     offset: float
 
+    def __str__(self) -> str:
+        factor = {1.0: "", -1.0: "-"}.get(self.multiplier, f"{self.multiplier:g} ")
+        return f"{factor}{self.leader}" + (f" {self.offset:+g}" if self.offset else "")
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:

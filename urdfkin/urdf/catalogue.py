@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+from urdfkin.errors import UnknownNameError
+from urdfkin.errors.demands import word
 from urdfkin.system.resources import example_robots_dir, robots_dir
 
 
@@ -54,6 +56,24 @@ class Entry:
 def catalogue() -> Mapping[str, Entry]:
     """Every entry by name: example-robot-data's, then urdfkin's own."""
     return {**_read("catalogue.toml", own=False), **_read("own.toml", own=True)}
+
+
+def robots(family: str | None = None) -> tuple[str, ...]:
+    """Names that `load` knows.
+
+    Args:
+        family: Only those of one: arm, biped, gripper, hand, humanoid, quadruped, text, ...
+
+    Raises:
+        UnknownNameError: no such family.
+
+    >>> "panda" in robots("arm"), robots("text")
+    (True, ('one_link', 'planar_two_link', 'polar', 'elbow'))
+    """
+    families = {entry.family for entry in catalogue().values()}
+    if family is not None and family not in families:
+        raise UnknownNameError("family", word(family, "family"), families)
+    return tuple(name for name, entry in catalogue().items() if family in (None, entry.family))
 
 
 def examples() -> tuple[str, ...]:

@@ -13,6 +13,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from urdfkin.errors.showing import Sheet, Shown, Table
+from urdfkin.system.asking import ask
 from urdfkin.urdf.catalogue import examples
 from urdfkin.urdf.origin import Origin
 from urdfkin.validation.clock import Clock
@@ -160,7 +162,7 @@ def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> st
 
 
 @dataclass(frozen=True, slots=True)
-class ValidationReport:
+class ValidationReport(Shown):
     """A whole run.
 
     Attributes:
@@ -185,6 +187,27 @@ class ValidationReport:
     interrupted: bool = False
     made_by: dict[str, str] | None = None
     judgements: tuple[Judgement | None, ...] = ()
+
+    def to_html(self) -> str:
+        """The whole report as one page that opens offline, as `urdfkin validate --html` writes it."""
+        return str(ask("a report as a page")(self.as_dict()))
+
+    def to_markdown(self) -> str:
+        """The report as a pull request's comment, as `urdfkin validate --markdown` writes it."""
+        return str(ask("a report as a comment")(self.as_dict()))
+
+    def _sheet(self) -> Sheet:
+        heads = ("robot", "verdict", "results", "outside", "worst [eps*scale]", "of the bound")
+        rows = []
+        for robot in self.robots:
+            tallies = robot.tallies.values()
+            worst, share = (max((getattr(x, of) for x in tallies), default=0.0) for of in ("worst", "share"))
+            figures = (f"{worst:.2g}", f"{share:.1%}") if tallies else ("", "")
+            rows.append((robot.source, robot.verdict.value, str(robot.results), str(robot.failed), *figures))
+        verified = sum(robot.verdict is Verdict.VERIFIED for robot in self.robots)
+        samples = f"{self.samples} samples of each, seed {self.seed}, in {self.seconds:.1f} s."
+        reasons = [f"{robot.source}: {robot.reason}" for robot in self.robots if robot.reason]
+        return Sheet(f"{verified} of {self.asked} robots verified", (Table(heads, rows), samples, *reasons))
 
     @property
     def command(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.printable import json_text
+from urdfkin.errors.showing import Sheet, Shown, Table
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.files import at_home, write_file
 from urdfkin.system.forking import lock_over_forks
@@ -146,7 +147,7 @@ _HEAD = ("robot", "source", "reading", "sha256", "urdfkin", "oracle")
 
 
 @dataclass(frozen=True, slots=True)
-class Certificate:
+class Certificate(Shown):
     """What a robot's results so far are worth.
 
     Attributes:
@@ -196,6 +197,21 @@ class Certificate:
             SourceError: no permission, no such folder, no room.
         """
         write_file(at_home(path), (json_text(self.as_dict()) + "\n").encode())
+
+    def _sheet(self) -> Sheet:
+        heads = ("quantity", "checked", "not checked", "worst [eps*scale]", "of the bound")
+        rows = [
+            (x.quantity, str(x.checked), str(x.unchecked), f"{x.worst:.2g}", f"{x.share:.1%}")
+            for x in self.lines
+        ]
+        word = "verified" if self.verified else "NOT verified"
+        made = f"Computed by urdfkin {self.urdfkin} from {self.source} (sha256 {self.sha256})."
+        reasons = [f"Not verified: {reason}." for reason in self.not_verified]
+        read = [f"Read: {self.reading}."] if self.reading else []
+        return Sheet(
+            f"{self.robot}: {word} by {self.oracle}",
+            (Table(heads, rows), *reasons, *read, *([made] if self.sha256 else [])),
+        )
 
     def __str__(self) -> str:
         head = f"{self.robot}, checked by {self.oracle}"

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": ("urdfkin.dh.export.terminal", "aligned text"),
     "markdown": ("urdfkin.dh.export.markdown", "a Markdown table"),
+    "html": ("urdfkin.dh.export.html", "HTML, for a page or a notebook"),
     "latex": ("urdfkin.dh.export.latex", "a LaTeX table (booktabs)"),
     "csv": ("urdfkin.dh.export.csv", "comma-separated, read back by urdfkin"),
     "json": ("urdfkin.dh.export.json", "JSON, read back by urdfkin"),

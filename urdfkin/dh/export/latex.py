@@ -8,17 +8,12 @@ from urdfkin.dh.export.cells import at_most, cells, is_identity
 from urdfkin.dh.row import Convention
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Angles, Units
-from urdfkin.errors.printable import printable
+from urdfkin.errors.printable import latex_text
 from urdfkin.model.tree import FloatArray
 
 _FORMULA = {
     Convention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     Convention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
-}
-_SPECIAL = {c: f"\\{c}" for c in "&%$#_{}"} | {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
 }
 
 
@@ -40,7 +35,7 @@ def write(table: DHTable, units: Units) -> str:
     rows = []
     for i, row in enumerate(table.rows, 1):
         texts = [_math(text) for text in cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")]
-        rows.append([str(i), escaped(row.joint), *texts])
+        rows.append([str(i), latex_text(row.joint), *texts])
     lines = [
         r"\begin{table}",
         r"  \centering",
@@ -58,7 +53,7 @@ def write(table: DHTable, units: Units) -> str:
 
 
 def _caption(table: DHTable) -> str:
-    names = f"{escaped(table.robot)}, {escaped(table.base_frame)} to {escaped(table.tip_frame)}"
+    names = f"{latex_text(table.robot)}, {latex_text(table.base_frame)} to {latex_text(table.tip_frame)}"
     product = _FORMULA[table.convention]
     if table.has_hayati_rows:
         product = product.replace(r"R_x(\alpha_i)", r"R_x(\alpha_i)\,R_y(\beta_i)")
@@ -87,8 +82,3 @@ def _math(text: str) -> str:
 
 def _plain(text: str) -> str:
     return re.sub(r"e([+-])0*(\d+)", lambda m: rf"\cdot 10^{{{'-' if m[1] == '-' else ''}{m[2]}}}", text)
-
-
-def escaped(text: str) -> str:
-    """Text with LaTeX's special characters made harmless, on one line."""
-    return "".join(_SPECIAL.get(character, character) for character in printable(text))

@@ -9,11 +9,10 @@ import numpy as np
 
 from urdfkin.dh.export.cells import pose_lines
 from urdfkin.dh.export.code import identifier, numbers, plain
-from urdfkin.dh.export.latex import escaped
 from urdfkin.dh.export.matlab import matrix
 from urdfkin.dh.export.terminal import aligned
 from urdfkin.dh.screws import Screws
-from urdfkin.errors.printable import printable
+from urdfkin.errors.printable import latex_text, printable
 from urdfkin.model.tree import FloatArray
 
 FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
@@ -48,7 +47,7 @@ def _latex(screws: Screws, digits: int) -> str:
         return r" \\ ".join(" & ".join(f"{_clean(x):.{min(digits, 6)}g}" for x in row) for row in values)
 
     home = rf"\begin{{bmatrix}}{rows(screws.M)}\end{{bmatrix}}"
-    names = f"{escaped(screws.robot)}, {escaped(screws.base_frame)} to {escaped(screws.tip_frame)}"
+    names = f"{latex_text(screws.robot)}, {latex_text(screws.base_frame)} to {latex_text(screws.tip_frame)}"
     heads = r"$i$ & joint & $\omega_x$ & $\omega_y$ & $\omega_z$ & $v_x$ & $v_y$ & $v_z$ \\"
     lines = [r"\begin{table}", r"  \centering"]
     home = rf"\begin{{bmatrix}}{rows(screws.M)}\end{{bmatrix}}"
@@ -56,7 +55,7 @@ def _latex(screws: Screws, digits: int) -> str:
     lines += [r"  \begin{tabular}{rlrrrrrr}", r"    \toprule", f"    {heads}", r"    \midrule"]
     for i, (joint, row) in enumerate(zip(screws.joints, screws.space, strict=True), 1):
         lines.append(
-            f"    {i} & {escaped(joint.name)} & "
+            f"    {i} & {latex_text(joint.name)} & "
             + rows(row[None]).replace(" & ", "$ & $").join("$$")
             + r" \\"
         )

@@ -46,6 +46,7 @@
       }));
       this.q = new Array(data.nq).fill(0);
       this.poses = data.links.map(() => new THREE.Matrix4());
+      this.start = data.start;
       this.neutral();
     }
     neutral() {
@@ -406,7 +407,9 @@
         }
       }
       if (!this.sliders.length) box.textContent = "No joint moves.";
-      this.neutral();
+      if (!this.robot.start) return this.neutral();
+      this.robot.q = [...this.robot.start];
+      this.setSliders();
     }
     slider(box, joint, name, at, [min, max], isAngle) {
       const label = document.createElement("label"), words = document.createElement("span"), output = document.createElement("output");

@@ -1,0 +1,218 @@
+"""Objects show themselves: by print, in notebooks, Markdown and LaTeX, whatever names a file brings."""
+
+from __future__ import annotations
+
+import html
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from html.parser import HTMLParser
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.attacks.hostile import NAMES
+from urdfkin.dh.export import export
+from urdfkin.dh.units import units_of
+from urdfkin.errors.showing import Sheet, Table
+from urdfkin.lint.finding import Findings
+from urdfkin.report.document import Document
+from urdfkin.report.html import as_html
+from urdfkin.report.markdown import as_markdown
+from urdfkin.robot import Robot
+
+FORMS = ("__str__", "_repr_html_", "_repr_markdown_", "_repr_latex_")
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    robot = urdfkin.load("panda", verify=False)
+    robot.jacobian("ready", "panda_hand")
+    return robot
+
+
+@pytest.fixture(scope="module")
+def objects(robot: Robot) -> dict[str, Any]:
+    rates = "neutral, panda_joint1=1, panda_joint2=0.5"
+    return {
+        "robot": robot,
+        "table": robot.dh(),
+        "chain": robot.chain(),
+        "breakdown": robot.acceleration_breakdown("ready", rates, rates),
+        "breakdown of a batch": robot.acceleration_breakdown(robot.sample(4), rates, rates),
+        "certificate": robot.certificate(),
+        "findings": urdfkin.load("planar_two_link").findings,
+        "check": urdfkin.check('<robot name="r"><link name="base"/><link name="stray"/></robot>'),
+    }
+
+
+#: What must stand in each form of each object.
+SAYS = {
+    "robot": ("panda: nq 8, nv 8", "panda_joint4", "-3.0718", "-0.0698", "2.175"),
+    "table": ("standard Denavit-Hartenberg parameters", "panda_joint4", "0.316", "0.0825"),
+    "chain": ("panda_link0 to panda_hand_tcp", "7 joints", "panda_joint4", "0.649"),
+    "breakdown": ("Acceleration by joint and kind", "panda_joint2", "centripetal", "coriolis", "sum"),
+    "breakdown of a batch": ("sample", "... and 2 more samples"),
+    "certificate": ("panda: NOT verified by Pinocchio", "jacobian", "verify=False was asked for", "sha256"),
+    "findings": ("no findings",),
+    "check": ("1 error", "URDF411", "stray", "the link has no parent"),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", SAYS)
+def test_an_object_says_what_there_is_to_say_in_every_form(
+    name: str, form: str, objects: dict[str, Any]
+) -> None:
+    if (name, form) in {("certificate", "__str__"), ("table", "_repr_latex_")}:
+        pytest.skip("a form of its own, tested elsewhere")
+    text = getattr(objects[name], form)()
+    plain = html.unescape(text).replace("\\", "").replace("&#8288;", "")
+    missing = [words for words in SAYS[name] if words not in plain]
+    assert missing == []
+
+
+@pytest.mark.parametrize("name", ["robot", "table", "chain", "breakdown"])
+def test_its_repr_is_one_short_line(name: str, objects: dict[str, Any]) -> None:
+    text = repr(objects[name])
+    assert text.startswith("<")
+    assert len(text) < 100
+    assert "\n" not in text
+
+
+def test_a_table_writes_itself_as_the_command_line_does(robot: Robot) -> None:
+    table, units = robot.dh(snap=1e-6), units_of("degrees", "millimetres", 6)
+    for form in ("markdown", "latex", "html"):
+        own = getattr(table, f"to_{form}")("degrees", "mm", 6)
+        assert own == export(table, form, units).rstrip("\n")
+        assert "316" in own
+    assert str(table) == export(table, "terminal").rstrip("\n")
+    with pytest.raises(urdfkin.InputError, match="unknown unit"):
+        table.to_latex("turns")
+
+
+def test_a_report_writes_itself_as_the_command_line_does() -> None:
+    report = urdfkin.validate("planar_two_link", samples=3)
+    document = cast("Document", report.as_dict())
+    assert report.to_html() == as_html(document)
+    assert report.to_markdown() == as_markdown(document)
+    for form in FORMS:
+        text = getattr(report, form)().replace("\\", "")
+        assert "1 of 1 robots verified" in text
+        assert "planar_two_link" in text
+
+
+class _Tags(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.seen: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.open.append(tag)
+        self.seen.add(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def sheets() -> Iterator[Callable[[str], Sheet]]:
+    yield lambda name: Sheet(name, ())
+    yield lambda name: Sheet("t", (name, Table((name, "x"), [(name, 1.0)])))
+
+
+@pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
+def test_a_name_from_a_strangers_file_is_text_in_every_form(name: str) -> None:
+    for made in sheets():
+        sheet, tame = made(name), made("tame")
+        tags = _Tags()
+        tags.feed(sheet.html())
+        assert tags.open == []
+        assert tags.seen <= {"div", "p", "b", "table", "thead", "tbody", "tr", "th", "td"}
+        for form in ("text", "markdown", "latex"):
+            written = getattr(sheet, form)()
+            assert len(written.splitlines()) == len(getattr(tame, form)().splitlines()), "no line is added"
+            assert "\x1b" not in written
+
+
+def test_a_table_of_numbers_hides_rounding_and_lines_up() -> None:
+    table = Table(("name", "x"), [("a", 1.0), ("longer", 1e-17), ("c", -0.25)])
+    assert table.text().splitlines() == [
+        "name        x", "-------------", "a           1", "longer      0", "c       -0.25"
+    ]  # fmt: skip
+
+
+def test_a_robots_view_is_a_page_in_a_frame_of_its_own(robot: Robot) -> None:
+    cell = robot.view("ready, panda_joint1=30deg", height=300)
+    shown = cell._repr_html_()
+    assert shown.startswith('<iframe sandbox="allow-scripts"')
+    assert "height:300px" in shown
+    page = cell.page()
+    assert "default-src 'none'" in page
+    assert "http://" not in page.split("<script>")[0]
+    assert repr(np.pi / 6) in page
+    with pytest.raises(urdfkin.InputError, match="one configuration"):
+        robot.view(robot.sample(2))
+
+
+# -- the public face -------------------------------------------------------------------------------------
+
+
+def test_limits_joints_and_frames_are_those_of_the_file(robot: Robot) -> None:
+    lower, upper = robot.limits
+    at = robot.coordinate_names.index("panda_joint4")
+    assert (lower[at], upper[at], robot.velocity_limits[at]) == (-3.0718, -0.0698, 2.175)
+    assert robot.joints["panda_joint4"].limit is not None
+    assert list(robot.joints) == [joint.name for joint in robot.tree.joints]
+    assert set(robot.frames) == set(robot.frame_names)
+    assert robot.frames["panda_joint4"] == robot.frames["panda_link4"] == "panda_link4"
+    with pytest.raises(ValueError, match="read-only"):
+        robot.limits[0, 0] = 0.0
+    wheel = urdfkin.load("kinova", verify=False)
+    assert np.isinf(wheel.limits[:, wheel.coordinate_names.index("j2s6s200_joint_1")]).all()
+
+
+def test_a_frame_may_be_left_out_where_there_is_one_tip(robot: Robot) -> None:
+    np.testing.assert_array_equal(robot.jacobian("ready"), robot.jacobian("ready", "panda_hand_tcp"))
+    arm = urdfkin.load(urdfkin.load("planar_two_link").urdf, verify=False)
+    q, rates = [0.1, 0.2], [1.0, 2.0]
+    tip = arm.tip_frame
+    np.testing.assert_array_equal(arm.placement(q), arm.placement(q, tip))
+    np.testing.assert_array_equal(arm.velocity(q, rates), arm.velocity(q, rates, tip))
+    np.testing.assert_array_equal(arm.acceleration(q, rates, rates), arm.acceleration(q, rates, rates, tip))
+    np.testing.assert_array_equal(
+        arm.analytical_jacobian([0.5, 0.6], representation="quaternion").shape, (7, 2)
+    )
+    np.testing.assert_array_equal(arm.prepare().jacobian(np.array(q)), arm.jacobian(q, tip))
+    two = urdfkin.load(urdfkin.load("a1").urdf, verify=False)
+    with pytest.raises(
+        urdfkin.InputError, match=r"which frame\? .*found .*FL_foot.*; name one, such as robot.tip"
+    ):
+        two.jacobian("ready")
+
+
+def test_completion_offers_what_people_call_and_no_inner_parts(robot: Robot) -> None:
+    offered = [name for name in dir(robot) if not name.startswith("_")]
+    assert {"jacobian", "dh", "view", "limits", "joints", "integrate"} <= set(offered)
+    assert {"plan", "verifier"}.isdisjoint(offered)
+
+
+def test_robots_are_the_names_that_load_knows() -> None:
+    assert "panda" in urdfkin.robots()
+    assert urdfkin.robots("text") == ("one_link", "planar_two_link", "polar", "elbow")
+    with pytest.raises(urdfkin.UnknownNameError, match="unknown family 'arms'; did you mean arm"):
+        urdfkin.robots("arms")
+
+
+def test_findings_are_a_list_like_any_other() -> None:
+    found = urdfkin.load("planar_two_link").findings
+    assert isinstance(found, Findings)
+    assert found == []
+
+
+def test_a_table_shows_itself_whatever_was_imported_first() -> None:
+    code = "from urdfkin.dh.rows import table_from_rows as t; print(t([[1, 0, 0, 0]], 'standard'))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "standard Denavit-Hartenberg parameters" in done.stdout

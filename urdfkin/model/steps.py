@@ -1,0 +1,107 @@
+"""From one configuration along rates, and the rates between two: what + and - are where q holds orientations.
+
+As Pinocchio's `integrate` and `difference`. One number of a joint adds up; planar and floating joints move
+along the screw that their rates, which stand in the moving frame, make: R = R_0 exp(w), p = p_0 + R_0 V(w) s
+with V(w) = I + (1 - cos|w|)/|w|^2 [w] + (|w| - sin|w|)/|w|^3 [w]^2.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from urdfkin.kinematics.rotation import exp_rotation, log_rotation, skew
+from urdfkin.kinematics.rotation.quaternion import quaternion_of, rotation_of
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
+
+#: Squared angles (rad^2) below which (|w| - sin|w|)/|w|^3 is summed, which would lose its digits else.
+_SUMMED = 0.25
+
+
+def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
+    """(..., nq) where `q` (..., nq) gets to in a second at the rates `v` (..., nv)."""
+    shape = np.broadcast_shapes(q.shape[:-1], v.shape[:-1])
+    out = np.array(np.broadcast_to(q, (*shape, tree.nq)))
+    for joint, at, to in _own(tree):
+        step = v[..., to : to + joint.nv]
+        if joint.nq == 1:
+            out[..., at] += step[..., 0]
+            continue
+        here = out[..., at : at + joint.nq]
+        p, R = _pose(joint, here)
+        s, w = _screw(joint, step)
+        p = p + (R @ (_along(w) @ s[..., np.newaxis]))[..., 0]
+        if joint.kind is JointKind.PLANAR:
+            here[...] = np.concatenate((p[..., :2], here[..., 2:] + w[..., 2:]), axis=-1)
+        else:
+            here[...] = np.concatenate((p, quaternion_of(R @ exp_rotation(w))), axis=-1)
+    return out
+
+
+def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
+    """(..., nv) rates that lead from `start` to `end` (..., nq) in a second, the shortest way round."""
+    shape = np.broadcast_shapes(start.shape[:-1], end.shape[:-1])
+    start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
+    v = np.empty((*shape, tree.nv))
+    for joint, at, to in _own(tree):
+        one, other = (q[..., at : at + joint.nq] for q in (start, end))
+        if joint.nq == 1:
+            way = other[..., 0] - one[..., 0]
+            v[..., to] = _shortest(way) if joint.kind is JointKind.CONTINUOUS else way
+            continue
+        (p_0, R_0), (p_1, R_1) = _pose(joint, one), _pose(joint, other)
+        back = np.swapaxes(R_0, -1, -2)
+        w = log_rotation(back @ R_1)
+        if joint.kind is JointKind.PLANAR:
+            w = np.zeros((*shape, 3))
+            w[..., 2] = _shortest(other[..., 2] - one[..., 2])
+        s = np.linalg.solve(_along(w), back @ (p_1 - p_0)[..., np.newaxis])[..., 0]
+        six = (s[..., :2], w[..., 2:]) if joint.kind is JointKind.PLANAR else (s, w)
+        v[..., to : to + joint.nv] = np.concatenate(six, axis=-1)
+    return v
+
+
+def _own(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
+    """Joints with coordinates of their own, and where these and their rates begin."""
+    rows = zip(tree.joints, tree.q_index, tree.v_index, strict=True)
+    return [(joint, at, to) for joint, at, to in rows if joint.nv]
+
+
+def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(..., 3) and (..., 3, 3) of a planar or floating joint."""
+    if joint.kind is JointKind.FLOATING:
+        return own[..., :3], rotation_of(own[..., 3:])
+    zero = np.zeros((*own.shape[:-1], 1))
+    return np.concatenate((own[..., :2], zero), axis=-1), exp_rotation(_about_z(own[..., 2]))
+
+
+def _screw(joint: Joint, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sliding and turning, (..., 3) each."""
+    if joint.kind is JointKind.FLOATING:
+        return step[..., :3], step[..., 3:]
+    zero = np.zeros((*step.shape[:-1], 1))
+    return np.concatenate((step[..., :2], zero), axis=-1), _about_z(step[..., 2])
+
+
+def _about_z(angle: FloatArray) -> FloatArray:
+    turn = np.zeros((*angle.shape, 3))
+    turn[..., 2] = angle
+    return turn
+
+
+def _along(w: FloatArray) -> FloatArray:
+    """(..., 3, 3) V(w)."""
+    square = (w * w).sum(axis=-1)[..., np.newaxis, np.newaxis]
+    angle, W = np.sqrt(square), skew(w)
+    half = np.sinc(angle / (2.0 * math.pi))
+    summed = sum((-square) ** k / math.factorial(2 * k + 3) for k in range(7))
+    cubed = np.where(
+        square < _SUMMED, summed, (1.0 - np.sinc(angle / math.pi)) / np.where(square > 0.0, square, 1.0)
+    )
+    V: FloatArray = np.eye(3) + 0.5 * half**2 * W + cubed * (W @ W)
+    return V
+
+
+def _shortest(angle: FloatArray) -> FloatArray:
+    return np.asarray(angle - math.tau * np.round(angle / math.tau))
