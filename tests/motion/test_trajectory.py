@@ -45,10 +45,17 @@ def test_a_line_without_time_or_samples_is_refused(robot: Robot, duration: float
         line(robot, robot.neutral(), END, duration, samples)
 
 
-def test_a_floating_root_has_no_line() -> None:
-    floating = urdfkin.load("ur5", root_joint="floating")
-    with pytest.raises(InputError, match="floating joint's rates are not the rates of its coordinates"):
-        line(floating, floating.neutral(), floating.neutral(), 1.0, 5)
+@pytest.mark.parametrize("root", ["floating", "planar"])
+def test_a_floating_base_goes_along_a_line_whose_rates_are_those_of_its_frames(root: str) -> None:
+    robot = urdfkin.load("a1", root_joint=root, verify=False)
+    ends = robot.sample(2, seed=8)
+    x = line(robot, *ends, 2.0, 2001)
+    np.testing.assert_allclose(robot.difference(x.q[-1], ends[1]), 0.0, atol=1e-13)
+    p = robot.placement(x.q, "FL_foot")[:, :3, 3]
+    h = x.t[1] - x.t[0]
+    slopes, seconds = (p[2:] - p[:-2]) / (2.0 * h), (p[2:] - 2.0 * p[1:-1] + p[:-2]) / h**2
+    np.testing.assert_allclose(robot.velocity(x.q, x.v, "FL_foot")[1:-1, :3], slopes, atol=2e-4)
+    np.testing.assert_allclose(robot.acceleration(x.q, x.v, x.a, "FL_foot")[1:-1, :3], seconds, atol=2e-3)
 
 
 def write(path: Path, robot: Robot, columns: dict[str, np.ndarray]) -> Path:

@@ -25,10 +25,21 @@ if TYPE_CHECKING:
     from urdfkin.motion.trajectory import Trajectory
     from urdfkin.robot import Robot
 
-#: They repeat `urdfkin.view.plot.panels.PANELS`, whose import --help does not need.
+#: They repeat those of `urdfkin.view.plot.panels`, whose import --help does not need.
 PANELS = (
-    *("position", "orientation", "velocity", "angular-velocity", "acceleration", "angular-acceleration"),
-    *("parts", "singular-values", "manipulability", "disagreement"),
+    *(
+        "q",
+        "v",
+        "a",
+        "position",
+        "orientation",
+        "velocity",
+        "angular-velocity",
+        "acceleration",
+        "angular-acceleration",
+    ),
+    *("parts", "singular-values", "angular-singular-values", "manipulability", "angular-manipulability"),
+    "disagreement",
 )
 
 EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.svg"
@@ -77,7 +88,8 @@ def command(
 ) -> None:
     """Draw a frame's position, velocity, acceleration and its parts, singular values and the check over time.
 
-    Along a CSV or .npz file, or along a line in joint space from rest to rest. Exit 0: verified. 1: a
+    So are q, v and a, with their limits; an axis has one unit. Along a CSV or .npz file, or along a line in
+    joint space from rest to rest, on which a floating base moves along a screw. Exit 0: verified. 1: a
     disagreement. 3: Pinocchio could not check it.
     """
     if (trajectory is None) == (end is None):

@@ -19,6 +19,7 @@ from urdfkin.kinematics.rotation.quaternion import rotation_of
 from urdfkin.kinematics.rotation.quaternion_rates import angular_velocity_from_quaternion_rates
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import checked
+from urdfkin.model.steps import difference, integrate
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
 from urdfkin.motion.archive import read_arrays
 from urdfkin.motion.columns import read_columns
@@ -62,17 +63,17 @@ class Trajectory:
 
 
 def line(robot: Robot, start: FloatArray, end: FloatArray, duration: float, samples: int) -> Trajectory:
-    """A straight line in joint space from rest to rest.
+    """A straight line in joint space from rest to rest; planar and floating joints move along one screw.
 
     Args:
         robot: The robot.
         start: (nq,) rad, m.
-        end: (nq,).
+        end: (nq,); continuous joints make all turns on the way, planar and floating ones none.
         duration: Seconds.
         samples: How many, ends included.
 
     Raises:
-        InputError: a duration that is not positive, fewer than three samples, a floating joint.
+        InputError: a duration that is not positive, fewer than three samples.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("ur5")
@@ -86,17 +87,19 @@ def line(robot: Robot, start: FloatArray, end: FloatArray, duration: float, samp
         raise InputError(
             f"a line needs a duration above 0 and {_FEWEST} samples", found=f"{duration} s, {samples}"
         )
-    _only_plain_joints(robot)
     q_0, q_1 = checked(robot.tree, start, "q"), checked(robot.tree, end, "q")
     t = np.linspace(0.0, duration, samples)
     u = (t / duration)[:, np.newaxis]
     s = u**3 * (10.0 + u * (-15.0 + 6.0 * u))
     s_1 = 30.0 * u**2 * (1.0 - u) ** 2 / duration
     s_2 = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / duration**2
-    step = q_1 - q_0
-    return Trajectory(
-        frozen(t), frozen(q_0 + s * step), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True
-    )
+    step = difference(robot.tree, q_0, q_1)
+    for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
+        if joint.nq == 1:
+            step[to] = q_1[at] - q_0[at]
+    # Along one screw the rates in the moving frame keep their directions: they are s' and s'' times the step.
+    q = integrate(robot.tree, q_0, s * step)
+    return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
 
 def read_trajectory(robot: Robot, path: Path, *, with_base: bool = False) -> Trajectory:
@@ -190,16 +193,6 @@ def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
             v[:, to : to + 3] = (R.swapaxes(-1, -2) @ slopes[:, at : at + 3, np.newaxis])[..., 0]
             v[:, to + 3 : to + 6] = angular_velocity_from_quaternion_rates(quaternion, rates, "body")
     return v
-
-
-def _only_plain_joints(robot: Robot) -> None:
-    for joint in robot.tree.joints:
-        if joint.kind in (JointKind.PLANAR, JointKind.FLOATING):
-            raise InputError(
-                f"a {joint.kind.value} joint's rates are not the rates of its coordinates",
-                where=f"joint {joint.name}",
-                remedy="give a CSV file of samples",
-            )
 
 
 def _columns(path: Path, data: Mapping[str, FloatArray], names: Sequence[str]) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -15,7 +16,7 @@ from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.motion.trajectory import Trajectory, line
 from urdfkin.robot import Robot
 from urdfkin.view.figure import save
-from urdfkin.view.plot.panels import PANELS
+from urdfkin.view.plot.panels import COORDINATES, PANELS
 from urdfkin.view.plot.sheet import foot, sheet
 
 pytest.importorskip("matplotlib")
@@ -30,7 +31,7 @@ def case() -> Case:
 
 
 def test_the_command_offers_every_panel_there_is() -> None:
-    assert tuple(PANELS) == OFFERED
+    assert (*COORDINATES, *PANELS) == OFFERED
 
 
 def test_the_lines_are_the_numbers(case: Case) -> None:
@@ -42,6 +43,76 @@ def test_the_lines_are_the_numbers(case: Case) -> None:
         np.testing.assert_array_equal(drawn.get_xdata(), trajectory.t)
     together = next(drawn for drawn in parts.lines if drawn.get_label() == "all together")
     np.testing.assert_array_equal(together.get_ydata(), np.linalg.norm(x.acceleration[:, :3], axis=1))
+
+
+def test_q_and_v_are_drawn_with_their_limits_one_unit_an_axis(case: Case) -> None:
+    robot, x, trajectory = case
+    axes = sheet(robot, x, trajectory, ["q", "v", "a"]).axes
+    assert [one.get_ylabel().split("\n")[0] for one in axes] == [
+        "q [rad]", "q [m]", "v [rad/s]", "v [m/s]", "a [rad/s²]", "a [m/s²]"
+    ]  # fmt: skip
+    angles = [drawn for drawn in axes[0].lines if drawn.get_label() in robot.coordinate_names]
+    assert [drawn.get_label() for drawn in angles] == list(robot.coordinate_names[:7])
+    for k, drawn in enumerate(angles):
+        np.testing.assert_array_equal(drawn.get_ydata(), trajectory.q[:, k])
+    for one, bounds in zip(
+        axes, (*_of(robot.limits), *_of([-robot.velocity_limits, robot.velocity_limits])), strict=False
+    ):
+        thin = {float(drawn.get_ydata()[0]) for drawn in one.lines if drawn.get_linewidth() == 0.6}
+        assert thin == bounds
+
+
+def _of(bounds: Any) -> tuple[set[float], set[float]]:
+    """Those of the panda's seven angles, and of its finger."""
+    return {float(x) for row in bounds for x in row[:7]}, {float(x) for row in bounds for x in row[7:]}
+
+
+@pytest.mark.slow
+def test_panels_are_as_wide_as_the_sheet_lets_them_be_whatever_their_legends_say() -> None:
+    robot = urdfkin.load("a1", root_joint="floating")
+    x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
+    figure = sheet(robot, frame_motion(robot, x.q, x.v, x.a, "FL_foot"), x)
+    figure.draw_without_rendering()
+    assert min(axes.get_position().width for axes in figure.axes) > 0.36
+    for axes in figure.axes:
+        if (legend := axes.get_legend()) is not None:
+            box = legend.get_window_extent().transformed(figure.transFigure.inverted())
+            assert box.x1 < axes.get_position().x1 + 0.03
+
+
+def test_where_a_limit_is_left_a_cross_stands(case: Case) -> None:
+    robot, *_ = case
+    x = line(robot, robot.poses["ready"], robot.poses["neutral"], 1.0, 21)
+    (axes, _) = sheet(robot, frame_motion(robot, x.q, x.v, x.a, robot.tip_frame), x, ["q"]).axes
+    crosses = next(drawn for drawn in axes.lines if drawn.get_label() == "outside the limits")
+    outside = x.q[:, 3] > robot.limits[1, 3]
+    assert outside.any()
+    np.testing.assert_array_equal(crosses.get_ydata(), x.q[outside, 3])
+
+
+def test_no_axis_mixes_metres_and_radians(case: Case) -> None:
+    robot, x, trajectory = case
+    names = ["singular-values", "angular-singular-values", "manipulability", "angular-manipulability"]
+    figure = sheet(robot, x, trajectory, names)
+    J = x.jacobian
+    for axes, rows in zip(figure.axes[:2], (slice(0, 3), slice(3, 6)), strict=True):
+        drawn = np.array([one.get_ydata() for one in axes.lines]).T
+        np.testing.assert_allclose(drawn, np.linalg.svd(J[:, rows], compute_uv=False), rtol=1e-12)
+    for axes, rows in zip(figure.axes[2:], (slice(0, 3), slice(3, 6)), strict=True):
+        determinant = np.linalg.det(J[:, rows] @ J[:, rows].swapaxes(1, 2))
+        np.testing.assert_allclose(axes.lines[0].get_ydata(), np.sqrt(determinant), rtol=1e-6)
+
+
+def test_a_floating_base_is_plotted_with_its_place_and_its_quaternion(tmp_path: Path) -> None:
+    robot = urdfkin.load("a1", root_joint="floating")
+    x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
+    motion = frame_motion(robot, x.q, x.v, x.a, "FL_foot")
+    assert motion.agrees
+    *axes, _ = sheet(robot, motion, x, ["q", "v"]).axes
+    assert [one.get_ylabel().split("\n")[0] for one in axes] == [
+        "q [rad]", "q [m]", "q [quaternion]", "v [rad/s]", "v [m/s]"
+    ]  # fmt: skip
+    assert save(sheet(robot, motion, x), tmp_path / "a.svg")
 
 
 def test_the_bound_is_drawn_beside_what_it_bounds(case: Case) -> None:
@@ -57,7 +128,7 @@ def test_the_bound_is_drawn_beside_what_it_bounds(case: Case) -> None:
 def test_the_title_says_from_where_to_where_and_how_long(case: Case) -> None:
     robot, x, trajectory = case
     title = sheet(robot, x, trajectory, ["position"]).get_suptitle()
-    start, end = (", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9)) for k in (0, -1))
+    start, end = (", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0) for k in (0, -1))
     assert title.endswith(f"from ({start}) to ({end}) m in 1 s")
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,8 +11,11 @@ import numpy as np
 from urdfkin.compiled.breakdown import KINDS
 from urdfkin.kinematics.rotation import log_rotation
 from urdfkin.kinematics.roundings import EPS
+from urdfkin.model import configuration
 from urdfkin.model.tree import FloatArray
 from urdfkin.motion.frame_motion import FrameMotion
+from urdfkin.motion.trajectory import Trajectory
+from urdfkin.robot import Robot
 
 if TYPE_CHECKING:
     from urdfkin.view.figure import Axes
@@ -24,7 +28,12 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
-def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: tuple[str, ...]) -> None:
+_LINEAR, _ANGULAR = slice(0, 3), slice(3, 6)
+#: With more lines than this none is named: nobody could tell them apart.
+_NAMED = 14
+
+
+def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) -> None:
     for k, name in enumerate(names):
         axes.plot(t, rows[:, k], color=COLOURS[k % 7], linestyle=STYLES[k % 7], label=name)
 
@@ -76,23 +85,24 @@ def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     axes.set_ylabel("parts, size [m/s²]")
 
 
-def singular_values(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Of the whole Jacobian."""
-    values = x.singular_values
+def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
+    """Of the Jacobian's linear or its angular rows: together they would add metres to radians."""
+    values = x.singular_values(rows)
     largest = values.max(initial=1.0)
     shown = np.where(values > EPS * largest, values, np.nan)
-    _lines(axes, t, shown, tuple(f"σ{k + 1}" for k in range(values.shape[1])))
+    _lines(axes, t, shown, [f"σ{k + 1}" for k in range(values.shape[1])])
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.set_ylabel("singular values of J [SI]")
+    lower, upper = axes.get_ylim()
+    axes.yaxis.set_minor_formatter(lambda value, _: f"{value:g}" if upper < 10.0 * lower else "")
+    axes.set_ylabel(f"singular values, {unit}\nper unit of rates")
 
 
-def manipulability(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Yoshikawa's, of all rows and of the linear and angular ones."""
-    rows = (slice(0, 6), slice(0, 3), slice(3, 6))
-    values = np.column_stack([x.manipulability(part) for part in rows])
-    _lines(axes, t, values, ("all rows", "linear", "angular"))
-    axes.set_ylabel("manipulability [SI]")
+def manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
+    """Yoshikawa's: the product of the singular values of the linear or of the angular rows."""
+    _lines(axes, t, x.manipulability(rows)[:, np.newaxis], ("",))
+    axes.set_ylabel(f"manipulability\n[{unit}]")
+    axes.set_ylim(bottom=0.0)
 
 
 def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
@@ -122,7 +132,63 @@ PANELS: dict[str, Panel] = {
     "acceleration": acceleration,
     "angular-acceleration": angular_acceleration,
     "parts": parts,
-    "singular-values": singular_values,
-    "manipulability": manipulability,
+    "singular-values": partial(singular_values, rows=_LINEAR, unit="m/s"),
+    "angular-singular-values": partial(singular_values, rows=_ANGULAR, unit="rad/s"),
+    "manipulability": partial(manipulability, rows=_LINEAR, unit="(m/s)³"),
+    "angular-manipulability": partial(manipulability, rows=_ANGULAR, unit="(rad/s)³"),
     "disagreement": disagreement,
 }
+
+#: What is put behind a unit in the panels of q, v and a.
+_PER = {"q": "", "v": "/s", "a": "/s²"}
+#: The panels of the coordinates, each an axis for each unit.
+COORDINATES = tuple(_PER)
+
+
+def coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[Panel]:
+    """q, v or a over time: a panel for each unit that its numbers have, with the limits of what moves."""
+    units = np.array(configuration.units(robot.tree, what))
+    return [
+        partial(_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit))
+        for unit in ("rad", "m", "")
+        if (units == unit).any()
+    ]
+
+
+def _coordinates(
+    robot: Robot,
+    trajectory: Trajectory,
+    what: str,
+    unit: str,
+    places: FloatArray,
+    axes: Axes,
+    x: FrameMotion,
+    t: FloatArray,
+) -> None:
+    """Those that move, or all where none does; thin, their limits; a cross where one is outside."""
+    del x
+    values: FloatArray = getattr(trajectory, what)
+    names = robot.coordinate_names if what == "q" else robot.rate_names
+    moves = [i for i in places if (values[:, i] != values[0, i]).any()] or list(places)
+    _lines(
+        axes, t, values[:, moves], [names[i] for i in moves] if len(moves) <= _NAMED else [""] * len(moves)
+    )
+    bounded, crosses = False, "outside the limits"
+    for k, (i, lower, upper) in enumerate((i, *_limits(robot, what, i)) for i in moves):
+        for bound in filter(np.isfinite, (lower, upper)):
+            axes.axhline(bound, color=COLOURS[k % 7], linestyle=STYLES[k % 7], linewidth=0.6)
+            bounded = True
+        # As everywhere, a bound printed in decimal is no violation where it is one unit in the last place.
+        outside = (values[:, i] < np.nextafter(lower, -np.inf)) | (values[:, i] > np.nextafter(upper, np.inf))
+        if outside.any():
+            axes.plot(t[outside], values[outside, i], "x", color="#B00020", markersize=3.0, label=crosses)
+            crosses = ""
+    said = f"{unit}{_PER[what]}" if unit else "quaternion"
+    axes.set_ylabel(f"{what} [{said}]" + ("\nthin: limits" if bounded else ""))
+
+
+def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
+    if what == "q":
+        return float(robot.limits[0, i]), float(robot.limits[1, i])
+    largest = float(robot.velocity_limits[i]) if what == "v" else np.inf
+    return -largest, largest
