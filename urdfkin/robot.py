@@ -409,16 +409,18 @@ class Robot(Shown):
         Args:
             name: "placement", "velocity", "jacobian", "jacobian rate", "hessian" or "acceleration".
             inputs: q, v and a, as far as it takes them.
-            frame: As in `placement`; so are the others.
+            frame: A link's or joint's name, or a list of names; the tip where there is one.
             reference: For which point and in which axes; a placement has none.
-            base: As in `placement`.
-            out: As in `placement`.
-            verify: As in `placement`.
-            threads: As in `placement`.
+            base: How the root link moves; None if it stands at the world's origin.
+            out: C-contiguous float64 array of the result's shape to write into.
+            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
+                it to the robot.
+            threads: How many compute a batch; None: every processor from 4,096 configurations on.
 
         Raises:
             UnknownNameError: no such quantity or frame.
-            InputError: as `placement`; other inputs than the quantity takes; one that has a way of its own.
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast; other
+                inputs than the quantity takes; one that has a way of its own.
             VerificationError: Pinocchio computes something else.
         """
         row = quantity(word(name, "name"))
@@ -443,7 +445,7 @@ class Robot(Shown):
         Args:
             q: (..., nq) rad, m.
             frame: A link's or joint's name; or a list of names, all of which one pass computes
-                (`link_frames` are every link).
+                (`link_frames` are every link); the tip where there is one.
             base: How the root link moves; None if it stands at the world's origin.
             out: C-contiguous float64 array of the result's shape to write into; after an error it may hold
                 anything.
@@ -521,7 +523,31 @@ class Robot(Shown):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 6) [linear; angular] m/s, rad/s: eq. 7.127, 7.128. Arguments and errors as `placement`."""
+        """(..., 6) velocity of a frame, [linear; angular] m/s, rad/s: eq. 7.127, 7.128.
+
+        Args:
+            q: (..., nq) rad, m.
+            v: (..., nv) rad/s, m/s; those of planar and floating joints in the moving frame.
+            frame: A link's or joint's name, or a list of names, which adds an axis behind the batch; the tip
+                where there is one.
+            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
+                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
+            base: How the root link moves; None if it stands at the world's origin.
+            out: C-contiguous float64 array of the result's shape to write into.
+            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
+                it to the robot.
+            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+
+        Raises:
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
+            UnknownNameError: no such frame, reference or joint.
+            VerificationError: Pinocchio computes something else.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> arm.velocity([0.0, 0.0], {"joint_1": 1.0, "joint_2": 0.0}).round(6).tolist()
+        [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
+        """
         if (
             (base is None and threads is None)
             and (fast := self._fast(frame, reference, verify))
@@ -541,9 +567,33 @@ class Robot(Shown):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 6, nv) velocity Jacobian, eq. 7.85. Arguments and errors as `placement`.
+        """(..., 6, nv) velocity Jacobian, eq. 7.85: `velocity` is J v.
 
-        Column i is the frame's velocity [linear; angular] for a unit rate of `rate_names[i]` alone.
+        Column i is the frame's velocity [linear; angular] for a unit rate of `rate_names[i]` alone, m/s and
+        rad/s per rad/s or m/s.
+
+        Args:
+            q: (..., nq) rad, m.
+            frame: A link's or joint's name, or a list of names, which adds an axis behind the batch; the tip
+                where there is one.
+            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
+                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
+            base: How the root link moves; None if it stands at the world's origin.
+            out: C-contiguous float64 array of the result's shape to write into.
+            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
+                it to the robot.
+            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+
+        Raises:
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
+            UnknownNameError: no such frame, reference or joint.
+            VerificationError: Pinocchio computes something else.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> J = arm.jacobian("joint_1=0, joint_2=90deg")
+        >>> J[:2].round(6).tolist()
+        [[-0.4, -0.4], [0.5, 0.0]]
         """
         if (
             (base is None and threads is None)
@@ -569,8 +619,25 @@ class Robot(Shown):
 
         In LOCAL_WORLD_ALIGNED, J a + J-dot v is the acceleration of the text and of `acceleration`. In LOCAL
         and WORLD it is the *spatial* acceleration, which differs by w x vel: there the point, or the axes,
-        that the rows speak of move themselves. On a moving base, what the base does comes on top. Arguments
-        and errors as `placement`.
+        that the rows speak of move themselves. On a moving base, what the base does comes on top.
+
+        Args:
+            q: (..., nq) rad, m.
+            v: (..., nv) rad/s, m/s; those of planar and floating joints in the moving frame.
+            frame: A link's or joint's name, or a list of names, which adds an axis behind the batch; the tip
+                where there is one.
+            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
+                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
+            base: How the root link moves; None if it stands at the world's origin.
+            out: C-contiguous float64 array of the result's shape to write into.
+            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
+                it to the robot.
+            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+
+        Raises:
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
+            UnknownNameError: no such frame, reference or joint.
+            VerificationError: Pinocchio computes something else.
         """
         return self._computed("jacobian rate", (q, v), frame, reference, base, out, verify, threads)
 
@@ -591,7 +658,24 @@ class Robot(Shown):
         alone. Where rate j comes before column i, its z_j turns the column, z_j x (z_i x d_i); where it comes
         behind, it moves the end of its arm, z_i x (z_j x d_j): in LOCAL_WORLD_ALIGNED the linear rows are
         symmetric in i and j but for the rates of one planar or floating joint, the angular ones never are.
-        WORLD has the first kind alone, LOCAL the second. Arguments and errors as `placement`.
+        WORLD has the first kind alone, LOCAL the second.
+
+        Args:
+            q: (..., nq) rad, m.
+            frame: A link's or joint's name, or a list of names, which adds an axis behind the batch; the tip
+                where there is one.
+            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
+                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
+            base: How the root link moves; None if it stands at the world's origin.
+            out: C-contiguous float64 array of the result's shape to write into.
+            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
+                it to the robot.
+            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+
+        Raises:
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
+            UnknownNameError: no such frame, reference or joint.
+            VerificationError: Pinocchio computes something else.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link", verify=False)
@@ -620,9 +704,36 @@ class Robot(Shown):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 6) classical acceleration [linear; angular] m/s^2, rad/s^2: eq. 7.129, 7.130.
+        """(..., 6) classical acceleration of a frame, [linear; angular] m/s^2, rad/s^2: eq. 7.129, 7.130.
 
-        Gravity is not in it. Arguments and errors as `placement`.
+        The linear part is the second derivative of the position of the frame's origin, p'', not the spatial
+        acceleration p'' - w x p' (Pinocchio has both: `getFrameClassicalAcceleration` is this one). Gravity
+        is not in it; `imu` has what a sensor reads. With `jacobian` and `jacobian_rate` in
+        LOCAL_WORLD_ALIGNED it is J a + J-dot v; `acceleration_breakdown` says which joint contributes what.
+
+        Args:
+            q: (..., nq) rad, m.
+            v: (..., nv) rad/s, m/s; those of planar and floating joints in the moving frame.
+            a: (..., nv) rad/s^2, m/s^2, likewise.
+            frame: A link's or joint's name, or a list of names, which adds an axis behind the batch; the tip
+                where there is one.
+            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
+                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
+            base: How the root link moves; None if it stands at the world's origin.
+            out: C-contiguous float64 array of the result's shape to write into.
+            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
+                it to the robot.
+            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+
+        Raises:
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
+            UnknownNameError: no such frame, reference or joint.
+            VerificationError: Pinocchio computes something else.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> arm.acceleration([0.0, 0.0], [1.0, 0.0], [0.0, 0.0]).round(6).tolist()  # -w^2 r, r = 0.9 m
+        [-0.9, 0.0, 0.0, 0.0, 0.0, 0.0]
         """
         if (
             (base is None and threads is None)
@@ -655,15 +766,17 @@ class Robot(Shown):
             q: (..., nq) rad, m.
             v: (..., nv) rad/s, m/s.
             a: (..., nv) rad/s^2, m/s^2.
-            frame: As in `placement`; so are the others.
+            frame: A link's or joint's name, or a list of names; the tip where there is one.
             gravity: (3,) m/s^2 in the world's axes.
-            base: As in `placement`.
-            out: As in `placement`.
-            verify: As in `placement`.
-            threads: As in `placement`.
+            base: How the root link moves; None if it stands at the world's origin.
+            out: C-contiguous float64 array of the result's shape to write into.
+            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
+                it to the robot.
+            threads: How many compute a batch; None: every processor from 4,096 configurations on.
 
         Raises:
-            InputError: as `placement`; gravity that is not three finite numbers.
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast; gravity
+                that is not three finite numbers.
             UnknownNameError: no such frame.
             VerificationError: Pinocchio computes something else.
 
@@ -700,12 +813,14 @@ class Robot(Shown):
             q: (..., nq) rad, m.
             frame: A link's or joint's name.
             rows: "all", "linear" or "angular".
-            base: As in `placement`.
-            verify: As in `placement`.
-            threads: As in `placement`.
+            base: How the root link moves; None if it stands at the world's origin.
+            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
+                it to the robot.
+            threads: How many compute a batch; None: every processor from 4,096 configurations on.
 
         Raises:
-            InputError: as `placement`, or other rows.
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast; other
+                rows.
             UnknownNameError: no such frame.
             VerificationError: Pinocchio computes another Jacobian.
 
@@ -747,14 +862,15 @@ class Robot(Shown):
 
         Args:
             q: (..., nq) rad, m.
-            frame: As in `placement`.
+            frame: A link's or joint's name, or a list of names; the tip where there is one.
             representation: Euler sequence by SciPy's name ("ZYZ" is the text's, "xyz" is rpy), or
                 "quaternion".
             nearest: How near the representational singularity may be, radians.
             base: How the root link stands; None if at the world's origin.
-            out: As in `placement`.
-            verify: As in `placement`.
-            threads: As in `placement`.
+            out: C-contiguous float64 array of the result's shape to write into.
+            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
+                it to the robot.
+            threads: How many compute a batch; None: every processor from 4,096 configurations on.
 
         Returns:
             (..., 6, nv), or (..., 7, nv) for a quaternion.
@@ -764,7 +880,7 @@ class Robot(Shown):
                 is to be checked, than rounding can tell (some 1e-13 rad); the error says how near. A
                 quaternion has none.
             UnknownNameError: no such frame or representation.
-            InputError: as `placement`.
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
             VerificationError: Pinocchio computes something else.
         """
         representation, nearest = word(representation, "representation"), real_number(nearest, "nearest")
@@ -812,13 +928,31 @@ class Robot(Shown):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> AccelerationBreakdown:
-        """`acceleration`, as a sum over joints and kinds: transverse, centripetal, Coriolis, sliding.
+        """A frame's classical acceleration as a sum over joints and kinds: whose doing it is (7.125, 7.130).
 
-        The sum is checked against Pinocchio's acceleration. Arguments and errors as `placement`, for one
-        frame; `out` is for the terms, (..., joints, 4, 6).
+        The kinds are transverse, centripetal, Coriolis and sliding. The sum is `acceleration`, and is checked
+        against Pinocchio's.
+
+        Args:
+            q: (..., nq) rad, m.
+            v: (..., nv) rad/s, m/s; those of planar and floating joints in the moving frame.
+            a: (..., nv) rad/s^2, m/s^2, likewise.
+            frame: A link's or joint's name; the tip where there is one.
+            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
+                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
+            base: How the root link moves; None if it stands at the world's origin.
+            out: C-contiguous float64 array (..., joints, 4, 6) to write the terms into.
+            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
+                it to the robot.
+            threads: How many compute a batch; None: every processor from 4,096 configurations on.
 
         Returns:
-            The parts, with the caller's batch shape in front.
+            The parts, with the caller's batch shape in front; `print` and notebooks show them as a table.
+
+        Raises:
+            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
+            UnknownNameError: no such frame, reference or joint.
+            VerificationError: Pinocchio computes something else.
         """
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, word(frame, "frame"), reference, base, (q, v, a))

@@ -60,6 +60,7 @@ ARM = (
 #: Good arguments for every parameter without a default.
 GOOD: dict[str, Any] = {
     "q": [0.1, 0.2], "v": [0.1, 0.2], "a": [0.1, 0.2], "frame": "c", "n": 2,
+    "start": [0.1, 0.2], "end": [0.3, 0.2],
     "name": "velocity", "inputs": ([0.1, 0.2], [0.1, 0.2]), "to": "numpy", "relative_to": "b",
 }  # fmt: skip
 

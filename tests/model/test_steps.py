@@ -74,6 +74,15 @@ def test_the_frames_velocity_is_the_difference_quotient_along_a_step() -> None:
     np.testing.assert_allclose((ahead - behind) / (2 * h), robot.velocity(q, v, "FL_foot")[:3], atol=1e-8)
 
 
+def test_batches_broadcast_or_are_refused() -> None:
+    robot, _ = both("a1", "planar")
+    q, v = robot.sample(4), np.ones((3, 1, robot.nv))
+    assert robot.integrate(q, v).shape == (3, 4, robot.nq)
+    assert robot.difference(q, robot.neutral()).shape == (4, robot.nv)
+    with pytest.raises(urdfkin.InputError, match="the batch shapes do not fit"):
+        robot.integrate(q, np.ones((3, robot.nv)))
+
+
 def test_a_wheel_counts_its_turns_and_goes_back_the_shortest_way() -> None:
     robot, _ = both("kinova", None)
     wheel = robot.coordinate_names.index("j2s6s200_joint_1")

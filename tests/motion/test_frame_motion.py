@@ -53,7 +53,7 @@ def test_manipulability_is_the_root_of_the_determinant() -> None:
         np.testing.assert_allclose(
             x.manipulability(rows) ** 2, np.linalg.det(J @ J.swapaxes(1, 2)), rtol=1e-6
         )
-    np.testing.assert_allclose(x.singular_values().prod(axis=1), x.manipulability(), rtol=1e-12)
+    np.testing.assert_allclose(x.singular_values.prod(axis=1), x.manipulability(), rtol=1e-12)
 
 
 def test_a_frame_that_nothing_moves_has_no_manipulability() -> None:

@@ -49,7 +49,7 @@ def test_a_line_without_time_or_samples_is_refused(robot: Robot, duration: float
 def test_a_floating_base_goes_along_a_line_whose_rates_are_those_of_its_frames(root: str) -> None:
     robot = urdfkin.load("a1", root_joint=root, verify=False)
     ends = robot.sample(2, seed=8)
-    x = line(robot, *ends, 2.0, 2001)
+    x = line(robot, ends[0], ends[1], 2.0, 2001)
     np.testing.assert_allclose(robot.difference(x.q[-1], ends[1]), 0.0, atol=1e-13)
     p = robot.placement(x.q, "FL_foot")[:, :3, 3]
     h = x.t[1] - x.t[0]

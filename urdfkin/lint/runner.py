@@ -59,9 +59,9 @@ def check(
             hundredth of a kind on into that one.
 
     Returns:
-        The findings that no comment of the file silences, a list that a notebook shows as a table; an empty one
-        for a file nothing can be said against. Of each kind 10,000 are written out; `also` of the last holds
-        the lines of the others.
+        The findings that no comment of the file silences, a list that a notebook shows as a table; an empty
+        one for a file nothing can be said against. Of each kind 10,000 are written out; `also` of the last
+        holds the lines of the others.
 
     Raises:
         SourceError: the file cannot be read.

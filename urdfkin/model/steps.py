@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation, skew
 from urdfkin.kinematics.rotation.quaternion import quaternion_of, rotation_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
@@ -21,7 +22,7 @@ _SUMMED = 0.25
 
 def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
     """(..., nq) where `q` (..., nq) gets to in a second at the rates `v` (..., nv)."""
-    shape = np.broadcast_shapes(q.shape[:-1], v.shape[:-1])
+    shape = _together(q, v)
     out = np.array(np.broadcast_to(q, (*shape, tree.nq)))
     for joint, at, to in _own(tree):
         step = v[..., to : to + joint.nv]
@@ -41,7 +42,7 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """(..., nv) rates that lead from `start` to `end` (..., nq) in a second, the shortest way round."""
-    shape = np.broadcast_shapes(start.shape[:-1], end.shape[:-1])
+    shape = _together(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
     v = np.empty((*shape, tree.nv))
     for joint, at, to in _own(tree):
@@ -60,6 +61,15 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
         six = (s[..., :2], w[..., 2:]) if joint.kind is JointKind.PLANAR else (s, w)
         v[..., to : to + joint.nv] = np.concatenate(six, axis=-1)
     return v
+
+
+def _together(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
+    """The common batch shape."""
+    try:
+        return np.broadcast_shapes(one.shape[:-1], other.shape[:-1])
+    except ValueError:
+        found = f"{one.shape[:-1]} and {other.shape[:-1]}"
+        raise InputError("the batch shapes do not fit", found=found) from None
 
 
 def _own(tree: KinematicTree) -> list[tuple[Joint, int, int]]:

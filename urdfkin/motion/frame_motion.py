@@ -67,8 +67,13 @@ class FrameMotion:
         """Whether no sample lies outside its bound."""
         return all((check.share <= 1.0).all() for check in self.checks.values())
 
-    def singular_values(self, rows: slice = slice(0, 6)) -> FloatArray:
-        """(n, ...) of the Jacobian's `rows`, largest first; all of them mix metres and radians as SI does."""
+    @property
+    def singular_values(self) -> FloatArray:
+        """(n, min(6, nv)) of the Jacobian, largest first; metres and radians mixed as SI units mix them."""
+        return self.singular_values_of(slice(0, 6))
+
+    def singular_values_of(self, rows: slice) -> FloatArray:
+        """(n, ...) of some of the Jacobian's rows."""
         return np.asarray(np.linalg.svd(self.jacobian[:, rows], compute_uv=False), dtype=np.float64)
 
     def manipulability(self, rows: slice = slice(0, 6)) -> FloatArray:

@@ -19,6 +19,7 @@ from urdfkin.kinematics.rotation.quaternion import rotation_of
 from urdfkin.kinematics.rotation.quaternion_rates import angular_velocity_from_quaternion_rates
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import checked
+from urdfkin.model.given import Given
 from urdfkin.model.steps import difference, integrate
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
 from urdfkin.motion.archive import read_arrays
@@ -62,7 +63,7 @@ class Trajectory:
     base: BaseMotion | None = None
 
 
-def line(robot: Robot, start: FloatArray, end: FloatArray, duration: float, samples: int) -> Trajectory:
+def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) -> Trajectory:
     """A straight line in joint space from rest to rest; planar and floating joints move along one screw.
 
     Args:

@@ -29,7 +29,7 @@ def numbers(x: FrameMotion) -> str:
     lines += [f"| {name} [{unit}] | {' | '.join(map(_number, vector))} |" for name, unit, vector in rows]
     lines += [
         "",
-        f"singular values of J: {', '.join(map(_number, x.singular_values()[0]))}",
+        f"singular values of J: {', '.join(map(_number, x.singular_values[0]))}",
         "",
         f"manipulability: {_number(x.manipulability()[0])},"
         f" linear {_number(x.manipulability(slice(0, 3))[0])}",

@@ -58,7 +58,9 @@ def test_q_and_v_are_drawn_with_their_limits_one_unit_an_axis(case: Case) -> Non
     for one, bounds in zip(
         axes, (*_of(robot.limits), *_of([-robot.velocity_limits, robot.velocity_limits])), strict=False
     ):
-        thin = {float(drawn.get_ydata()[0]) for drawn in one.lines if drawn.get_linewidth() == 0.6}
+        thin = {
+            float(np.asarray(drawn.get_ydata())[0]) for drawn in one.lines if drawn.get_linewidth() == 0.6
+        }
         assert thin == bounds
 
 
@@ -100,7 +102,7 @@ def test_no_axis_mixes_metres_and_radians(case: Case) -> None:
         np.testing.assert_allclose(drawn, np.linalg.svd(J[:, rows], compute_uv=False), rtol=1e-12)
     for axes, rows in zip(figure.axes[2:], (slice(0, 3), slice(3, 6)), strict=True):
         determinant = np.linalg.det(J[:, rows] @ J[:, rows].swapaxes(1, 2))
-        np.testing.assert_allclose(axes.lines[0].get_ydata(), np.sqrt(determinant), rtol=1e-6)
+        np.testing.assert_allclose(np.asarray(axes.lines[0].get_ydata()), np.sqrt(determinant), rtol=1e-6)
 
 
 def test_a_floating_base_is_plotted_with_its_place_and_its_quaternion(tmp_path: Path) -> None:

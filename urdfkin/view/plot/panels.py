@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urdfkin.compiled.breakdown import KINDS
+from urdfkin.compiled.plan import IntArray
 from urdfkin.kinematics.rotation import log_rotation
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration
@@ -87,7 +88,7 @@ def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
     """Of the Jacobian's linear or its angular rows: together they would add metres to radians."""
-    values = x.singular_values(rows)
+    values = x.singular_values_of(rows)
     largest = values.max(initial=1.0)
     shown = np.where(values > EPS * largest, values, np.nan)
     _lines(axes, t, shown, [f"σ{k + 1}" for k in range(values.shape[1])])
@@ -149,7 +150,7 @@ def coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[P
     """q, v or a over time: a panel for each unit that its numbers have, with the limits of what moves."""
     units = np.array(configuration.units(robot.tree, what))
     return [
-        partial(_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit))
+        partial(_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit).astype(np.int64))
         for unit in ("rad", "m", "")
         if (units == unit).any()
     ]
@@ -160,7 +161,7 @@ def _coordinates(
     trajectory: Trajectory,
     what: str,
     unit: str,
-    places: FloatArray,
+    places: IntArray,
     axes: Axes,
     x: FrameMotion,
     t: FloatArray,
