@@ -8,12 +8,10 @@ import numpy as np
 import urdfkin
 
 robot = urdfkin.load("panda")  # a name that `urdfkin robots` lists, a path, or URDF text
-pose = {"panda_joint2": -0.5, "panda_joint4": -2.0, "panda_joint6": 1.5}  # radians
-q = robot.neutral()
-for joint, angle in pose.items():
-    q[robot.coordinate_names.index(joint)] = angle
+# A pose that the other joints keep, then radians, degrees or multiples of pi; a mapping by name does, too.
+pose = "neutral, panda_joint2=-30deg, panda_joint4=-2*pi/3, panda_joint6=1.5"
 
-J = robot.jacobian(q, "panda_hand_tcp")  # (6, nv), rows [linear; angular], eq. 7.85
+J = robot.jacobian(pose, "panda_hand_tcp")  # (6, nv), rows [linear; angular], eq. 7.85
 np.set_printoptions(precision=3, suppress=True)
 print(f"columns: {', '.join(robot.rate_names)}")
 print(J)

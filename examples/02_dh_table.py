@@ -6,11 +6,10 @@ Learn: `snap` takes a URDF's 1.5708 for the right angle it means, and every tabl
 import numpy as np
 
 import urdfkin
-from urdfkin.dh import export
 
 robot = urdfkin.load("ur5")
 table = robot.dh("tool0", "base", snap=1e-6)
-print(export(table, "markdown"))
+print(table.to_markdown())
 
 q = np.full(6, 0.3)
 print("the tip by the table, metres:", table.placement(q)[:3, 3].round(6))

@@ -53,6 +53,8 @@ def test_every_command_that_takes_q_reads_it_so(tmp_path: Path) -> None:
         done = urdfkin(command, "ur5", "--q", q, "--format", "json")
         assert (done.code, done.data["q"][0][0]) == (0, math.pi / 6)
     picture = tmp_path / "way.svg"
+    done = urdfkin("plot", "ur5", "--to", "raedy", "-o", str(picture))
+    assert "error: --to: unknown pose 'raedy'; did you mean ready?" in done.err
     assert (
         urdfkin("plot", "ur5", "--from", "ready", "--to", q, "--panel", "position", "-o", str(picture)).code
         == 0

@@ -168,9 +168,16 @@ def load_robot(
 
 
 def read_inputs(
-    robot: Robot, frame: str | None, seed: int, q: str, v: str = "neutral", a: str = "neutral"
+    robot: Robot,
+    frame: str | None,
+    seed: int,
+    q: str,
+    v: str = "neutral",
+    a: str = "neutral",
+    *,
+    option: str = "--q",
 ) -> Inputs:
-    """Values from the command line; batches of one length, single ones repeated.
+    """Values from the command line; batches of one length, single ones repeated; `option` is what q came by.
 
     Raises:
         InputError: a number that is none, a wrong count, batches of different lengths, a seed for nothing.
@@ -181,7 +188,8 @@ def read_inputs(
     if not any(text.startswith("random") for text in (q, v, a)):
         refuse_idle(click.get_current_context(), ("seed",), "without a random --q, --v or --a")
     rng = np.random.default_rng(seed)
-    rows = [_values(robot, letter, text, rng) for letter, text in (("q", q), ("v", v), ("a", a))]
+    given = (("q", q, option), ("v", v, "--v"), ("a", a, "--a"))
+    rows = [_values(robot, letter, text, where, rng) for letter, text, where in given]
     lengths = {len(part) for part in rows if len(part) != 1}
     if len(lengths) > 1:
         raise InputError(
@@ -195,7 +203,7 @@ def read_inputs(
     return Inputs(robot, frame or robot.tip_frame, q_, v_, a_)
 
 
-def _values(robot: Robot, letter: str, text: str, rng: Any) -> FloatArray:
+def _values(robot: Robot, letter: str, text: str, where: str, rng: Any) -> FloatArray:
     """(n, width) for one option."""
     from urdfkin.model.configuration import places  # noqa: PLC0415  keeps --help fast
     from urdfkin.verify.sampling import sample  # noqa: PLC0415
@@ -203,17 +211,17 @@ def _values(robot: Robot, letter: str, text: str, rng: Any) -> FloatArray:
     names = robot.coordinate_names if letter == "q" else robot.rate_names
     word, _, count = text.partition(":")
     if word == "random":
-        n = _count(letter, count) if count else _RANDOM_SAMPLES
+        n = _count(where, count) if count else _RANDOM_SAMPLES
         return sample(robot.tree, n, rng) if letter == "q" else rng.standard_normal((n, len(names)))
     if text.startswith("@"):
-        return read_batch(Path(text[1:]), f"--{letter}", (names,))[0]
-    return places(robot.tree, letter).read(text, f"--{letter}")[None]
+        return read_batch(Path(text[1:]), where, (names,))[0]
+    return places(robot.tree, letter).read(text, where)[None]
 
 
-def _count(letter: str, text: str) -> int:
+def _count(where: str, text: str) -> int:
     count = whole(text)
     if count is None or count < 1:
-        raise InputError("random:N wants a whole number from 1 on", where=f"--{letter}", found=repr(text))
+        raise InputError("random:N wants a whole number from 1 on", where=where, found=repr(text))
     return count
 
 

@@ -118,7 +118,8 @@ def _line(robot: Robot, start: str, end: str, duration: float, samples: int, see
     from urdfkin.cli.arguments import read_inputs  # noqa: PLC0415
     from urdfkin.motion.trajectory import line  # noqa: PLC0415
 
-    ends = [read_inputs(robot, None, seed, text).q for text in (start, end)]
+    given = (("--from", start), ("--to", end))
+    ends = [read_inputs(robot, None, seed, text, option=option).q for option, text in given]
     if any(len(q) != 1 for q in ends):
         raise InputError("a line has one beginning and one end", found=f"{len(ends[0])} and {len(ends[1])}")
     return line(robot, ends[0][0], ends[1][0], duration, samples)

@@ -60,26 +60,31 @@ def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
 def places(tree: KinematicTree, what: str) -> Places:
     """How the numbers of "q", "v" or "a" are called and measured, for those who give them by name."""
     is_q = what == "q"
-    own = [joint for joint in tree.joints if joint.nv]
+    spans = {
+        joint.name: (at, joint.nq if is_q else joint.nv)
+        for joint, at in zip(tree.joints, tree.q_index if is_q else tree.v_index, strict=True)
+        if joint.nv > 1
+    }
     return Places(
         what,
         _names(tree, what),
         units(tree, what),
-        poses(tree) if is_q else {"neutral": np.zeros(tree.nv)},
-        spans={
-            joint.name: (at, joint.nq if is_q else joint.nv)
-            for joint, at in zip(tree.joints, tree.q_index if is_q else tree.v_index, strict=True)
-            if joint in own and joint.nv > 1
-        },
-        otherwise={
-            joint.name: f"it follows {joint.mimic.leader}: give that, or load with mimic=False (--no-mimic)"
-            if joint.mimic
-            else "it is fixed: leave it out"
-            for joint in tree.joints
-            if not joint.nv
-        },
-        lengths=_other_lengths(tree, what),
+        spans,
+        poses=lambda: poses(tree) if is_q else {"neutral": np.zeros(tree.nv)},
+        otherwise=lambda: _without_coordinate(tree),
+        lengths=lambda: _other_lengths(tree, what),
     )
+
+
+def _without_coordinate(tree: KinematicTree) -> dict[str, str]:
+    """Joints that have no number of their own, and what to do instead of giving one."""
+    return {
+        joint.name: f"it follows {joint.mimic.leader}: give that, or load with mimic=False (--no-mimic)"
+        if joint.mimic
+        else "it is fixed: leave it out"
+        for joint in tree.joints
+        if not joint.nv
+    }
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, str]:

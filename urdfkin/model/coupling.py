@@ -66,7 +66,8 @@ class Coupling:
         # A leader that is not on the path may be of any kind.
         own = tuple(map(units.get, self.names))
         follow = {joint: f"it follows {mimic.leader}: give that" for joint, mimic, _ in rules if mimic}
-        return Places(what, self.names, own, {"neutral": np.zeros(len(self.names))}, otherwise=follow)
+        neutral = {"neutral": np.zeros(len(self.names))}
+        return Places(what, self.names, own, poses=lambda: neutral, otherwise=lambda: follow)
 
     def values(self, q: Given) -> FloatArray:
         """(..., joints) values of all joints, rad or m.

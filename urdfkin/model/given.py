@@ -8,7 +8,7 @@ has a number, an array of a batch, or such a text for each name. A missing name 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,19 +38,19 @@ class Places:
         what: "q", "v" or "a".
         names: One a number.
         units: "rad", "m", "" for a number without a unit, such as a quaternion's, or None for whatever it is.
-        poses: Named values.
         spans: Joints with several numbers: where the first stands, and how many they are.
-        otherwise: What else might be named, and what to do instead.
-        lengths: Other lengths than `names` has that people give, and what to do about it.
+        poses: Makes the named values; it and the next two are only called where they are needed.
+        otherwise: Makes what else might be named, and what to do instead.
+        lengths: Makes other lengths than `names` has that people give, and what to do about it.
     """
 
     what: str
     names: tuple[str, ...]
     units: tuple[str | None, ...]
-    poses: Mapping[str, FloatArray] = field(default_factory=dict)
     spans: Mapping[str, tuple[int, int]] = field(default_factory=dict)
-    otherwise: Mapping[str, str] = field(default_factory=dict)
-    lengths: Mapping[int, str] = field(default_factory=dict)
+    poses: Callable[[], Mapping[str, FloatArray]] = dict
+    otherwise: Callable[[], Mapping[str, str]] = dict
+    lengths: Callable[[], Mapping[int, str]] = dict
 
     def read(self, value: str | Mapping[str, ArrayLike], where: str | None = None) -> FloatArray:
         """(..., numbers) that a text or a mapping says.
@@ -63,7 +63,8 @@ class Places:
             InputError: too few or too many numbers, one that is none, a unit that does not fit.
             UnknownNameError: no such coordinate, rate or pose.
 
-        >>> arm = Places("q", ("shoulder", "elbow"), ("rad", "rad"), {"neutral": np.zeros(2)})
+        >>> rest = {"neutral": np.zeros(2)}
+        >>> arm = Places("q", ("shoulder", "elbow"), ("rad", "rad"), poses=lambda: rest)
         >>> arm.read("neutral, elbow=2").tolist(), arm.read({"elbow": [1, 2], "shoulder": 0.5}).tolist()
         ([0.0, 2.0], [[0.5, 1.0], [0.5, 2.0]])
         >>> arm.read("elbow=30deg")
@@ -92,13 +93,14 @@ keeps: 'neutral, elbow=...'
         return self._by_name(values, where, pose)
 
     def _pose(self, word: str, where: str) -> FloatArray:
-        if word not in self.poses:
-            raise UnknownNameError("pose", word[:60], self.poses, where=where)
-        return self.poses[word]
+        poses = self.poses()
+        if word not in poses:
+            raise UnknownNameError("pose", word[:60], poses, where=where)
+        return poses[word]
 
     def _in_order(self, cells: Sequence[str], where: str) -> FloatArray:
         if len(cells) != len(self.names):
-            raise wrong_count(self.names, len(cells), where, self.lengths.get(len(cells)))
+            raise wrong_count(self.names, len(cells), where, self.lengths().get(len(cells)))
         rows = zip(cells, self.names, self.units, strict=True)
         return np.array([self._number(text, f"{where}, {name}", unit) for text, name, unit in rows], float)
 
@@ -132,8 +134,8 @@ keeps: 'neutral, elbow=...'
         kind = "coordinate" if self.what == "q" else "rate"
         if not isinstance(name, str):
             raise InputError(f"a {kind} is called by its name", where=where, found=shown(name))
-        if name in self.otherwise:
-            raise InputError(f"{name!r} is no {kind}", where=where, remedy=self.otherwise[name])
+        if (instead := self.otherwise().get(name)) is not None:
+            raise InputError(f"{name!r} is no {kind}", where=where, remedy=instead)
         if name not in self.spans:
             raise UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
         at, size = self.spans[name]
