@@ -45,7 +45,8 @@ def test_batches_broadcast_and_lengths_are_checked() -> None:
     q = np.zeros((4, 1, 3))
     assert jacobian(table, q).shape == (4, 1, 6, 3)
     assert acceleration(table, q, np.ones((5, 3)), np.ones(3)).shape == (4, 5, 6)
-    assert velocity(table, {"j1": 0.1}, np.ones(3)).shape == (6,)
+    named = velocity(table, {"j1": 0.1, "j2": 0.0, "j3": 0.0}, "neutral, j2=90deg/s")
+    np.testing.assert_array_equal(named, velocity(table, [0.1, 0.0, 0.0], [0.0, np.pi / 2, 0.0]))
     with pytest.raises(InputError, match="v needs 3 values"):
         velocity(table, q, np.ones(2))
     with pytest.raises(UnknownNameError, match="unknown reference"):
