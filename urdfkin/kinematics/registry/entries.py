@@ -35,6 +35,7 @@ class Equation:
     Attributes:
         number: As printed, "7.130".
         statement: In urdfkin's notation, plain characters.
+        latex: The same, in LaTeX.
         meaning: One or two sentences.
         written: The functions of `urdfkin.kinematics.equations` that are it, by name.
         functions: What computes it, "module:name".
@@ -44,6 +45,7 @@ class Equation:
 
     number: str
     statement: str
+    latex: str
     meaning: str
     written: tuple[str, ...]
     functions: tuple[str, ...]
@@ -121,6 +123,7 @@ def _equation(entry: dict[str, Any]) -> Equation:
     return Equation(
         number=entry["number"],
         statement=entry["statement"],
+        latex=entry["latex"],
         meaning=entry["meaning"],
         written=tuple(entry.get("written", ())),
         functions=tuple(entry["functions"]),
