@@ -1,37 +1,60 @@
-"""The pages on the Hessian and on accelerations run, print what they say, and say of others what is so."""
+"""The pages run, print what they say, and say of other libraries what is so."""
 
 from __future__ import annotations
 
-import contextlib
-import io
 import re
+import warnings
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import urdfkin
-from tests.test_tour import BLOCK, tidy
+from tests.pages import DOCS, blocks, pages, run
+from urdfkin.cli import cli
 from urdfkin.model.tree import FloatArray
 
-DOCS = Path(__file__).parents[1] / "docs"
 PAGE = (DOCS / "accelerations.md").read_text(encoding="utf-8")
 Q, V, A = np.array([np.pi / 2.0, 0.5]), np.array([2.0, 0.3]), np.zeros(2)
 
 
-@pytest.mark.parametrize("page", ["hessian", "accelerations"])
-def test_every_block_prints_what_stands_below_it(page: str) -> None:
-    blocks = BLOCK.findall((DOCS / f"{page}.md").read_text(encoding="utf-8"))
-    kinds = [kind for kind, _ in blocks]
-    assert kinds == ["python", "text"] * (len(blocks) // 2)
-    namespace: dict[str, Any] = {}
-    for (_, code), (_, shown) in zip(blocks[::2], blocks[1::2], strict=True):
-        printed = io.StringIO()
-        with contextlib.redirect_stdout(printed):
-            exec(compile(code, page, "exec"), namespace)
-        assert tidy(printed.getvalue()) == tidy(shown)
+#: Pages whose blocks other tests run, or that need what a test must not have.
+ELSEWHERE = {
+    "tour.md": "tests/test_tour.py",
+    "dh-at-work.md": "tests/dh/test_at_work_page.py",
+    "dh.md": "tests/cli/test_dh.py",
+    "enclosures.md": "tests/verify/exact/test_enclosure.py",
+    "campaigns.md": "a scheduler on another machine",
+}
+
+
+def runs(page: str) -> bool:
+    return any(kind in ("python", "console") for kind, _ in blocks(page)) and page not in ELSEWHERE
+
+
+SLOW = {"same.md": pytest.mark.slow}
+
+
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, marks=SLOW.get(page, ())) for page in pages() if runs(page)]
+)
+def test_every_block_prints_what_stands_below_it(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with np.printoptions(), warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # examples of what is warned of
+        for block in run(page):
+            assert block.agrees(), f"{block.code}\n{block.printed}"
+
+
+@pytest.mark.parametrize("page", ELSEWHERE)
+def test_a_page_that_is_run_elsewhere_is_named_there(page: str) -> None:
+    where = ELSEWHERE[page]
+    assert not where.startswith("tests/") or page.removesuffix(".md") in (DOCS.parent / where).read_text(
+        "utf-8"
+    )
 
 
 def rows(library: str) -> list[tuple[str, FloatArray]]:
@@ -93,3 +116,42 @@ def test_what_the_page_says_of_mujoco_is_so() -> None:
     assert len(said) == len(asked)
     for (call, numbers), theirs in zip(said, asked, strict=True):
         np.testing.assert_allclose(theirs, numbers, atol=1e-12, err_msg=call)
+
+
+def table_rows(heading: str) -> list[list[str]]:
+    """The rows of a table of docs/coming-from.md: what stands between backticks in each cell."""
+    section = (DOCS / "coming-from.md").read_text("utf-8").split(f"\n## {heading}")[1].split("\n## ")[0]
+    lines = [line for line in section.splitlines() if line.startswith("| ")][1:]
+    return [re.findall(r"`([^`]+)`", line) for line in lines]
+
+
+def test_what_is_said_to_be_pinocchios_and_ours_is_the_same() -> None:
+    (setup, *_) = (text for kind, text in blocks("coming-from.md") if kind == "python")
+    names: dict[str, object] = {}
+    exec(setup, names)
+    told = table_rows("Pinocchio")
+    assert len(told) >= 8
+    for theirs, ours in told:
+        a, b = eval(theirs, names), eval(ours, names)
+        if isinstance(b, list | tuple):
+            assert tuple(a) == tuple(b), ours
+        else:
+            np.testing.assert_allclose(b, a, atol=1e-13, err_msg=ours)
+
+
+@pytest.mark.parametrize("heading", ["Robotics Toolbox", "MATLAB"])
+def test_what_is_said_to_be_ours_runs(heading: str) -> None:
+    (setup, *_) = (text for kind, text in blocks("coming-from.md") if kind == "python")
+    names: dict[str, object] = {}
+    exec(setup, names)
+    group = cli.make_context("urdfkin", ["--help"], resilient_parsing=True)
+    told = [row[-1] for row in table_rows(heading)]
+    assert len(told) >= 8
+    for ours in told:
+        if ours.startswith("urdfkin "):
+            _, name, *words = ours.split()
+            command = cli.get_command(group, name)
+            assert command is not None, ours
+            command.make_context(name, words, parent=group)
+        else:
+            eval(ours, names)

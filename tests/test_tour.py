@@ -1,37 +1,21 @@
 """docs/tour.md runs, prints what it says, and has its pictures."""
 
-import contextlib
-import io
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from tests.pages import DOCS, run
+
 pytestmark = pytest.mark.slow
 
-DOCS = Path(__file__).parents[1] / "docs"
 TOUR = (DOCS / "tour.md").read_text(encoding="utf-8")
-BLOCK = re.compile(r"```(python|text)\n(.*?)```", re.DOTALL)
 
 
 def test_every_block_runs_and_prints_what_stands_below_it() -> None:
-    namespace: dict[str, Any] = {}
-    blocks = BLOCK.findall(TOUR)
-    assert sum(kind == "python" for kind, _ in blocks) > 10
-    for i, (kind, text) in enumerate(blocks):
-        if kind != "python":
-            continue
-        printed = io.StringIO()
-        with contextlib.redirect_stdout(printed):
-            exec(compile(text, "docs/tour.md", "exec"), namespace)
-        shown = blocks[i + 1][1] if i + 1 < len(blocks) and blocks[i + 1][0] == "text" else ""
-        # A zero may print as -0: its sign is rounding.
-        assert tidy(printed.getvalue()) == tidy(shown), text
-
-
-def tidy(text: str) -> list[str]:
-    return re.sub(r"-0\.(?![0-9])", " 0.", re.sub(r"[\[\]]", " ", text)).split()
+    ran = list(run("tour.md"))
+    assert len(ran) > 10
+    assert [block for block in ran if not block.agrees()] == []
 
 
 def test_every_picture_is_there_and_described() -> None:

@@ -1,0 +1,130 @@
+"""Make pictures for README and site: the three references, photographs of the report and the viewer.
+
+Needs the extras `plots`, `view` and `test`, and Debian's chromium and chromium-driver.
+"""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from PIL import Image
+
+import urdfkin
+from scripts.make_tour import IMAGES, INK, QUIET, RED, STYLE, arrow
+from tests.report.browser import Browser, opened
+from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.report.html import as_html
+from urdfkin.view.server import new_server
+from urdfkin.view.viewer import Viewer
+
+if TYPE_CHECKING:
+    from urdfkin.report.document import Document
+
+GREEN = "#3a8a4d"
+POSE = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8, 0.04]
+
+
+def _axes(axes: Any, at: FloatArray, R: FloatArray) -> None:
+    """Two axes in red and green."""
+    for k, color in enumerate((RED, GREEN)):
+        arrow(axes, at, 0.17 * R[:, k], color)
+        axes.text(*(at + 0.23 * R[:, k]), "xy"[k], color=color, ha="center", va="center", fontsize=9)
+
+
+def reference_frames() -> Any:
+    """The bent planar arm of docs/reference-frames.md, a panel for each reference."""
+    arm, q, v = urdfkin.load("planar_two_link"), [0.0, np.pi / 2], [1.0, 1.0]
+    figure, panels = plt.subplots(1, 3, figsize=(9.6, 3.6), sharey=True, layout="constrained")
+    points = arm.placement(q, ["base", "link_2", "tip"])[:, :2, 3]
+    R_tip, tip, world = arm.placement(q, "tip")[:2, :2], points[-1], np.eye(2)
+    told = (
+        ("local_world_aligned", tip, world, "(-0.8, 0.5): the tip, along the world's axes"),
+        ("local", tip, R_tip, "(0.5, 0.8): the tip, along its own axes"),
+        ("world", np.zeros(2), world, "(0, -0.5): the point at the world's origin"),
+    )
+    for axes, (reference, at, R, title) in zip(panels, told, strict=True):
+        axes.plot(
+            *points.T, "-o", color="#c3ccd6", linewidth=7, markersize=9, markerfacecolor=QUIET, zorder=1
+        )
+        if reference == "world":
+            axes.plot(*np.array([tip, at]).T, color=QUIET, linestyle=":", linewidth=1.2, zorder=0)
+        _axes(axes, at, R)
+        numbers = arm.velocity(q, v, "tip", reference)[:2]
+        arrow(axes, at, 0.6 * R @ numbers, INK)
+        for k, color in enumerate((RED, GREEN)):  # the arrow's two numbers, as steps along the axes
+            begin = at + (0.6 * R[:, 0] * numbers[0] if k else 0)
+            axes.plot(
+                *np.array([begin, begin + 0.6 * R[:, k] * numbers[k]]).T, color=color, linewidth=1.2, ls="--"
+            )
+        axes.set(xlim=(-0.35, 0.95), ylim=(-0.36, 0.8), xticks=(), yticks=())
+        axes.set_aspect("equal")
+        axes.spines[:].set_visible(False)
+        axes.set_title(f"{reference.upper()}\n{title}", fontsize=9)
+    return figure
+
+
+def photograph_report(folder: Path) -> None:
+    """The page of a report about two robots, the first unfolded, its robot bent."""
+    page = folder / "report.html"
+    found = urdfkin.validate(["panda", "ur5"], samples=1000)
+    text = as_html(cast("Document", found.as_dict()))
+    installed = str(
+        Path(urdfkin.load("panda").path or "").parents[2]
+    )  # whose machine it was is nobody's business
+    page.write_text(text.replace(installed, "example-robot-data"), encoding="utf-8")
+    with opened(folder / "report", width=1000, height=1250) as browser:
+        browser.open(page)
+        browser.js("document.querySelector('details.robot').open = true; scrollTo(0, 0)")
+        browser.settle()
+        keep(browser, "report")
+
+
+def photograph_viewer(folder: Path) -> None:
+    """The viewer beside its controls, and on a phone."""
+    server = new_server(port=8099)
+    try:
+        viewer = Viewer(server, urdfkin.load("panda"), POSE)
+        viewer.dh.value = "standard"
+        for name, width, height in (("viewer", 1100, 800), ("viewer-phone", 400, 800)):
+            with opened(folder / name, width=width, height=height) as browser:
+                browser.chrome.get(server.address)
+                browser.wait("return document.querySelector('canvas') !== null")
+                time.sleep(60)  # shapes fade in, and a software renderer is slow
+                browser.js(
+                    "document.querySelectorAll('[class*=Notification] button').forEach(b => b.click())"
+                )
+                time.sleep(5)
+                keep(browser, name)
+    finally:
+        server.stop()
+
+
+def keep(browser: Browser, name: str) -> None:
+    """A picture of few colours, so that it is small."""
+    image = Image.open(io.BytesIO(browser.chrome.get_screenshot_as_png())).convert("RGB")
+    image.quantize(128).save(IMAGES / f"{name}.png", optimize=True)
+
+
+def main() -> None:
+    """Make them all."""
+    with mpl.rc_context(STYLE):
+        figure = reference_frames()
+        figure.savefig(IMAGES / "reference-frames.svg", metadata={"Date": None})
+        plt.close(figure)
+    with tempfile.TemporaryDirectory() as folder:
+        photograph_report(Path(folder))
+        photograph_viewer(Path(folder))
+
+
+if __name__ == "__main__":
+    main()

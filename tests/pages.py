@@ -1,0 +1,62 @@
+"""A page of the documentation as a test sees it: blocks that are run in order, and what they print."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from tests.cli.running import urdfkin
+
+DOCS = Path(__file__).parents[1] / "docs"
+_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+
+
+class Ran(NamedTuple):
+    """A block that was run, what the page shows below it, and what it printed."""
+
+    code: str
+    shown: str
+    printed: str
+
+    def agrees(self) -> bool:
+        """Whether they are the same but for blanks and the signs of zeros; `...` stands for anything."""
+        words = [re.escape(word) for word in tidy(self.shown)]
+        pattern = " ".join(words).replace(re.escape("..."), ".*")
+        return re.fullmatch(pattern, " ".join(tidy(self.printed)), re.DOTALL) is not None
+
+
+def tidy(text: str) -> list[str]:
+    """The words; a zero may print as -0, since its sign is rounding."""
+    return re.sub(r"-0\.(?![0-9])", " 0.", re.sub(r"[\[\]]", " ", text)).split()
+
+
+def pages() -> list[str]:
+    """Every page by its path below docs."""
+    return sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md"))
+
+
+def blocks(page: str) -> list[tuple[str, str]]:
+    """Language and text of each block."""
+    return _BLOCK.findall((DOCS / page).read_text(encoding="utf-8"))
+
+
+def run(page: str) -> Iterator[Ran]:
+    """Its Python in one namespace, its `$ urdfkin` lines in this process, in order."""
+    namespace: dict[str, Any] = {}
+    below = [*blocks(page)[1:], ("", "")]
+    for (kind, text), (next_kind, next_text) in zip(blocks(page), below, strict=True):
+        if kind == "python":
+            printed = io.StringIO()
+            with contextlib.redirect_stdout(printed):
+                exec(compile(text, page, "exec"), namespace)
+            yield Ran(text, next_text if next_kind == "text" else "", printed.getvalue())
+        elif kind == "console":
+            for example in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
+                command, _, shown = example.partition("\n")
+                done = urdfkin(*shlex.split(command)[1:])
+                yield Ran(command, shown, done.text + done.err)
