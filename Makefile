@@ -1,6 +1,6 @@
 # The loop of whoever changes urdfkin; CONTRIBUTING.md says when to run what.
 PATH := $(CURDIR)/.venv/bin:$(PATH)
-.PHONY: help setup format check fast test search docs bench
+.PHONY: help setup format check fast test search docs site bench
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 10
@@ -27,12 +27,16 @@ test: check  ## everything that must pass
 search:  ## the quick tests, their properties on examples that were never tried
 	pytest -q -n 2 -m "not slow and not browser" --hypothesis-profile=search
 
-docs:  ## the pages that are generated from the code
+docs:  ## the pages that are generated from the code, then the site
 	python scripts/make_equations.py
 	python scripts/make_findings.py
 	python scripts/make_reports.py
 	python scripts/make_performance.py
 	python scripts/make_tour.py
+	$(MAKE) site
+
+site:  ## the documentation as a site, in site/index.html: no network, now or later
+	mkdocs build --strict
 
 bench:  ## beside Pinocchio, in seconds
 	python scripts/benchmark.py --quick

@@ -1,0 +1,120 @@
+"""The documentation as a site: it builds without a warning, stands alone, and reads well in a browser."""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import urdfkin
+from scripts.docs_docstrings import fenced
+from scripts.docs_site import commands_page, library_page, notebook
+from tests.pages import DOCS, blocks, pages
+from tests.report.browser import Browser, opened
+from urdfkin.cli import commands
+from urdfkin.kinematics.registry import equations
+
+ROOT = DOCS.parent
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Built as `make site` builds it."""
+    from mkdocs.commands.build import build  # noqa: PLC0415  of the extra `docs`
+    from mkdocs.config import load_config  # noqa: PLC0415
+
+    folder = tmp_path_factory.mktemp("site")
+    logging.getLogger("mkdocs").setLevel(logging.WARNING)
+    config = load_config(str(ROOT / "mkdocs.yml"), site_dir=str(folder), strict=True)
+    config.plugins.on_startup(command="build", dirty=False)
+    build(config)  # strict: a link or heading that is not there ends it
+    return folder
+
+
+@pytest.mark.slow
+def test_every_page_is_built_and_in_the_menu(site: Path) -> None:
+    built = {str(path.relative_to(site).with_suffix("")) for path in site.rglob("*.html")} - {"404"}
+    assert built == {page.removesuffix(".md") for page in pages()} | {"cli", "api"}
+    menu = (ROOT / "mkdocs.yml").read_text("utf-8").partition("\nnav:")[2]
+    assert set(re.findall(r": (\S+)\.md$", menu, re.MULTILINE)) == built
+
+
+@pytest.mark.slow
+def test_every_equation_is_mathematics_and_no_formula_is_left_in_the_words_of_latex(site: Path) -> None:
+    page = (site / "equations.html").read_text("utf-8")
+    assert page.count("<math") == len(equations())
+    for path in site.rglob("*.html"):
+        assert "$<code>" not in path.read_text("utf-8"), path
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_the_site_opens_from_a_disc_asks_no_network_and_can_be_searched(site: Path, desk: Browser) -> None:
+    desk.requests()
+    for page in ("index", "questions", "lessons/planar-arm", "api"):
+        desk.open(site / f"{page}.html")
+        assert [url for url in desk.requests() if not url.startswith(("file:", "data:"))] == []
+        assert desk.errors() == []
+    desk.js(
+        "const box = document.querySelector('input.md-search__input'); box.focus(); box.value = 'continuous';"
+        "box.dispatchEvent(new KeyboardEvent('keyup', {bubbles: true}))"
+    )
+    desk.wait("return document.querySelectorAll('.md-search-result__item').length > 2")
+    assert desk.errors() == []
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_no_page_is_wider_than_a_phone(site: Path, tmp_path: Path) -> None:
+    with opened(tmp_path, width=390, height=844) as phone:
+        for page in (
+            "index",
+            "questions",
+            "reference-frames",
+            "equations",
+            "lessons/planar-arm",
+            "cli",
+            "api",
+        ):
+            phone.open(site / f"{page}.html")
+            phone.settle()
+            assert phone.js("return document.documentElement.scrollWidth") <= 390, page
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with opened(tmp_path_factory.mktemp("profile")) as browser:
+        browser.chrome.get("about:blank")  # what a new tab asks for is none of ours
+        yield browser
+
+
+def test_the_pages_of_commands_and_of_the_library_hold_every_name() -> None:
+    page = commands_page()
+    assert [name for name in commands() if f"\n## urdfkin {name}\n" not in page] == []
+    assert "Usage: urdfkin campaign merge" in page
+    assert re.findall(r"^::: .*\.(\w+)$", library_page(), re.MULTILINE) == list(urdfkin.__all__)
+
+
+@pytest.mark.parametrize("page", [page for page in pages() if page.startswith("lessons/")])
+def test_a_lesson_is_a_notebook_with_what_it_prints(page: str) -> None:
+    made = json.loads(json.dumps(notebook((DOCS / page).read_text("utf-8"))))
+    code = [cell for cell in made["cells"] if cell["cell_type"] == "code"]
+    told = blocks(page)
+    assert [cell["source"] for cell in code] == [text.rstrip() for kind, text in told if kind == "python"]
+    shown = [output["text"] for cell in code for output in cell["outputs"]]
+    assert shown == [text for kind, text in told if kind == "text"]
+    words = "".join(cell["source"] for cell in made["cells"] if cell["cell_type"] == "markdown")
+    assert "```" not in words
+    assert words.count("$") >= 2
+    assert "`$" not in words
+
+
+def test_a_doctest_in_a_docstring_is_a_block_of_code() -> None:
+    assert fenced("It adds.\n\n>>> add(1,\n...     2)\n3\n\nAnd so on.") == (
+        "It adds.\n\n```pycon\n>>> add(1,\n...     2)\n3\n```\n\nAnd so on."
+    )
+    assert fenced("Example:\n    >>> 1\n    1\n") == "Example:\n    ```pycon\n    >>> 1\n    1\n    ```\n"
