@@ -49,7 +49,7 @@ _AFTER: dict[str, tuple[str, str]] = {
     "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
     "campaign": ("urdfkin.cli.campaign", "validations kept in a folder: how far they are, merged"),
     "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),
-    "explain": ("urdfkin.cli.explain", "what a finding's code means, or an equation's number"),
+    "explain": ("urdfkin.cli.explain", "what a finding's code means, an equation, or a question"),
     "report": ("urdfkin.cli.report", "show or write the report of an earlier validation"),
     "plot": ("urdfkin.cli.plot", "a frame's motion along a trajectory, as a picture"),
     "view": ("urdfkin.cli.view", "a robot in a browser tab, with sliders and arrows"),

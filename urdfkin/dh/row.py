@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.errors import InputError
+from urdfkin.errors.questions import Question
 from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic
 
 
@@ -27,7 +28,9 @@ def convention_of(name: str) -> Convention:
         return Convention(name)
     except (ValueError, TypeError):
         raise InputError(
-            "unknown convention", found=repr(name), remedy="say 'standard' or 'modified'"
+            "unknown convention",
+            found=repr(name),
+            remedy=f"say 'standard' or 'modified'; {Question.WHICH_DH_CONVENTION}",
         ) from None
 
 

@@ -11,6 +11,7 @@ from typing import Any, Self, TypeVar
 
 from urdfkin.errors.nearest import nearest
 from urdfkin.errors.printable import printable
+from urdfkin.errors.questions import Question
 
 _E = TypeVar("_E", bound="UrdfkinError")
 
@@ -76,7 +77,15 @@ class UnknownNameError(UrdfkinError, LookupError):
         nearest: Up to three existing names that look like it.
     """
 
-    def __init__(self, kind: str, name: str, known: Iterable[str], *, where: str | None = None) -> None:
+    def __init__(
+        self,
+        kind: str,
+        name: str,
+        known: Iterable[str],
+        *,
+        where: str | None = None,
+        question: Question | None = None,
+    ) -> None:
         names = sorted(set(known))
         close = nearest(name, names, cutoff=0.5)
         if close:
@@ -85,6 +94,8 @@ class UnknownNameError(UrdfkinError, LookupError):
             remedy = f"there are {len(names)}: {', '.join(names[:6])}{', ...' if len(names) > 6 else ''}"
         else:
             remedy = "there are none"
+        if question is not None:
+            remedy = f"{remedy}; {question}"
         super().__init__(f"unknown {kind} {name!r}", where=where, remedy=remedy)
         self.name = name
         self.nearest = tuple(close)

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from urdfkin.errors import InputError, NotFiniteError
+from urdfkin.errors.questions import Question
 from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, unit_quaternions
 from urdfkin.model.given import Given, Places
@@ -331,7 +332,10 @@ def _angle_back(joint: Joint, values: FloatArray) -> FloatArray:
     norm = np.hypot(cosine, sine)
     if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
         raise InputError(
-            "(cos, sin) must have norm 1", where=f"joint {joint.name}", found=f"{norm.max():.9g}"
+            "(cos, sin) must have norm 1",
+            where=f"joint {joint.name}",
+            found=f"{norm.max():.9g}",
+            remedy=str(Question.CONTINUOUS_JOINTS),
         )
     return np.concatenate((values[..., :-2], np.arctan2(sine, cosine)[..., None]), axis=-1)
 
@@ -348,5 +352,5 @@ def _check_follows(joint: Joint, leader: FloatArray, values: FloatArray) -> None
             f"a follower must be {rule.multiplier:g} * {rule.leader} + {rule.offset:g}",
             where=f"joint {joint.name}",
             found=f"it is off by {np.abs(off).max():.3g}",
-            remedy="load with mimic=False to move it freely",
+            remedy=f"load with mimic=False to move it freely; {Question.MIMIC_JOINTS}",
         )

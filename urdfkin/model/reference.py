@@ -6,6 +6,7 @@ from enum import IntEnum
 
 from urdfkin.errors import UnknownNameError
 from urdfkin.errors.demands import shown
+from urdfkin.errors.questions import Question
 
 
 class Reference(IntEnum):
@@ -32,5 +33,6 @@ class Reference(IntEnum):
             return value
         name = value if isinstance(value, str) else shown(value)
         if name.upper() not in cls.__members__:
-            raise UnknownNameError("reference", name, [member.lower() for member in cls.__members__])
+            known = [member.lower() for member in cls.__members__]
+            raise UnknownNameError("reference", name, known, question=Question.REFERENCE_FRAMES)
         return cls[name.upper()]

@@ -22,6 +22,15 @@ def robots_dir() -> Path:
     raise SourceError("urdfkin's own robots are missing", where=str(here), remedy="install urdfkin again")
 
 
+def questions_page() -> Path:
+    """docs/questions.md: inside the package once installed, among the docs in a checkout."""
+    here = Path(__file__).resolve().parents[1]
+    for file in (here / "questions.md", here.parent / "docs" / "questions.md"):
+        if file.is_file():
+            return file
+    raise SourceError("urdfkin's questions are missing", where=str(here), remedy="install urdfkin again")
+
+
 @cache
 def example_robots_dir() -> Path:
     """`share/example-robot-data/robots`, found without importing anything of it.

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import InstallationError
+from urdfkin.errors.questions import Question
 
 #: The versions that check: what accelerations and J-dot mean in them was measured.
 _MAJOR = "4"
@@ -72,7 +73,8 @@ def _impostor(found: Any) -> InstallationError:
         "the module `pinocchio` is not Pinocchio, the library that checks results",
         where=str(file),
         found=what,
-        remedy=f"Pinocchio's package is called pin: {cure}; pip install {_WANTED}",
+        remedy=f"Pinocchio's package is called pin: {cure}; pip install {_WANTED}; "
+        f"{Question.WRONG_PINOCCHIO}",
     )
 
 
