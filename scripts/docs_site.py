@@ -25,6 +25,16 @@ _NAME_OF_FUNCTION = re.compile(r"(<mi>(?:cos|sin)</mi>)(?=<m(?:i|sub)>)")
 _FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n?", re.DOTALL | re.MULTILINE)
 
 
+def on_config(config: Any) -> Any:
+    """No page is forgotten: those that mkdocs.yml does not name come last in the menu."""
+    named = set(re.findall(r"[\w/-]+\.md", json.dumps(config.nav)))
+    docs = Path(config.docs_dir)
+    pages = sorted(str(path.relative_to(docs)) for path in docs.rglob("*.md"))
+    if more := [page for page in pages if page not in named]:
+        config.nav.append({"More": more})
+    return config
+
+
 def on_files(files: Any, config: Any) -> Any:
     """Add the pages that are made of the program, and a notebook for each lesson."""
     from mkdocs.structure.files import File  # noqa: PLC0415  of the extra `docs`

@@ -274,7 +274,9 @@ def test_what_is_printed_goes_through_the_door() -> None:
     allowed = {
         "door.py": ("click.echo(printable(line)",),
         "info.py": ("click.echo()",), "robots.py": ("click.echo()",),
-        "explain.py": ("click.echo(equation)", "click.echo(explain(", 'click.echo(f"{rule.id}'),
+        "explain.py": (
+            "click.echo(equation)", "click.echo(answer)", "click.echo(explain(", 'click.echo(f"{rule.id}',
+        ),
         "checked.py": ("click.echo(as_json(", "click.echo(as_sarif("),
         "report.py": ("click.echo(asset(",), "compare.py": ("click.echo(json.dumps(",),
         "same.py": ("click.echo(schema_text()",),
