@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
-import sys
+from pathlib import Path
 
 from packaging.requirements import Requirement
 
@@ -17,7 +17,7 @@ def closure(name: str) -> dict[str, int]:
         if name in found:
             continue
         distribution = importlib.metadata.distribution(name)
-        files = [path.locate() for path in distribution.files or ()]
+        files = [Path(path.locate()) for path in distribution.files or ()]
         found[name] = sum(file.stat().st_size for file in files if file.is_file())
         needs = map(Requirement, distribution.requires or ())
         waiting += [need.name for need in needs if need.marker is None or need.marker.evaluate({"extra": ""})]
@@ -34,4 +34,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
