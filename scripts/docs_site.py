@@ -93,7 +93,7 @@ def notebook(page: str) -> dict[str, Any]:
             cells[-1]["outputs"].append({"output_type": "stream", "name": "stdout", "text": text})
     _tell(cells, page[at:])
     kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
-    return {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}
+    return {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 4}
 
 
 def _tell(cells: list[dict[str, Any]], text: str) -> None:
@@ -115,7 +115,7 @@ def library_page() -> str:
 
 def commands_page() -> str:
     """Every command as `--help` prints it."""
-    parent = click.Context(cli, info_name="urdfkin", **cli.context_settings)
+    parent = click.Context(cli, info_name="urdfkin", terminal_width=80, **cli.context_settings)
     parts = ["# Commands", "`urdfkin COMMAND --help` prints each of these.", *_help(cli, parent, "##")]
     return "\n\n".join(parts) + "\n"
 

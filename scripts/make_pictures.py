@@ -38,7 +38,14 @@ def _axes(axes: Any, at: FloatArray, R: FloatArray) -> None:
     """Two axes in red and green."""
     for k, color in enumerate((RED, GREEN)):
         arrow(axes, at, 0.17 * R[:, k], color)
-        axes.text(*(at + 0.23 * R[:, k]), "xy"[k], color=color, ha="center", va="center", fontsize=9)
+        axes.text(
+            *(at + 0.2 * R[:, k] + 0.045 * R[:, 1 - k]),
+            "xy"[k],
+            color=color,
+            ha="center",
+            va="center",
+            fontsize=9,
+        )
 
 
 def reference_frames() -> Any:
