@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,12 +15,20 @@ from tests.pages import DOCS
 from urdfkin.cli.questions import answers
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.questions import Question
+from urdfkin.urdf import xacro
 from urdfkin.verify.pinocchio_module import _impostor
 
 WHEEL = """<robot name="wheel"><link name="a"/><link name="b"/><link name="c"/>
 <joint name="axle" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
 <joint name="cap" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
 <limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="axle" multiplier="2"/></joint></robot>"""
+
+
+def _without_xacrodoc() -> object:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(xacro, "find_spec", lambda _: None)
+        return xacro.expand(Path(__file__), {})
+
 
 #: What leads to each question: a call that raises.
 ASKED: dict[Question, list[Callable[[], object]]] = {
@@ -30,6 +39,7 @@ ASKED: dict[Question, list[Callable[[], object]]] = {
     Question.MIMIC_JOINTS: [lambda: urdfkin.load(WHEEL).from_pinocchio([1.0, 0.0, 0.5])],
     Question.REFERENCE_FRAMES: [lambda: urdfkin.load("ur5").jacobian(np.zeros(6), "tool0", "body")],
     Question.WHICH_DH_CONVENTION: [lambda: urdfkin.load("ur5").dh(convention="classic")],
+    Question.XACRO: [_without_xacrodoc],
     Question.WRONG_PINOCCHIO: [lambda: _raised(_impostor(np))],
 }
 

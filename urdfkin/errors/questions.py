@@ -17,6 +17,7 @@ class Question(Enum):
     REFERENCE_FRAMES = "reference-frames"
     WHICH_DH_CONVENTION = "which-dh-convention"
     WRONG_PINOCCHIO = "the-wrong-pinocchio"
+    XACRO = "xacro-without-ros"
 
     def __str__(self) -> str:
         return f"`urdfkin explain {self.value}` says more"

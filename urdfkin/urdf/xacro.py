@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import SourceError, UrdfkinError
+from urdfkin.errors.questions import Question
 from urdfkin.system.interpreter import own_python
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.packages import VARIABLES
@@ -57,7 +58,8 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         raise XacroError(
             "a .xacro file needs the package xacrodoc",
             where=str(path),
-            remedy='install it with "urdfkin[xacro]", or expand the file with: xacro FILE > robot.urdf',
+            remedy='install it with "urdfkin[xacro]", or expand the file with: xacro FILE > robot.urdf;'
+            f" {Question.XACRO}",
         )
     command = own_python("from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8"))
     output, status = _ask(command, _request(path.absolute(), arguments, patience), patience)
