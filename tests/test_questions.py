@@ -33,7 +33,6 @@ def _without_xacrodoc() -> object:
 #: What leads to each question: a call that raises.
 ASKED: dict[Question, list[Callable[[], object]]] = {
     Question.CONTINUOUS_JOINTS: [
-        lambda: urdfkin.load(WHEEL).from_pinocchio([0.3]),
         lambda: urdfkin.load(WHEEL).from_pinocchio([0.3, 0.3, 0.6]),
     ],
     Question.MIMIC_JOINTS: [lambda: urdfkin.load(WHEEL).from_pinocchio([1.0, 0.0, 0.5])],
