@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,12 +12,14 @@ from pathlib import Path
 import pytest
 
 import urdfkin
-from scripts.docs_docstrings import fenced
 from scripts.docs_site import commands_page, library_page, notebook
 from tests.pages import DOCS, blocks, pages
 from tests.report.browser import Browser, opened
 from urdfkin.cli import commands
 from urdfkin.kinematics.registry import equations
+
+if not os.environ.get("CI"):  # there it must be
+    pytest.importorskip("mkdocs", reason="the extra `docs` is not installed")
 
 ROOT = DOCS.parent
 
@@ -114,6 +117,8 @@ def test_a_lesson_is_a_notebook_with_what_it_prints(page: str) -> None:
 
 
 def test_a_doctest_in_a_docstring_is_a_block_of_code() -> None:
+    from scripts.docs_docstrings import fenced  # noqa: PLC0415  imports griffe, of the extra `docs`
+
     assert fenced("It adds.\n\n>>> add(1,\n...     2)\n3\n\nAnd so on.") == (
         "It adds.\n\n```pycon\n>>> add(1,\n...     2)\n3\n```\n\nAnd so on."
     )
