@@ -14,7 +14,6 @@ from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
 from urdfkin.dh import DHTable, dh_table, export
 from urdfkin.dh.hint import noisy_cells
-from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import JointKind, KinematicTree, Mimic
@@ -92,17 +91,6 @@ def test_a_wrong_strict_table_is_a_disagreement_however_long_its_rows_are() -> N
     rows[0] = replace(rows[0], alpha=rows[0].alpha + 1e-3)
     with pytest.raises(TableError, match="DISAGREES"):
         robot.verifier.table(replace(table, rows=tuple(rows)))
-
-
-def test_the_robotics_toolbox_is_told_to_snap_and_what_strict_rows_would_cost() -> None:
-    table = dh_table(leaning(TWELVE_DIGITS), "tip", "l0")
-    strict = dh_table(leaning(TWELVE_DIGITS), "tip", "l0", near_parallel="strict")
-    with pytest.raises(InputError, match=r"snap=1e-12 \(--snap 1e-12\)") as caught:
-        export(table, "roboticstoolbox")
-    message = str(caught.value)
-    assert message.index("snap") < message.index("strict")
-    longest = max(abs(row.d) for row in strict.rows)
-    assert f"d = {longest:.2g} m" in message
 
 
 RACK = """<robot name="rack"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>

@@ -235,7 +235,7 @@ def test_a_name_in_latex_is_words(kind: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("form", ["numpy", "roboticstoolbox"])
+@pytest.mark.parametrize("form", ["numpy", "sympy", "casadi", "roboticstoolbox", "ets"])
 @pytest.mark.parametrize("kind", NAMES)
 def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
     def code(name: str) -> str:
@@ -269,12 +269,12 @@ def test_c_code_is_the_same_under_any_name_and_compiles(kind: str, tmp_path: Pat
         subprocess.run(["gcc", "-std=c99", "-Wall", "-Werror", "-fsyntax-only", file], check=True)
 
 
-@pytest.mark.parametrize("form", ["matlab", "matlab-rst"])
+@pytest.mark.parametrize("form", ["matlab", "matlab-symbolic", "matlab-rst"])
 @pytest.mark.parametrize("kind", NAMES)
 def test_matlab_code_is_the_same_under_any_name(kind: str, form: str) -> None:
     def code(name: str) -> list[str]:
         first, *lines = export(table(name), form).split("\n")
-        assert re.fullmatch(r"function \w+ = \w+\(q?\)", first)
+        assert re.fullmatch(r"function (\w+|\[T, q\]) = \w+\(q?\)", first)
         return [re.sub("'[^']*'", "''", line) for line in lines if not line.startswith("%")]
 
     assert code(NAMES[kind]) == code("tame_name")

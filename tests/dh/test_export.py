@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
-import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from scripts.forms.running import RUN, Job, Missing
 from tests.dh.arms import arm
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift
 from urdfkin.dh import FORMATS, dh_table, export, table_from_rows, units_of
-from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
+from urdfkin.model.tree import KinematicTree, Mimic
 
 EPS = float(np.finfo(np.float64).eps)
 LINK = shift(0.3, 0.1, 0.2) @ rotation("x", 1.0) @ rotation("z", 0.4)
@@ -42,6 +40,11 @@ def coupled() -> KinematicTree:
     return KinematicTree(tree.name, tree.links, tuple(joints))
 
 
+def nearly_parallel() -> KinematicTree:
+    """Nobody follows, and one row has a fifth parameter."""
+    return arm(LINK, shift(0.3, 0.2, 0.0) @ rotation("x", 1e-4) @ rotation("y", 2e-4), LINK, tip=LINK)
+
+
 TREES: dict[str, Callable[[], KinematicTree]] = {
     "coupled": coupled,
     "plain": lambda: arm(LINK, LINK, LINK, kinds="RPR", tip=LINK),
@@ -49,65 +52,16 @@ TREES: dict[str, Callable[[], KinematicTree]] = {
 }
 
 
-def run_numpy(table: DHTable, q: FloatArray, where: Path) -> FloatArray:
-    file = where / "code.py"
-    file.write_text(export(table, "numpy"))
-    spec = importlib.util.spec_from_file_location("code", file)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return np.asarray(module.placement(q))
-
-
-def run_c(table: DHTable, q: FloatArray, where: Path) -> FloatArray:
-    compiler = shutil.which("cc") or pytest.skip("no C compiler")
-    main = f"""
-    #include <stdio.h>
-    int main(void) {{
-        double q[{max(q.shape[1], 1)}], T[16];
-        for (int s = 0; s < {len(q)}; ++s) {{
-            for (int k = 0; k < {q.shape[1]}; ++k) if (scanf("%lf", &q[k]) != 1) return 1;
-            arm_placement(q, T);
-            for (int i = 0; i < 16; ++i) printf("%.17g\\n", T[i]);
-        }}
-        return 0;
-    }}"""
-    (where / "code.c").write_text(export(table, "c") + main)
-    strict = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"]
-    subprocess.run([compiler, *strict, "code.c", "-o", "code", "-lm"], cwd=where, check=True)
-    numbers = "\n".join(repr(float(x)) for x in q.ravel())
-    done = subprocess.run([str(where / "code")], input=numbers, capture_output=True, text=True, check=True)
-    return np.array(done.stdout.split(), dtype=float).reshape(-1, 4, 4)
-
-
-def run_roboticstoolbox(table: DHTable, q: FloatArray, where: Path) -> FloatArray:
-    pytest.importorskip("roboticstoolbox", exc_type=ImportError)
-    file = where / "code.py"
-    file.write_text(export(table, "roboticstoolbox"))
-    scope: dict[str, object] = {}
-    exec(file.read_text(), scope)
-    robot = scope["robot"]
-    return np.array([robot.fkine(one).A for one in q])  # type: ignore[attr-defined]
-
-
-def run_octave(table: DHTable, q: FloatArray, where: Path) -> FloatArray:
-    octave = shutil.which("octave-cli") or pytest.skip("no Octave")
-    (where / "arm_placement.m").write_text(export(table, "matlab"))
-    calls = "".join(
-        f"printf('%.17g\\n', arm_placement([{', '.join(map(repr, one.tolist()))}])');" for one in q
-    )
-    done = subprocess.run([octave, "--eval", calls], cwd=where, capture_output=True, text=True, check=True)
-    return np.array(done.stdout.split(), dtype=float).reshape(-1, 4, 4)
-
-
 def check(
-    run: Callable[[DHTable, FloatArray, Path], FloatArray], tree: KinematicTree, convention: str, where: Path
+    form: str, tree: KinematicTree, convention: str, where: Path, samples: int = 5, **options: Any
 ) -> None:
-    table = dh_table(tree, "tip", convention=convention)
-    q = configurations(tree.nq, 5)
+    table = dh_table(tree, "tip", convention=convention, **options)
+    q = configurations(tree.nq, samples)
     theirs = TreeOracle(tree).placement(q, "tip", "l0")
-    found = run(table, q, where)
+    try:
+        (found,) = RUN[form]([Job(table, q)], where)
+    except Missing as error:
+        pytest.skip(f"{error} is missing")
     assert found.shape == theirs.shape
     assert np.abs(found - theirs).max() <= 300 * EPS * (1 + table.span)
 
@@ -115,31 +69,77 @@ def check(
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 @pytest.mark.parametrize("name", TREES)
-@pytest.mark.parametrize("run", [run_numpy, run_c, run_octave])
+@pytest.mark.parametrize("form", ["numpy", "c", "matlab", "sympy", "casadi"])
 def test_written_code_computes_what_pinocchio_computes(
-    run: Callable[[DHTable, FloatArray, Path], FloatArray], name: str, convention: str, tmp_path: Path
+    form: str, name: str, convention: str, tmp_path: Path
 ) -> None:
-    check(run, TREES[name](), convention, tmp_path)
+    check(form, TREES[name](), convention, tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", ["standard", "modified"])
-def test_code_for_roboticstoolbox_computes_what_pinocchio_computes(convention: str, tmp_path: Path) -> None:
-    check(run_roboticstoolbox, TREES["plain"](), convention, tmp_path)
+@pytest.mark.parametrize("form", ["roboticstoolbox", "ets"])
+def test_code_for_roboticstoolbox_computes_what_pinocchio_computes(
+    form: str, convention: str, tmp_path: Path
+) -> None:
+    check(form, TREES["plain"](), convention, tmp_path)
+    check(form, nearly_parallel(), convention, tmp_path)
 
 
-def test_a_flipped_joint_reaches_the_written_code(tmp_path: Path) -> None:
-    tree = TREES["plain"]()
-    table, q = dh_table(tree, "tip", flip=["j2", "j3"]), configurations(3, 4)
-    theirs = TreeOracle(tree).placement(q, "tip", "l0")
-    for run in (run_numpy, run_c):
-        np.testing.assert_allclose(run(table, q, tmp_path), theirs, atol=1e-14)
+@pytest.mark.slow
+def test_matlabs_symbols_compute_what_pinocchio_computes(tmp_path: Path) -> None:
+    check("matlab-symbolic", arm(rotation("x", math.pi / 2) @ shift(0.3, 0.1, 0)), "standard", tmp_path, 1)
 
 
-def test_roboticstoolbox_is_told_what_it_cannot_hold() -> None:
-    with pytest.raises(InputError, match="fifth parameter"):
-        export(dh_table(coupled(), "tip"), "roboticstoolbox")
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["numpy", "c", "sympy", "casadi", "roboticstoolbox", "ets"])
+def test_a_flipped_joint_reaches_the_written_code(form: str, tmp_path: Path) -> None:
+    check(form, TREES["plain"](), "standard", tmp_path, flip=["j2", "j3"])
+
+
+@pytest.mark.parametrize("form", ["roboticstoolbox", "ets", "matlab-rst"])
+def test_a_form_without_followers_says_so(form: str) -> None:
     with pytest.raises(InputError, match="follows another"):
-        export(dh_table(coupled(), "tip", near_parallel="strict"), "roboticstoolbox")
+        export(dh_table(coupled(), "tip"), form)
+
+
+def test_the_fifth_parameter_is_a_transform_of_its_own_and_limits_go_along() -> None:
+    tree = nearly_parallel()
+    text = export(dh_table(tree, "tip"), "roboticstoolbox")
+    assert "ET.Ry(" in text
+    assert "DHRobot" not in text
+    robot = export(dh_table(TREES["plain"](), "tip"), "roboticstoolbox")
+    assert "rtb.DHRobot(" in robot
+    limited = table_from_rows(
+        [{"a": 1, "alpha": 0, "d": 0, "theta": 0, "limit": {"lower": -1.5, "upper": 2.5}}, [1, 0, 0, 0]],
+        "standard",
+    )
+    for form in ("roboticstoolbox", "ets"):
+        assert export(limited, form).count("qlim=[-1.5, 2.5]") == export(limited, form).count("qlim") == 1
+
+
+def test_numbers_in_symbols_are_those_that_somebody_wrote() -> None:
+    rows = [[0.425, 90, 0, 0], [1.0 / 3.0, 15, -0.1, -75], [0, 1e-7, 2, 0, "P"]]
+    table = table_from_rows(rows, "standard", angles="degrees")
+    lines = export(table, "sympy").splitlines()
+    first = lines.index("    return [")
+    assert [line.strip() for line in lines[first + 1 : first + 4]] == [
+        "(Rational(17, 40), pi/2, 0, q1),",
+        "(0.3333333333333333, pi/12, -Rational(1, 10), q2 - 5*pi/12),",
+        f"(0, {math.radians(1e-7)!r}, q3 + 2, 0),",
+    ]
+    matlab = export(table, "matlab-symbolic")
+    assert "sym(17)/40, sym(pi)/2, 0, q1\n" in matlab
+    assert "vpa('0.3333333333333333'), sym(pi)/12, -sym(1)/10, q2 - 5*sym(pi)/12\n" in matlab
+
+
+def test_what_sympy_makes_of_a_table_is_exact() -> None:
+    sympy = pytest.importorskip("sympy")
+    scope: dict[str, Any] = {}
+    exec(export(PLAIN, "sympy"), scope)
+    q1, q2, q3 = sympy.symbols("q1:4")
+    T = scope["placement"]([q1, q2, q3])
+    assert sympy.simplify(T[2, 3] - sympy.Rational(3, 10) + sympy.Rational(2, 5) * sympy.cos(q2)) == 0
 
 
 @pytest.mark.parametrize("form", FORMATS)

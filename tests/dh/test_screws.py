@@ -136,7 +136,7 @@ def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
     np.testing.assert_allclose(p, T[:3, 3], atol=1e-14)
     np.testing.assert_allclose(R @ names["R6T"], T[:3, :3], atol=1e-14)
     assert json.loads(write_screws(arm, "json"))["space"] == SPACE
-    assert r"\end{bmatrix}$.}" in write_screws(arm, "latex")
+    assert r"\end{bmatrix}$" in write_screws(arm, "latex")
     if octave := shutil.which("octave-cli"):
         (tmp_path / "robot_screws.m").write_text(write_screws(arm, "matlab"))
         script = "[M, S, B] = robot_screws(); printf('%.17g ', S(:), M(:))"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 
 import numpy as np
@@ -93,5 +94,8 @@ def test_the_table_is_written_with_its_antecedents() -> None:
     assert lines[0] == "arm: Khalil-Kleinfinger parameters, l0 is frame 0"
     assert lines[6].split() == ["2", "j2", "1", "1", "0", "0", "90", "50", "0", "q(j2)"]
     assert write_tree(table, "markdown", units_of()).count("|") == 11 * 5
-    assert write_tree(table, "csv", units_of()).splitlines()[0].startswith("joint,link,antecedent,sigma")
+    sheet = list(csv.DictReader(write_tree(table, "csv", units_of()).splitlines()))
+    assert list(sheet[0])[:4] == ["joint", "link", "antecedent", "sigma"]
+    for row, T in zip(sheet, table.T_frame_link, strict=True):
+        assert [float(row[f"T{i}{j}"]) for i in (1, 2, 3) for j in (1, 2, 3, 4)] == T[:3].ravel().tolist()
     assert [row["antecedent"] for row in as_mapping(table)["rows"]] == [0, 1, 2]

@@ -18,14 +18,15 @@ from urdfkin.cli.reports import check_writable
 #: Forms of a table. They repeat `urdfkin.dh.export.FORMATS`, whose import --help does not need.
 FORMATS = (
     *("terminal", "markdown", "html", "latex", "csv", "json", "toml"),
-    *("numpy", "matlab", "matlab-rst", "roboticstoolbox", "c", "urdf", "svg"),
+    *("numpy", "sympy", "casadi", "matlab", "matlab-symbolic", "matlab-rst", "roboticstoolbox", "ets"),
+    *("c", "urdf", "svg"),
 )
 
 ENDINGS = {
     ".txt": ("terminal",), ".md": ("markdown",), ".html": ("html",), ".tex": ("latex",), ".csv": ("csv",),
-    ".json": ("json",),
-    ".toml": ("toml",), ".py": ("numpy", "roboticstoolbox"), ".m": ("matlab", "matlab-rst"), ".c": ("c",),
-    ".h": ("c",), ".urdf": ("urdf",), ".svg": ("svg",),
+    ".json": ("json",), ".toml": ("toml",), ".py": ("numpy", "sympy", "casadi", "roboticstoolbox", "ets"),
+    ".m": ("matlab", "matlab-symbolic", "matlab-rst"), ".c": ("c",), ".h": ("c",), ".urdf": ("urdf",),
+    ".svg": ("svg",),
 }  # fmt: skip
 
 EXAMPLE = "urdfkin dh ur5 --base base --tip tool0 --snap 1e-6 --degrees --millimetres"

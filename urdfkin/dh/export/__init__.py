@@ -22,8 +22,12 @@ FORMATS: dict[str, tuple[str, str]] = {
     "toml": ("urdfkin.dh.export.toml", "TOML, read back by urdfkin"),
     "numpy": ("urdfkin.dh.export.numpy", "Python code on NumPy"),
     "matlab": ("urdfkin.dh.export.matlab", "MATLAB code, plain matrices"),
+    "sympy": ("urdfkin.dh.export.sympy", "Python code for SymPy, exact"),
+    "casadi": ("urdfkin.dh.export.casadi", "Python code for CasADi"),
+    "matlab-symbolic": ("urdfkin.dh.export.matlab_symbolic", "MATLAB code for the Symbolic Math Toolbox"),
     "matlab-rst": ("urdfkin.dh.export.matlab_rst", "MATLAB code for the Robotics System Toolbox"),
     "roboticstoolbox": ("urdfkin.dh.export.roboticstoolbox", "Python code for roboticstoolbox's DHRobot"),
+    "ets": ("urdfkin.dh.export.ets", "elementary transforms, Python code for roboticstoolbox"),
     "c": ("urdfkin.dh.export.c", "C99 code"),
 }
 
@@ -38,7 +42,7 @@ def export(table: DHTable, format: str, units: Units | None = None) -> str:
 
     Raises:
         UnknownNameError: no such format.
-        InputError: the form cannot hold this table (a Hayati row in roboticstoolbox's `DHRobot`).
+        InputError: the form cannot hold this table (a follower in roboticstoolbox).
     """
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)

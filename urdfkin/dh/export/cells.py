@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -30,12 +31,18 @@ def formula(table: DHTable) -> str:
     return (HAYATI_FORMULA if table.has_hayati_rows else FORMULA)[table.convention]
 
 
-def variable(table: DHTable, row: DHRow, times: str = " ", name: str = "q{}") -> str:
+def variable(
+    table: DHTable,
+    row: DHRow,
+    times: str = " ",
+    name: str = "q{}",
+    number: Callable[[float], str] = "{:.10g}".format,
+) -> str:
     """The joint's value in terms of the table's coordinates: q1, -q2, 2 q1 + 0.1."""
     leader = row.mimic.leader if row.mimic else row.joint
     q = name.format(table.joint_names.index(leader) + 1)
     multiplier = row.sense * (row.mimic.multiplier if row.mimic else 1.0)
-    return {1.0: q, -1.0: f"-{q}"}.get(multiplier, f"{multiplier:.10g}{times}{q}")
+    return {1.0: q, -1.0: f"-{q}"}.get(multiplier, f"{number(multiplier)}{times}{q}")
 
 
 def coordinate_names(table: DHTable, shown: Callable[[str], str] = str) -> str:
@@ -58,7 +65,7 @@ def added(variable: str, constant: str) -> str:
     return f"{variable} - {constant[1:]}" if constant.startswith("-") else f"{variable} + {constant}"
 
 
-def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: str) -> list[str]:
+def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
     """a, alpha, d, theta and, if any row needs it, beta, with the variable where it belongs."""
     moves = variable(table, row, **style)
     theta, d = units.angle(row.theta, pi), units.length(row.d)

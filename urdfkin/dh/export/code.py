@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import keyword
+import math
 import re
 
 from urdfkin.dh.export.cells import formula
+from urdfkin.dh.row import DHRow
 from urdfkin.dh.table import DHTable
+from urdfkin.errors import InputError
 from urdfkin.model.tree import FloatArray
 
 
@@ -51,6 +54,19 @@ def row_numbers(table: DHTable) -> list[list[float]]:
     return [[*row.cells, float(row.kind.turns), float(row.sense)] for row in table.rows]
 
 
-def is_coupled(table: DHTable) -> bool:
-    """Whether any joint follows another."""
-    return any(row.mimic is not None for row in table.rows)
+def demand_free(table: DHTable, what: str) -> None:
+    """Refuse a table with followers where `what` knows none."""
+    if any(row.mimic is not None for row in table.rows):
+        raise InputError(
+            f"{what} has no joint that follows another",
+            where=f"table of {table.robot}",
+            remedy="load with mimic off, or use a form in plain code, such as numpy or matlab",
+        )
+
+
+def bounds(row: DHRow) -> str:
+    """Lower and upper, with a comma between them; "" where a side is open."""
+    limit = row.limit
+    if limit is None or not (math.isfinite(limit.lower) and math.isfinite(limit.upper)):
+        return ""
+    return numbers([limit.lower, limit.upper])

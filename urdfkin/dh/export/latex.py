@@ -1,4 +1,4 @@
-"""The table for a paper: booktabs, the convention in the caption, pi as a fraction."""
+"""The table for a paper: booktabs, the convention in the caption, pi as a fraction, as wide as fits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FORMULA = {
 
 
 def write(table: DHTable, units: Units) -> str:
-    """A table environment that needs the packages booktabs and amsmath."""
+    """A table environment that needs the packages amsmath, booktabs and graphicx."""
     modified = table.convention is Convention.MODIFIED
     at = "_{i-1}" if modified else "_i"
     angle = "rad" if units.angles is Angles.RADIANS else r"$^\circ$"
@@ -34,19 +34,25 @@ def write(table: DHTable, units: Units) -> str:
         heads.append(rf"$\beta{at}$ [{angle}]")
     rows = []
     for i, row in enumerate(table.rows, 1):
-        texts = [_math(text) for text in cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")]
+        texts = [maths(text) for text in cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")]
         rows.append([str(i), latex_text(row.joint), *texts])
+    poses = {what: T for what, T in (("Base", table.base), ("Tool", table.tool)) if not is_identity(T)}
     lines = [
         r"\begin{table}",
         r"  \centering",
         f"  \\caption{{{_caption(table)}}}",
-        rf"  \begin{{tabular}}{{rl{'r' * (len(heads) - 2)}}}",
-        r"    \toprule",
-        f"    {' & '.join(heads)} \\\\",
-        r"    \midrule",
-        *(f"    {' & '.join(row)} \\\\" for row in rows),
-        r"    \bottomrule",
-        r"  \end{tabular}",
+        *fitted(
+            [
+                rf"\begin{{tabular}}{{rl{'r' * (len(heads) - 2)}}}",
+                r"  \toprule",
+                f"  {' & '.join(heads)} \\\\",
+                r"  \midrule",
+                *(f"  {' & '.join(row)} \\\\" for row in rows),
+                r"  \bottomrule",
+                r"\end{tabular}",
+            ]
+        ),
+        *(line for what, T in poses.items() for line in pose(what, T)),
         r"\end{table}",
     ]
     return "\n".join(lines) + "\n"
@@ -59,23 +65,28 @@ def _caption(table: DHTable) -> str:
         product = product.replace(r"R_x(\alpha_i)", r"R_x(\alpha_i)\,R_y(\beta_i)")
         product = product.replace(r"R_x(\alpha_{i-1})", r"R_x(\alpha_{i-1})\,R_y(\beta_{i-1})")
     caption = f"Denavit--Hartenberg parameters of {names}, {table.convention} convention, $T = {product}$."
-    for what, T in (("Base", table.base), ("Tool", table.tool)):
-        if not is_identity(T):
-            caption += f" {what} (m): ${_matrix(T)}$."
     if table.snap is not None and table.snap.changes:
         caption += (
-            f" Angles were rounded within {_math(f'{table.snap.tolerance:.2g}')}\\,rad,"
-            f" which moves the tip by at most {_math(at_most(table.snap.metres))}\\,m."
+            f" Angles were rounded within {maths(f'{table.snap.tolerance:.2g}')}\\,rad,"
+            f" which moves the tip by at most {maths(at_most(table.snap.metres))}\\,m."
         )
     return caption
 
 
-def _matrix(T: FloatArray) -> str:
+def fitted(lines: list[str]) -> list[str]:
+    """What is wider than the page's text made as wide as that, and nothing else changed."""
+    size = r"\ifdim\width>\linewidth\linewidth\else\width\fi"
+    return [rf"  \resizebox{{{size}}}{{!}}{{%", *(f"    {line}" for line in lines), "  }"]
+
+
+def pose(what: str, T: FloatArray) -> list[str]:
+    """A line of its own with a pose, in metres."""
     rows = (" & ".join(_plain(f"{x + 0.0:.6g}") for x in row) for row in T)
-    return r"\begin{bmatrix}" + r" \\ ".join(rows) + r"\end{bmatrix}"
+    matrix = r"\begin{bmatrix}" + r" \\ ".join(rows) + r"\end{bmatrix}"
+    return [r"  \par\medskip", *fitted([rf"{what} (m): ${matrix}$"])]
 
 
-def _math(text: str) -> str:
+def maths(text: str) -> str:
     """A cell in math mode, a/b as it stands and 1e-6 as a power."""
     return f"${_plain(text)}$"
 

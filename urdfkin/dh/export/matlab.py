@@ -8,7 +8,8 @@ from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.model.tree import FloatArray
 
-_BODY = """
+_VALUES = """
+one = eye(4);
 T = base;
 for i = 1:size(rows, 1)
     a = rows(i, 1); alpha = rows(i, 2); d = rows(i, 3); theta = rows(i, 4); beta = rows(i, 5);
@@ -17,10 +18,11 @@ for i = 1:size(rows, 1)
     else
         d = d + rows(i, 7) * values(i);
     end
-    S = [cos(theta), -sin(theta), 0, 0; sin(theta), cos(theta), 0, 0; 0, 0, 1, d; 0, 0, 0, 1];
-    Tx = [eye(3), [a; 0; 0]; 0, 0, 0, 1];
-    Rx = [1, 0, 0, 0; 0, cos(alpha), -sin(alpha), 0; 0, sin(alpha), cos(alpha), 0; 0, 0, 0, 1];
-    Ry = [cos(beta), 0, sin(beta), 0; 0, 1, 0, 0; -sin(beta), 0, cos(beta), 0; 0, 0, 0, 1];
+"""
+_FRAMES = """\
+    S = one; S(1:2, 1:2) = [cos(theta), -sin(theta); sin(theta), cos(theta)]; S(3, 4) = d;
+    X = one; X(2:3, 2:3) = [cos(alpha), -sin(alpha); sin(alpha), cos(alpha)]; X(1, 4) = a;
+    Y = one; Y([1, 3], [1, 3]) = [cos(beta), sin(beta); -sin(beta), cos(beta)];
     T = T * {product};
 end
 T = T * tool;
@@ -39,8 +41,13 @@ def write(table: DHTable, units: Units) -> str:
     lines += [f"values = coupling * q(:) + [{'; '.join(numbers([x]) for x in table.coupling.offset)}];"]
     for what, T in (("base", table.base), ("tool", table.tool)):
         lines += matrix(what, T.tolist(), 4)
-    product = "S * (Tx * Rx * Ry)" if table.convention is Convention.STANDARD else "(Tx * Rx * Ry) * S"
-    return "\n".join(lines) + _BODY.format(product=product)
+    return "\n".join(lines) + _VALUES + frames(table)
+
+
+def frames(table: DHTable) -> str:
+    """The end of a loop over rows, from a, alpha, d, theta and beta to T."""
+    product = "S * (X * Y)" if table.convention is Convention.STANDARD else "(X * Y) * S"
+    return _FRAMES.format(product=product)
 
 
 def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> list[str]:

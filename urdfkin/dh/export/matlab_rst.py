@@ -3,27 +3,23 @@
 The toolbox's own "dh" and "mdh" fixed transforms ignore theta of a revolute joint and d of a prismatic one,
 so that offsets would be lost, and know no Hayati row. The joints are therefore placed by the matrices of
 the table's own frames, and turn about z.
+
+What is written was run in Octave on classes that stand in for the toolbox's; nobody has run it in MATLAB yet.
 """
 
 from __future__ import annotations
 
-from urdfkin.dh.export.code import header, identifier, is_coupled, plain
+from urdfkin.dh.export.code import bounds, demand_free, header, identifier, plain
 from urdfkin.dh.export.matlab import matrix
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.to_tree import frame_poses
 from urdfkin.dh.units import Units
-from urdfkin.errors import InputError
 
 
 def write(table: DHTable, units: Units) -> str:
     """A function file `ROBOT_tree.m` that returns a rigidBodyTree."""
     del units
-    if is_coupled(table):
-        raise InputError(
-            "rigidBodyTree has no joint that follows another",
-            where=f"table of {table.robot}",
-            remedy="load with mimic off, or use the plain MATLAB form",
-        )
+    demand_free(table, "rigidBodyTree")
     poses = frame_poses(table)
     lines = [f"function robot = {identifier(table.robot)}_tree()", *(f"% {line}" for line in header(table))]
     lines += ["robot = rigidBodyTree('DataFormat', 'row');", f"robot.BaseName = '{plain(table.base_frame)}';"]
@@ -37,8 +33,8 @@ def write(table: DHTable, units: Units) -> str:
             "setFixedTransform(joint, T);",
             f"joint.JointAxis = [0 0 {row.sense}];",
         ]
-        if row.limit is not None and row.limit.lower > float("-inf") and row.limit.upper < float("inf"):
-            lines.append(f"joint.PositionLimits = [{row.limit.lower!r} {row.limit.upper!r}];")
+        if limits := bounds(row):
+            lines.append(f"joint.PositionLimits = [{limits}];")
         lines += ["body.Joint = joint;", f"addBody(robot, body, {parent});"]
         parent = f"'{plain(row.joint)}_link'"
     lines += [*matrix("T", poses[-1].tolist(), 4), f"body = rigidBody('{plain(table.tip_frame)}_tip');"]

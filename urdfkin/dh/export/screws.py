@@ -9,11 +9,11 @@ import numpy as np
 
 from urdfkin.dh.export.cells import pose_lines
 from urdfkin.dh.export.code import identifier, numbers, plain
+from urdfkin.dh.export.latex import fitted, maths, pose
 from urdfkin.dh.export.matlab import matrix
 from urdfkin.dh.export.terminal import aligned
 from urdfkin.dh.screws import Screws
 from urdfkin.errors.printable import latex_text, printable
-from urdfkin.model.tree import FloatArray
 
 FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -43,23 +43,16 @@ def _clean(x: float) -> float:
 
 
 def _latex(screws: Screws, digits: int) -> str:
-    def rows(values: FloatArray) -> str:
-        return r" \\ ".join(" & ".join(f"{_clean(x):.{min(digits, 6)}g}" for x in row) for row in values)
-
-    home = rf"\begin{{bmatrix}}{rows(screws.M)}\end{{bmatrix}}"
     names = f"{latex_text(screws.robot)}, {latex_text(screws.base_frame)} to {latex_text(screws.tip_frame)}"
     heads = r"$i$ & joint & $\omega_x$ & $\omega_y$ & $\omega_z$ & $v_x$ & $v_y$ & $v_z$ \\"
-    lines = [r"\begin{table}", r"  \centering"]
-    home = rf"\begin{{bmatrix}}{rows(screws.M)}\end{{bmatrix}}"
-    lines += [rf"  \caption{{Space screws of {names}, metres. $M = {home}$.}}"]
-    lines += [r"  \begin{tabular}{rlrrrrrr}", r"    \toprule", f"    {heads}", r"    \midrule"]
+    rows = []
     for i, (joint, row) in enumerate(zip(screws.joints, screws.space, strict=True), 1):
-        lines.append(
-            f"    {i} & {latex_text(joint.name)} & "
-            + rows(row[None]).replace(" & ", "$ & $").join("$$")
-            + r" \\"
-        )
-    return "\n".join([*lines, r"    \bottomrule", r"  \end{tabular}", r"\end{table}"]) + "\n"
+        numbers = " & ".join(maths(f"{_clean(x):.{min(digits, 6)}g}") for x in row)
+        rows.append(rf"  {i} & {latex_text(joint.name)} & {numbers} \\")
+    frame = [r"\begin{tabular}{rlrrrrrr}", r"  \toprule", f"  {heads}", r"  \midrule"]
+    lines = [r"\begin{table}", r"  \centering", rf"  \caption{{Space screws of {names}, metres.}}"]
+    lines += fitted([*frame, *rows, r"  \bottomrule", r"\end{tabular}"])
+    return "\n".join([*lines, *pose("$M$", screws.M), r"\end{table}"]) + "\n"
 
 
 def _toml(screws: Screws, _digits: int) -> str:

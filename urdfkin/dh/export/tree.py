@@ -29,14 +29,9 @@ def as_mapping(table: TreeParameters) -> dict[str, Any]:
 
 
 def write_tree(table: TreeParameters, form: str, units: Units) -> str:
-    """The table as "terminal", "markdown" or "csv"; csv is in metres and radians."""
+    """The table as "terminal", "markdown" or "csv"; csv is in metres and radians, with T_frame_link."""
     if form == "csv":
-        out = io.StringIO()
-        writer = csv.DictWriter(out, [field.name for field in fields(TreeRow)], lineterminator="\n")
-        writer.writeheader()
-        for row in as_mapping(table)["rows"]:
-            writer.writerow({k: csv_cell(v) if isinstance(v, str) else v for k, v in row.items()})
-        return out.getvalue()
+        return _csv(table)
     shown = markdown_code if form == "markdown" else str
     title = f"{shown(table.robot)}: Khalil-Kleinfinger parameters, {shown(table.root)} is frame 0"
     body = [_heads(table, units), *(_cells(table, j, units, shown) for j in range(len(table.rows)))]
@@ -45,6 +40,18 @@ def write_tree(table: TreeParameters, form: str, units: Units) -> str:
         rule = "| " + " | ".join(["---:"] * len(body[0])) + " |"
         return "\n".join([f"{title}: `{FORMULA}`", "", lines[0], rule, *lines[1:]]) + "\n"
     return "\n".join([printable(title), FORMULA, "", *aligned(body)]) + "\n"
+
+
+def _csv(table: TreeParameters) -> str:
+    """A line for each row: its numbers, then the three upper rows of T_frame_link, T11 to T34."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    places = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
+    writer.writerow([*(field.name for field in fields(TreeRow)), *places])
+    for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3].tolist(), strict=True):
+        own = [csv_cell(value) if isinstance(value, str) else value for value in row.values()]
+        writer.writerow([*own, *(x for line in T for x in line)])
+    return out.getvalue()
 
 
 def _heads(table: TreeParameters, units: Units) -> list[str]:

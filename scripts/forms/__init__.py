@@ -1,0 +1,1 @@
+"""Running the forms that tables are written in."""

@@ -1,0 +1,39 @@
+"""What a table that was written as Python computes, in whichever interpreter has its library.
+
+    python scripts/forms/poses.py JOBS RESULTS     # JSON: a list of {form, text, q}; a list of poses for each
+
+It imports nothing of urdfkin: the Robotics Toolbox may live in an environment of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+
+def poses(form: str, text: str, q: list[list[float]]) -> list[list[list[float]]]:
+    """4 x 4 for each configuration."""
+    scope: dict[str, Any] = {"__name__": "table"}
+    exec(compile(text, form, "exec"), scope)
+    if form in ("roboticstoolbox", "ets"):
+        return [scope["robot"].fkine(one).A.tolist() for one in q]
+    place = scope["placement"]
+    if form == "sympy":
+        from sympy import Float  # noqa: PLC0415  one library for each form
+
+        exact = [place([Float(x, 30) for x in one]) for one in q]
+        return [[[float(x) for x in row] for row in T.tolist()] for T in exact]
+    if form == "casadi":
+        from casadi import DM, SX, Function  # noqa: PLC0415
+
+        symbols = SX.sym("q", len(q[0]))
+        function = Function("placement", [symbols], [place(symbols)])
+        return [DM(function(DM(one))).full().tolist() for one in q]
+    return place(q).tolist()  # type: ignore[no-any-return]
+
+
+if __name__ == "__main__":
+    jobs = json.loads(Path(sys.argv[1]).read_text("utf-8"))
+    Path(sys.argv[2]).write_text(json.dumps([poses(**job) for job in jobs]), "utf-8")

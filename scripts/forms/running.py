@@ -1,0 +1,187 @@
+"""Forms of tables, run: each takes tables with configurations and gives the poses that its code computes.
+
+A form whose interpreter or library is missing here raises `Missing`.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from scripts.forms import poses
+from urdfkin.dh import DHTable, export, read_table, to_urdf
+from urdfkin.loading import load
+from urdfkin.model.tree import FloatArray
+
+_STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
+_MAIN = """
+#include <stdio.h>
+int main(void) {{
+    double q[{room}], T[16];
+    for (int s = 0; s < {count}; ++s) {{
+        for (int k = 0; k < {n}; ++k) if (scanf("%lf", &q[k]) != 1) return 1;
+        table_placement(q, T);
+        for (int i = 0; i < 16; ++i) printf("%.17g\\n", T[i]);
+    }}
+    return 0;
+}}"""
+_DOCUMENT = r"""\documentclass{article}
+\usepackage{amsmath,booktabs,graphicx}
+\usepackage[utf8]{inputenc}
+\begin{document}
+"""
+
+
+class Missing(Exception):  # noqa: N818  said, and gone on
+    """What a form needs is not installed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A table and configurations of its own coordinates, (n, coordinates)."""
+
+    table: DHTable
+    q: FloatArray
+
+
+Poses = list[FloatArray]
+
+
+def in_python(form: str) -> Callable[[Sequence[Job], Path], Poses]:
+    """The forms that are Python, in this interpreter."""
+
+    def run(jobs: Sequence[Job], folder: Path) -> Poses:
+        library = form if form != "ets" else "roboticstoolbox"
+        if importlib.util.find_spec(library) is None:
+            raise Missing(library)
+        return [np.array(poses.poses(form, export(job.table, form), job.q.tolist())) for job in jobs]
+
+    return run
+
+
+def elsewhere(form: str, interpreter: str) -> Callable[[Sequence[Job], Path], Poses]:
+    """The same in another interpreter."""
+
+    def run(jobs: Sequence[Job], folder: Path) -> Poses:
+        given, found = folder / "jobs.json", folder / "poses.json"
+        data = [{"form": form, "text": export(job.table, form), "q": job.q.tolist()} for job in jobs]
+        given.write_text(json.dumps(data), "utf-8")
+        subprocess.run([interpreter, poses.__file__, str(given), str(found)], check=True)
+        return [np.array(one) for one in json.loads(found.read_text("utf-8"))]
+
+    return run
+
+
+def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
+    """Compiled with every warning an error."""
+    compiler, found = _program("cc"), Poses()
+    for job in jobs:
+        n = job.q.shape[1]
+        main = _MAIN.format(room=max(n, 1), n=n, count=len(job.q))
+        (folder / "code.c").write_text(export(replace(job.table, robot="table"), "c") + main, "utf-8")
+        subprocess.run([compiler, *_STRICT, "code.c", "-o", "code", "-lm"], cwd=folder, check=True)
+        numbers = "\n".join(map(repr, job.q.ravel().tolist()))
+        done = subprocess.run(
+            [str(folder / "code")], input=numbers, capture_output=True, text=True, check=True
+        )
+        found.append(_read(done.stdout))
+    return found
+
+
+def in_octave(form: str) -> Callable[[Sequence[Job], Path], Poses]:
+    """MATLAB's forms: all tables in one process."""
+    name = {"matlab": "placement", "matlab-symbolic": "symbolic"}[form]
+
+    def run(jobs: Sequence[Job], folder: Path) -> Poses:
+        octave = _program("octave-cli")
+        lines = ["try, pkg load symbolic, catch, disp('missing'), exit(0), end"] * form.endswith("symbolic")
+        for k, job in enumerate(jobs):
+            text = export(replace(job.table, robot=f"t{k}"), form)
+            (folder / f"t{k}_{name}.m").write_text(text, "utf-8")
+            if form.endswith("symbolic"):
+                lines.append(f"[T, q] = t{k}_{name}();")
+            for one in job.q.tolist():
+                numbers = "; ".join(map(repr, one))
+                value = f"t{k}_{name}([{numbers}])"
+                if form.endswith("symbolic"):
+                    exact = re.sub(r"[^; ]+", r"vpa('\g<0>')", numbers)
+                    value = f"double(subs(T, q, [{exact}]))"
+                lines.append(f"printf('%.17g\\n', ({value})');")
+            lines.append("printf('end\\n');")
+        (folder / "tables.m").write_text("\n".join(lines), "utf-8")
+        command = [octave, "--no-init-file", "--quiet", "tables.m"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+        if done.stdout.startswith("missing"):
+            raise Missing("Octave's package symbolic")
+        # Octave's package says on the way which Python it found.
+        parts = (re.sub(r".*[a-z].*\n", "", part) for part in done.stdout.split("end\n")[:-1])
+        return [_read(part) for part in parts]
+
+    return run
+
+
+def read_back(form: str) -> Callable[[Sequence[Job], Path], Poses]:
+    """The forms that urdfkin reads to the last bit."""
+
+    def run(jobs: Sequence[Job], folder: Path) -> Poses:
+        found, file = Poses(), folder / f"table.{form}"
+        for job in jobs:
+            file.write_text(export(job.table, form), "utf-8")
+            found.append(read_table(file).placement(job.q))
+        return found
+
+    return run
+
+
+def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
+    """A URDF of the table, read and computed as any other."""
+    found = Poses()
+    for job in jobs:
+        robot = load(to_urdf(job.table), verify=False)
+        path = robot.chain(robot.tree.links[list(robot.tree.leaves())[-1]])
+        order = [job.table.joint_names.index(name) for name in path.joint_names]
+        found.append(path.placement(job.q[:, order]))
+    return found
+
+
+RUN: dict[str, Callable[[Sequence[Job], Path], Poses]] = {
+    **{form: in_python(form) for form in ("numpy", "sympy", "casadi", "roboticstoolbox", "ets")},
+    "c": in_c,
+    "matlab": in_octave("matlab"),
+    "matlab-symbolic": in_octave("matlab-symbolic"),
+    **{form: read_back(form) for form in ("toml", "json", "csv")},
+    "urdf": as_urdf,
+}
+
+
+def too_wide(tables: Sequence[str], folder: Path) -> list[float]:
+    """Points by which each LaTeX table is wider than the page of an `article`: 0 where it fits."""
+    latex = _program("pdflatex")
+    marked = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
+    (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked) + "\\end{document}\n", "utf-8")
+    command = [latex, "-interaction=nonstopmode", "-halt-on-error", "tables.tex"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+    if done.returncode:
+        raise RuntimeError(next(line for line in done.stdout.splitlines() if line.startswith("!")))
+    log = (folder / "tables.log").read_text("utf-8", errors="replace")
+    parts = re.split(r"^table \d+$", log, flags=re.MULTILINE)[1:]
+    over = (re.findall(r"Overfull \\hbox \((\S+)pt too wide\)", part) for part in parts)
+    return [max(map(float, found), default=0.0) for found in over]
+
+
+def _program(name: str) -> str:
+    if (found := shutil.which(name)) is None:
+        raise Missing(name)
+    return found
+
+
+def _read(text: str) -> FloatArray:
+    return np.array(text.split(), dtype=np.float64).reshape(-1, 4, 4)

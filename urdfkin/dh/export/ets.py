@@ -1,0 +1,56 @@
+"""A table as a sequence of elementary transforms (Haviland and Corke), each a turn or a shift, or a joint.
+
+The fifth parameter of a Hayati row is one transform more. As Python code for roboticstoolbox, whose numerical
+solvers take it.
+"""
+
+from __future__ import annotations
+
+from urdfkin.dh.export.cells import is_identity
+from urdfkin.dh.export.code import bounds, demand_free, header, numbers, plain
+from urdfkin.dh.row import Convention, DHRow
+from urdfkin.dh.table import DHTable
+from urdfkin.dh.units import Units
+from urdfkin.model.tree import FloatArray
+
+
+def write(table: DHTable, units: Units) -> str:
+    """A module with `ets`, and `robot`, a Robot made of it.
+
+    Raises:
+        InputError: a follower.
+    """
+    del units
+    demand_free(table, "a sequence of elementary transforms")
+    lines = ['"""' + header(table)[0] + ".", "", *(f"{line}." for line in header(table)[1:]), '"""', ""]
+    lines += ["import numpy as np", "import roboticstoolbox as rtb", "from roboticstoolbox import ET", ""]
+    lines += ["ets = rtb.ETS(", "    [", *_pose(table.base, always=not table.rows)]
+    lines += [
+        f"        {', '.join(_row(row, table.convention))},  # {plain(row.joint)}" for row in table.rows
+    ]
+    lines += [*_pose(table.tool), "    ]", ")", f'robot = rtb.Robot(ets, name="{plain(table.robot)}")']
+    return "\n".join(lines) + "\n"
+
+
+def joint(row: DHRow) -> list[str]:
+    """How roboticstoolbox is told of a joint's sense and limits."""
+    limits = bounds(row)
+    return ["flip=True"] * (row.sense < 0) + ([f"qlim=[{limits}]"] if limits else [])
+
+
+def _row(row: DHRow, convention: Convention) -> list[str]:
+    moves = ", ".join(joint(row))
+    along = [*_some("Rz", row.theta), *([f"ET.Rz({moves})"] * row.kind.turns), *_some("tz", row.d)]
+    along += [f"ET.tz({moves})"] * (not row.kind.turns)
+    across = [*_some("tx", row.a), *_some("Rx", row.alpha), *_some("Ry", row.beta)]
+    return along + across if convention is Convention.STANDARD else across + along
+
+
+def _some(name: str, value: float) -> list[str]:
+    return [f"ET.{name}({value!r})"] if value else []
+
+
+def _pose(T: FloatArray, *, always: bool = False) -> list[str]:
+    if is_identity(T) and not always:
+        return []
+    return [f"        ET.SE3(np.array([{numbers(T.ravel())}]).reshape(4, 4)),"]
