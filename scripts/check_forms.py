@@ -28,6 +28,7 @@ import urdfkin
 from scripts.forms.running import RUN, Job, Missing, elsewhere, too_wide
 from urdfkin.dh import FORMATS, DHTable, export
 from urdfkin.errors import InputError
+from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import examples
@@ -55,8 +56,8 @@ class Subject:
     def off(self, found: FloatArray) -> tuple[float, float]:
         """Metres from Pinocchio; and from the table's own product, as a share of what rounding may do."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # A form and the table round alike often: each in its own way.
-        allowed = 2.0 * self.table.rounding(self.job.q) * max(1.0, 1.0 / (self.table.span or 1.0))
+        # Each rounds in its own way; a table without any length still has angles.
+        allowed = 2.0 * np.maximum(self.table.rounding(self.job.q), EPS * of_rows(len(self.table.rows)))
         return float(np.abs(found - self.theirs)[:, :3, 3].max()), float((apart / allowed).max())
 
 

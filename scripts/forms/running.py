@@ -122,7 +122,7 @@ def in_octave(form: str) -> Callable[[Sequence[Job], Path], Poses]:
         if done.stdout.startswith("missing"):
             raise Missing("Octave's package symbolic")
         # Octave's package says on the way which Python it found.
-        parts = (re.sub(r".*[a-z].*\n", "", part) for part in done.stdout.split("end\n")[:-1])
+        parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in done.stdout.split("end\n")[:-1])
         return [_read(part) for part in parts]
 
     return run

@@ -128,8 +128,8 @@ def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
         names["M"] @ exponential(names["Blist"].T, np.ones(6)), arm.placement(np.ones(6)), atol=1e-14
     )
     # ik-geo's form: positions P between the axes H, turned one after the other.
-    R, p = np.eye(3), names["P"][:, 0]
-    for h, between in zip(names["H"].T, names["P"][:, 1:].T, strict=True):
+    R, p = np.eye(3), names["P"][0]
+    for h, between in zip(names["H"], names["P"][1:], strict=True):
         R = R @ exp_rotation(h)
         p = p + R @ between
     T = arm.placement(np.ones(6))

@@ -139,7 +139,7 @@ def _pair(screws: Screws, i: int) -> Pair:
     return Pair(screws.joints[i].name, screws.joints[i + 1].name, angle, distance)
 
 
-def _meeting(screws: Screws, at: tuple[int, ...]) -> tuple[FloatArray, float]:
+def meeting(screws: Screws, at: tuple[int, ...]) -> tuple[FloatArray, float]:
     """The point nearest to some axes in least squares, and how far the farthest of them is."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in at:
@@ -163,7 +163,7 @@ def _triples(screws: Screws, letters: str, pairs: tuple[Pair, ...]) -> list[Kind
         if tilt <= NEAR_ANGLE:
             found.append(Kind("three parallel axes", names, radians=tilt))
         elif min(pairs[i].angle, pairs[i + 1].angle) > NEAR_ANGLE:
-            point, off = _meeting(screws, (i, i + 1, i + 2))
+            point, off = meeting(screws, (i, i + 1, i + 2))
             if off <= NEAR_LENGTH:
                 where = " wrist" if i == len(letters) - 3 else " shoulder" if i == 0 else " joint"
                 name = "spherical" + where

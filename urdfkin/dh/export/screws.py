@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-import numpy as np
-
 from urdfkin.dh.export.cells import pose_lines
 from urdfkin.dh.export.code import identifier, numbers, plain
 from urdfkin.dh.export.latex import fitted, maths, pose
 from urdfkin.dh.export.matlab import matrix
 from urdfkin.dh.export.terminal import aligned
 from urdfkin.dh.screws import Screws
+from urdfkin.dh.subproblems import axes_and_steps
 from urdfkin.errors.printable import latex_text, printable
 
 FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
@@ -72,19 +71,20 @@ def _numpy(screws: Screws, _digits: int) -> str:
         lines += [f"{name} = np.array(", "    [", *(f"        [{numbers(row)}]," for row in rows), "    ]"]
         lines.append(")" if name == "M" else ").reshape(-1, 6).T")
     if all(joint.kind.turns for joint in screws.joints):
-        way = np.diff(np.vstack([np.zeros(3), screws.points, screws.M[:3, 3]]), axis=0)
+        H, P = axes_and_steps(screws)
         lines += [
             "",
-            "# EAIK, ik-geo: T = P0 + R(h1, q1) (P1 + R(h2, q2) (P2 + ...)), its rotation times R6T.",
+            "# EAIK's HPRobot(H, P), ik-geo: p = P0 + R(h1, q1) (P1 + R(h2, q2) (P2 + ...)).",
+            "# They are asked for the rotation R @ R6T.T, where R is the tip's.",
         ]
-        for name, rows in (("H", screws.space[:, :3]), ("P", way)):
+        for name, rows in (("H", H), ("P", P)):
             lines += [
                 f"{name} = np.array(",
                 "    [",
                 *(f"        [{numbers(row)}]," for row in rows),
                 "    ]",
             ]
-            lines.append(").reshape(-1, 3).T")
+            lines.append(").reshape(-1, 3)")
         lines.append("R6T = M[:3, :3]")
     return "\n".join(lines) + "\n"
 

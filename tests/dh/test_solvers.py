@@ -1,0 +1,131 @@
+"""Solvers that other people wrote find the tip's poses again with what urdfkin writes for them.
+
+Each test runs where its package is installed; docs/dh-at-work.md says which was run, and what came out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.dh.test_opw import NAMES, table
+from urdfkin.dh import export
+from urdfkin.dh.export.screws import write_screws
+from urdfkin.dh.opw import opw_of
+from urdfkin.loading import load
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+
+TIPS = {"ur5": "tool0", "ur10": "tool0", "kinova": "j2s6s200_end_effector"}
+#: What ik-geo calls an arm's kind.
+IK_GEO = {
+    "ur5": "three_parallel_two_intersecting",
+    "ur10": "three_parallel_two_intersecting",
+    "kinova": "spherical_two_parallel",
+}
+Solve = Callable[[FloatArray], Sequence[Any]]
+
+
+def poses(robot: Robot, tip: str, count: int = 10) -> tuple[FloatArray, FloatArray]:
+    """Configurations with their tips in the base, both checked against Pinocchio."""
+    q = np.random.default_rng(0).uniform(-3.0, 3.0, (count, 6))
+    base = np.linalg.inv(robot.placement(q, robot.base_frame))
+    return q, base @ robot.placement(q, tip)
+
+
+def check(robot: Robot, tip: str, solve: Solve) -> None:
+    """Every solution reaches its pose, in Pinocchio too; where the pose came from is among them."""
+    for q, T in zip(*poses(robot, tip), strict=True):
+        found = np.array(solve(T)).reshape(-1, 6)
+        assert len(found) > 0
+        base = np.linalg.inv(robot.placement(found, robot.base_frame))
+        np.testing.assert_allclose(
+            base @ robot.placement(found, tip), np.broadcast_to(T, (len(found), 4, 4)), atol=1e-10
+        )
+        apart = np.abs(np.angle(np.exp(1j * (found - q)))).max(axis=-1)
+        assert apart.min() < 1e-7
+
+
+def axes(robot: Robot, tip: str) -> dict[str, Any]:
+    scope: dict[str, Any] = {}
+    exec(write_screws(robot.screws(tip, robot.base_frame), "numpy"), scope)
+    return scope
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TIPS)
+def test_eaik_solves_for_the_poses_of_h_and_p(name: str) -> None:
+    eaik = pytest.importorskip("eaik.IK_HP")
+    robot = load(name)
+    given = axes(robot, TIPS[name])
+    solver = eaik.HPRobot(given["H"], given["P"])
+    assert solver.hasKnownDecomposition()
+
+    def solve(T: FloatArray) -> list[Any]:
+        pose = T.copy()
+        pose[:3, :3] = T[:3, :3] @ given["R6T"].T
+        found = solver.IK(pose)
+        # What it calls least squares is an answer to a pose that a branch does not reach.
+        return [q for q, nearest in zip(found.Q, found.is_LS, strict=True) if not nearest]
+
+    check(robot, TIPS[name], solve)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TIPS)
+def test_ik_geo_solves_for_the_poses_of_h_and_p(name: str) -> None:
+    ik_geo = pytest.importorskip("ik_geo")
+    robot = load(name)
+    given = axes(robot, TIPS[name])
+    solver = getattr(ik_geo.Robot, IK_GEO[name])(given["H"].tolist(), given["P"].tolist())
+
+    def solve(T: FloatArray) -> list[Any]:
+        # Its Python takes a rotation column by column (1.0.3).
+        columns = (T[:3, :3] @ given["R6T"].T).T.tolist()
+        return [q for q, nearest in solver.get_ik(columns, T[:3, 3].tolist()) if not nearest]
+
+    check(robot, TIPS[name], solve)
+
+
+def opw_solver(robot: Robot, tip: str) -> Solve:
+    opw = pytest.importorskip("py_opw_kinematics")
+    found = opw_of(robot.chain(tip, robot.base_frame), 1e-9)
+    model = opw.KinematicModel(
+        **found.lengths, offsets=found.offsets, flip_axes=tuple(sign < 0 for sign in found.signs)
+    )
+    solver = opw._internal.Robot(model, False)
+    base, tool = np.linalg.inv(found.base), np.linalg.inv(found.tool)
+    return lambda T: [*solver.inverse(base @ T @ tool)]
+
+
+@pytest.mark.slow
+def test_opw_kinematics_solves_for_the_poses_of_a_catalogue_arm() -> None:
+    robot = load("kinova")
+    check(robot, TIPS["kinova"], opw_solver(robot, TIPS["kinova"]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_opw_kinematics_solves_for_the_poses_of_any_arm_of_the_kind(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    drawn = rng.uniform([-0.4, -0.4, -0.3, 0.1, 0.3, 0.3, 0.05], [0.4, 0.4, 0.3, 0.6, 0.9, 0.9, 0.2])
+    signs = [int(sign) for sign in rng.choice([-1, 1], 6)]
+    lengths = dict(zip(NAMES, drawn.tolist(), strict=True))
+    robot = load(table(lengths, list(rng.uniform(-3, 3, 6)), signs))
+    check(robot, "tip", opw_solver(robot, "tip"))
+
+
+@pytest.mark.slow
+def test_the_robotics_toolbox_solves_with_the_elementary_transforms() -> None:
+    pytest.importorskip("roboticstoolbox", exc_type=ImportError)
+    robot = load("ur5")
+    scope: dict[str, Any] = {}
+    exec(export(robot.dh("tool0", robot.base_frame), "ets"), scope)
+    q, wanted = poses(robot, "tool0", 5)
+    for start, T in zip(q, wanted, strict=True):
+        found = scope["ets"].ik_LM(T, q0=start + 0.1, tol=1e-20)
+        base = np.linalg.inv(robot.placement(found[0], robot.base_frame))
+        np.testing.assert_allclose(base @ robot.placement(found[0], "tool0"), T, atol=1e-8)
