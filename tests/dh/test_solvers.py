@@ -5,6 +5,7 @@ Each test runs where its package is installed; docs/dh-at-work.md says which was
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -15,17 +16,12 @@ from tests.dh.test_opw import NAMES, table
 from urdfkin.dh import export
 from urdfkin.dh.export.screws import write_screws
 from urdfkin.dh.opw import opw_of
+from urdfkin.dh.structure import structure
 from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
 TIPS = {"ur5": "tool0", "ur10": "tool0", "kinova": "j2s6s200_end_effector"}
-#: What ik-geo calls an arm's kind.
-IK_GEO = {
-    "ur5": "three_parallel_two_intersecting",
-    "ur10": "three_parallel_two_intersecting",
-    "kinova": "spherical_two_parallel",
-}
 Solve = Callable[[FloatArray], Sequence[Any]]
 
 
@@ -80,7 +76,8 @@ def test_ik_geo_solves_for_the_poses_of_h_and_p(name: str) -> None:
     ik_geo = pytest.importorskip("ik_geo")
     robot = load(name)
     given = axes(robot, TIPS[name])
-    solver = getattr(ik_geo.Robot, IK_GEO[name])(given["H"].tolist(), given["P"].tolist())
+    (family,) = re.findall(r"ik-geo's (\w+)", " ".join(structure(robot.screws(TIPS[name])).solvers))
+    solver = getattr(ik_geo.Robot, family)(given["H"].tolist(), given["P"].tolist())
 
     def solve(T: FloatArray) -> list[Any]:
         # Its Python takes a rotation column by column (1.0.3).
@@ -92,13 +89,15 @@ def test_ik_geo_solves_for_the_poses_of_h_and_p(name: str) -> None:
 
 def opw_solver(robot: Robot, tip: str) -> Solve:
     opw = pytest.importorskip("py_opw_kinematics")
+    from scipy.spatial.transform import RigidTransform  # noqa: PLC0415  of SciPy 1.16, which it needs
+
     found = opw_of(robot.chain(tip, robot.base_frame), 1e-9)
     model = opw.KinematicModel(
         **found.lengths, offsets=found.offsets, flip_axes=tuple(sign < 0 for sign in found.signs)
     )
-    solver = opw._internal.Robot(model, False)
+    solver = opw.Robot(model, degrees=False)
     base, tool = np.linalg.inv(found.base), np.linalg.inv(found.tool)
-    return lambda T: [*solver.inverse(base @ T @ tool)]
+    return lambda T: [*solver.inverse(RigidTransform.from_matrix(base @ T @ tool))]
 
 
 @pytest.mark.slow

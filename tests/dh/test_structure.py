@@ -74,7 +74,8 @@ def test_three_parallel_axes_are_told_with_their_tilt(tilt: float) -> None:
     assert found.kinds[0].name == "three parallel axes"
     assert found.kinds[0].radians == pytest.approx(tilt, abs=1e-12)
     assert found.kinds[0].is_exact == (tilt == 0.0)
-    assert found.solvers == ("Pieper, three axes are parallel, two meet: EAIK, ik-geo",)
+    solvers = "EAIK, ik-geo's three_parallel_two_intersecting"
+    assert found.solvers == (f"Pieper, three axes are parallel, two meet: {solvers}",)
 
 
 def test_a_scara_and_a_gantry_are_known() -> None:

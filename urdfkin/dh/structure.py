@@ -200,11 +200,17 @@ def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[s
     flat = [pair.angle <= NEAR_ANGLE for pair in pairs]
     if "spherical wrist" in named and square[0] and flat[1] and all(square[2:]):
         found.append("OPW (ortho-parallel basis, spherical wrist): opw_kinematics, rs-opw-kinematics")
+    meet = [pair.distance <= NEAR_LENGTH and pair.angle > NEAR_ANGLE for pair in pairs]
     if spherical:
-        found.append("Pieper, three axes meet: EAIK, ik-geo")
+        ends = "_two_parallel" if flat[1] else "_two_intersecting" if meet[0] else ""
+        ik_geo = f", ik-geo's spherical{ends}" if "spherical wrist" in named else ""
+        found.append(f"Pieper, three axes meet: EAIK{ik_geo}")
     if "three parallel axes" in named:
-        meet = any(one.distance <= NEAR_LENGTH and one.angle > NEAR_ANGLE for one in pairs)
-        found.append(f"Pieper, three axes are parallel{', two meet: EAIK, ik-geo' if meet else ': ik-geo'}")
+        # ik-geo wants the axes 2, 3, 4 parallel, and 5, 6 to meet.
+        ik_geo = f"ik-geo's three_parallel{'_two_intersecting' if meet[4] else ''}"
+        solvers = ["EAIK"] * any(meet) + [ik_geo] * (flat[1] and flat[2])
+        if solvers:
+            found.append(f"Pieper, three axes are parallel{', two meet' * any(meet)}: {', '.join(solvers)}")
     return found
 
 

@@ -1,6 +1,7 @@
 """Python code for roboticstoolbox: a `DHRobot` of Revolute and Prismatic links, DH or MDH, with their limits.
 
-A DHRobot has no fifth parameter. A table with Hayati rows is a `Robot` of elementary transforms, which has.
+A DHRobot has no fifth parameter, and one joint at least. A table with Hayati rows, or with none, is a `Robot`
+of elementary transforms.
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ from urdfkin.dh.units import Units
 
 
 def write(table: DHTable, units: Units) -> str:
-    """A module with `robot`, a DHRobot, or a Robot where a row needs beta.
+    """A module with `robot`, a DHRobot, or a Robot where that cannot hold the table.
 
     Raises:
         InputError: a follower, which neither of them can hold.
     """
-    if table.has_hayati_rows:
+    if table.has_hayati_rows or not table.rows:
         return ets.write(table, units)
     demand_free(table, "DHRobot")
     lines = ['"""' + header(table)[0] + ".", "", *(f"{line}." for line in header(table)[1:]), '"""', ""]
