@@ -18,6 +18,7 @@ import numpy as np
 
 from scripts.forms import poses
 from urdfkin.dh import DHTable, export, read_table, to_urdf
+from urdfkin.dh.export.code import plain
 from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
 
@@ -33,6 +34,7 @@ int main(void) {{
     }}
     return 0;
 }}"""
+_PACKAGE = "try, pkg load symbolic, catch, disp('missing'), exit(0), end"
 _DOCUMENT = r"""\documentclass{article}
 \usepackage{amsmath,booktabs,graphicx}
 \usepackage[utf8]{inputenc}
@@ -53,9 +55,10 @@ class Job:
 
 
 Poses = list[FloatArray]
+Run = Callable[[Sequence[Job], Path], Poses]
 
 
-def in_python(form: str) -> Callable[[Sequence[Job], Path], Poses]:
+def in_python(form: str) -> Run:
     """The forms that are Python, in this interpreter."""
 
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
@@ -67,7 +70,7 @@ def in_python(form: str) -> Callable[[Sequence[Job], Path], Poses]:
     return run
 
 
-def elsewhere(form: str, interpreter: str) -> Callable[[Sequence[Job], Path], Poses]:
+def elsewhere(form: str, interpreter: str) -> Run:
     """The same in another interpreter."""
 
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
@@ -96,26 +99,22 @@ def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
     return found
 
 
-def in_octave(form: str) -> Callable[[Sequence[Job], Path], Poses]:
-    """MATLAB's forms: all tables in one process."""
-    name = {"matlab": "placement", "matlab-symbolic": "symbolic"}[form]
+def in_octave(form: str, lines_of: Callable[[int, Job], list[str]], first: str = "") -> Run:
+    """MATLAB's forms, all tables in one process.
+
+    Args:
+        form: Its name.
+        lines_of: For the table with a number, the statements that print its poses.
+        first: What is said before.
+    """
 
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
-        octave = _program("octave-cli")
-        lines = ["try, pkg load symbolic, catch, disp('missing'), exit(0), end"] * form.endswith("symbolic")
+        octave, lines = _program("octave-cli"), [first]
         for k, job in enumerate(jobs):
             text = export(replace(job.table, robot=f"t{k}"), form)
-            (folder / f"t{k}_{name}.m").write_text(text, "utf-8")
-            if form.endswith("symbolic"):
-                lines.append(f"[T, q] = t{k}_{name}();")
-            for one in job.q.tolist():
-                numbers = "; ".join(map(repr, one))
-                value = f"t{k}_{name}([{numbers}])"
-                if form.endswith("symbolic"):
-                    exact = re.sub(r"[^; ]+", r"vpa('\g<0>')", numbers)
-                    value = f"double(subs(T, q, [{exact}]))"
-                lines.append(f"printf('%.17g\\n', ({value})');")
-            lines.append("printf('end\\n');")
+            name = re.findall(r"(\w+)\(.*\)$", text.partition("\n")[0])[0]
+            (folder / f"{name}.m").write_text(text, "utf-8")
+            lines += [*lines_of(k, job), "printf('end\\n');"]
         (folder / "tables.m").write_text("\n".join(lines), "utf-8")
         command = [octave, "--no-init-file", "--quiet", "tables.m"]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
@@ -128,7 +127,26 @@ def in_octave(form: str) -> Callable[[Sequence[Job], Path], Poses]:
     return run
 
 
-def read_back(form: str) -> Callable[[Sequence[Job], Path], Poses]:
+def _printed(value: str) -> str:
+    return f"printf('%.17g\\n', ({value})');"
+
+
+def _plainly(k: int, job: Job) -> list[str]:
+    return [_printed(f"t{k}_placement([{'; '.join(map(repr, q))}])") for q in job.q.tolist()]
+
+
+def _symbolically(k: int, job: Job) -> list[str]:
+    exact = ("; ".join(f"vpa('{x!r}')" for x in q) for q in job.q.tolist())
+    return [f"[T, q] = t{k}_symbolic();", *(_printed(f"double(subs(T, q, [{q}]))") for q in exact)]
+
+
+def _as_bodies(k: int, job: Job) -> list[str]:
+    tip = f"{plain(job.table.tip_frame)}_tip"
+    numbers = (", ".join(map(repr, q)) for q in job.q.tolist())
+    return [f"robot = t{k}_tree();", *(_printed(f"getTransform(robot, [{q}], '{tip}')") for q in numbers)]
+
+
+def read_back(form: str) -> Run:
     """The forms that urdfkin reads to the last bit."""
 
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
@@ -152,11 +170,13 @@ def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
     return found
 
 
-RUN: dict[str, Callable[[Sequence[Job], Path], Poses]] = {
+RUN: dict[str, Run] = {
     **{form: in_python(form) for form in ("numpy", "sympy", "casadi", "roboticstoolbox", "ets")},
     "c": in_c,
-    "matlab": in_octave("matlab"),
-    "matlab-symbolic": in_octave("matlab-symbolic"),
+    "matlab": in_octave("matlab", _plainly),
+    "matlab-symbolic": in_octave("matlab-symbolic", _symbolically, _PACKAGE),
+    # On classes that stand in for the toolbox's: nobody has run it in MATLAB.
+    "matlab-rst": in_octave("matlab-rst", _as_bodies, f"addpath('{Path(__file__).parent / 'octave'}');"),
     **{form: read_back(form) for form in ("toml", "json", "csv")},
     "urdf": as_urdf,
 }

@@ -87,6 +87,14 @@ def test_code_for_roboticstoolbox_computes_what_pinocchio_computes(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_a_rigid_body_tree_computes_what_pinocchio_computes_on_classes_that_stand_in(
+    convention: str, tmp_path: Path
+) -> None:
+    check("matlab-rst", TREES["plain"](), convention, tmp_path, flip=["j2", "j3"])
+
+
+@pytest.mark.slow
 def test_matlabs_symbols_compute_what_pinocchio_computes(tmp_path: Path) -> None:
     check("matlab-symbolic", arm(rotation("x", math.pi / 2) @ shift(0.3, 0.1, 0)), "standard", tmp_path, 1)
 

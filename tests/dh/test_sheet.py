@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.cli.test_dh import run
 from tests.random_chains import trees
-from urdfkin.dh import dh_table, export, read_table, to_convention, units_of
+from urdfkin.dh import dh_table, export, read_table, table_from_rows, to_convention, units_of
 from urdfkin.dh.digits import last_digits
 from urdfkin.dh.expression import NoCellError, cell_of
 from urdfkin.dh.read import is_table_file, mapping_from_text, table_from_text
@@ -110,6 +110,12 @@ def test_what_urdfkin_prints_is_read_again(name: str, form: str) -> None:
         assert [row.joint for row in again.rows] == [row.joint for row in table.rows]
         q = np.linspace(-1, 1, len(table.rows))
         np.testing.assert_allclose(again.placement(q), table.placement(q), atol=1e-9)
+
+
+def test_a_robot_called_robot_is_no_key_of_a_sheet() -> None:
+    table = table_from_rows([[0.3, 0, 0, 0]], "standard")
+    assert table.robot == "robot"
+    assert table_from_text(export(table, "terminal"), ".txt").robot == "robot"
 
 
 @pytest.mark.slow

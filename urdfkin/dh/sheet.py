@@ -65,7 +65,9 @@ def from_sheet(text: str) -> dict[str, Any]:
     else:
         raise _no_header(lines)
     around = [spelled(line) for line in grid.around]
-    data = _said(grid.around, _KEY if form is _separated else _SAID)
+    # A title begins with the robot's name, which may be "robot".
+    plain = [line for line in grid.around if not _TITLE.search(line)]
+    data = _said(plain, _KEY if form is _separated else _SAID)
     if "convention" not in data and (convention := _convention(around, grid.columns)):
         data["convention"] = convention
     for line in grid.around:

@@ -4,7 +4,8 @@ The toolbox's own "dh" and "mdh" fixed transforms ignore theta of a revolute joi
 so that offsets would be lost, and know no Hayati row. The joints are therefore placed by the matrices of
 the table's own frames, and turn about z.
 
-What is written was run in Octave on classes that stand in for the toolbox's; nobody has run it in MATLAB yet.
+What is written runs in Octave on classes that stand in for the toolbox's (`scripts/forms/octave`); nobody has
+run it in MATLAB yet.
 """
 
 from __future__ import annotations

@@ -1,0 +1,13 @@
+% Stands in for the Robotics System Toolbox's class.
+classdef rigidBody < handle
+    properties
+        Name = '';
+        Joint = [];
+    end
+    methods
+        function self = rigidBody(name)
+            self.Name = name;
+            self.Joint = rigidBodyJoint([name '_jnt']);
+        end
+    end
+end

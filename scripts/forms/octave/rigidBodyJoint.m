@@ -1,0 +1,21 @@
+% Stands in for the Robotics System Toolbox's class.
+classdef rigidBodyJoint < handle
+    properties
+        Name = '';
+        Type = 'fixed';
+        JointAxis = [0 0 1];
+        PositionLimits = [-pi pi];
+        Fixed = eye(4);
+    end
+    methods
+        function self = rigidBodyJoint(name, type)
+            self.Name = name;
+            if nargin > 1
+                self.Type = type;
+            end
+        end
+        function setFixedTransform(self, T)
+            self.Fixed = T;
+        end
+    end
+end
