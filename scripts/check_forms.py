@@ -37,7 +37,7 @@ from urdfkin.verify.sampling import sample
 #: Configurations of each table.
 SAMPLES = 4
 #: Octave's symbolic package asks Python about each sum, 20 s for six joints: so many small tables.
-FEW, SMALL = 4, 3
+FEW, SMALL = 6, 4
 
 
 @dataclass(frozen=True, slots=True)

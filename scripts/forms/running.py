@@ -19,6 +19,7 @@ import numpy as np
 from scripts.forms import poses
 from urdfkin.dh import DHTable, export, read_table, to_urdf
 from urdfkin.dh.export.code import plain
+from urdfkin.dh.to_tree import link_names
 from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
 
@@ -163,8 +164,8 @@ def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
     """A URDF of the table, read and computed as any other."""
     found = Poses()
     for job in jobs:
-        robot = load(to_urdf(job.table), verify=False)
-        path = robot.chain(robot.tree.links[list(robot.tree.leaves())[-1]])
+        base, *_, tip = link_names(job.table)
+        path = load(to_urdf(job.table), verify=False).chain(tip, base)
         order = [job.table.joint_names.index(name) for name in path.joint_names]
         found.append(path.placement(job.q[:, order]))
     return found

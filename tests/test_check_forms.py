@@ -1,0 +1,64 @@
+"""The script that runs every form on the catalogue: on a robot of it, and it sees what it should."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urdfkin
+from scripts.check_forms import Subject, subject
+from scripts.forms.running import RUN, Missing, too_wide
+from urdfkin.dh import export
+
+pytestmark = pytest.mark.slow
+
+
+@cache
+def talos_thumb() -> Subject:
+    """Four joints to turn, one that follows another which is not on the way."""
+    robot = urdfkin.load("talos")
+    return subject(robot, "talos", robot.dh("gripper_left_fingertip_1_link", "arm_left_5_link"))
+
+
+@cache
+def elbow() -> Subject:
+    robot = urdfkin.load("elbow")
+    return subject(robot, "elbow", robot.dh(convention="modified"))
+
+
+@pytest.mark.parametrize("form", sorted(set(RUN) - {"matlab-symbolic"}))
+def test_a_catalogue_robot_goes_through_every_form(form: str, tmp_path: Path) -> None:
+    one = elbow() if form in ("roboticstoolbox", "ets", "matlab-rst") else talos_thumb()
+    try:
+        (found,) = RUN[form]([one.job], tmp_path)
+    except Missing as error:
+        pytest.skip(f"{error} is missing")
+    metres, share = one.off(found)
+    assert metres < 1e-14
+    assert share <= 1.0
+    wrong = found.copy()
+    wrong[:, 0, 3] += 1e-12
+    assert one.off(wrong)[1] > 1.0
+
+
+def test_a_latex_table_is_as_wide_as_the_page_at_most(tmp_path: Path) -> None:
+    texts = [export(urdfkin.load(name).dh(), "latex") for name in ("icub", "ur5")]
+    # What is not fitted is too wide: the compiler says so.
+    loose = [text.replace(r"\ifdim\width>\linewidth\linewidth\else\width\fi", r"\width") for text in texts]
+    try:
+        over = too_wide([*texts, *loose], tmp_path)
+    except Missing as error:
+        pytest.skip(f"{error} is missing")
+    assert over[:2] == [0.0, 0.0]
+    assert min(over[2:]) > 0.0
+
+
+def test_a_table_of_another_robot_is_seen() -> None:
+    one = elbow()
+    rows = (replace(one.table.rows[0], d=one.table.rows[0].d + 1e-9), *one.table.rows[1:])
+    assert one.off(replace(one.table, rows=rows).placement(one.job.q))[1] > 1.0
+    assert np.isfinite(one.theirs).all()
