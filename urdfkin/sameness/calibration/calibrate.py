@@ -1,0 +1,356 @@
+"""A model fitted to measured poses: what they tell, what the parameters are then, and what to doubt."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.dh.table import DHTable
+from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.errors.demands import choice, real_number, shown, switch, word, words
+from urdfkin.loading import load
+from urdfkin.model.configuration import checked
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+from urdfkin.sameness.calibration.ends import demand_plausible, starting
+from urdfkin.sameness.calibration.fit import WRONGLY, Fit, Measured, Noise, best_fit, odd_poses, quantile
+from urdfkin.sameness.calibration.identify import Identification, identify, stacked
+from urdfkin.sameness.calibration.models import Model, table_model, urdf_model
+from urdfkin.sameness.calibration.poses import checked_poses
+from urdfkin.sameness.calibration.rewritten import Rewritten
+from urdfkin.sameness.calibration.way import Parameter
+from urdfkin.sameness.result import length
+from urdfkin.urdf.sources import Source
+from urdfkin.verify.certificate import Certificate
+
+#: Configurations that show what could be found, whatever was measured.
+_GENERAL = 40
+#: How many times as uncertain as general configurations leave a parameter: less is no reason to warn.
+_WEAK = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A model after its calibration; make one with `urdfkin.calibrate`.
+
+    Attributes:
+        robot: The robot as it was.
+        model: What was fitted of it.
+        identification: Which parameters the poses tell.
+        general: Which general configurations would tell.
+        fitted: The fit; None where there are no poses.
+        before: The same numbers for the robot as it was, base and tool fitted where they are unknown.
+        odd: Numbers of the poses that do not belong to the others.
+        without_odd: The fit without these.
+        weak: Kept parameters that the poses hardly tell, each with how many times as uncertain it is as
+            as many general configurations would leave it.
+        certificate: What Pinocchio said of what was written.
+    """
+
+    robot: Robot
+    model: Model
+    identification: Identification
+    general: Identification
+    fitted: Fit | None = None
+    before: Fit | None = None
+    odd: tuple[int, ...] = ()
+    without_odd: Fit | None = None
+    weak: dict[int, float] | None = None
+    certificate: Certificate | None = None
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All that were to be fitted."""
+        return self.model.way.parameters
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """(p,) by how much each parameter moved, m and rad; 0 for those that stand still."""
+        return (
+            np.zeros(len(self.parameters)) if self.fitted is None else self.fitted.at - self.model.way.start
+        )
+
+    @cached_property
+    def deviations(self) -> FloatArray:
+        """(p,) standard deviations; 0 for those that stand still."""
+        found = np.zeros(len(self.parameters))
+        if self.fitted is not None:
+            found[list(self.identification.kept)] = np.sqrt(np.diag(self.fitted.covariance))
+        return found
+
+    @property
+    def origins(self) -> dict[str, FloatArray]:
+        """(4, 4) by joint: the new origins of those that moved."""
+        return {} if self.fitted is None else self.model.origins(self.fitted.at)
+
+    @property
+    def base(self) -> FloatArray | None:
+        """(4, 4) of the robot's base in the instrument's frame; None where it was not asked for."""
+        return None if self.fitted is None else self.model.end("base", self.fitted.at)
+
+    @property
+    def tool(self) -> FloatArray | None:
+        """(4, 4) of the target in the tip's frame; None where it was not asked for."""
+        return None if self.fitted is None else self.model.end("tool", self.fitted.at)
+
+    @property
+    def table(self) -> DHTable | None:
+        """The calibrated table; None where a URDF was calibrated."""
+        return None if self.fitted is None else self.model.table(self.fitted.at)
+
+    @cached_property
+    def written(self) -> Rewritten:
+        """The URDF's own text with the new origins in it, and what that moves."""
+        return Rewritten(self.robot, self.origins)
+
+
+def calibrate(
+    source: Robot | Source | DHTable,
+    q: ArrayLike | None = None,
+    poses: ArrayLike | None = None,
+    *,
+    tip: str | None = None,
+    base: str | None = None,
+    fit: Collection[str] = ("origins",),
+    noise: tuple[float, float] | None = None,
+    drop_odd: bool = False,
+    complete: bool = True,
+) -> Calibration:
+    """The model with which a robot, or a table, comes closest to measured poses.
+
+    What is written is loaded anew, and its tip held against Pinocchio's at the measured configurations.
+
+    Args:
+        source: A robot, what `load` takes, or a Denavit-Hartenberg table.
+        q: (s, nq) configurations; of a table (s, coordinates). None: only what could be found is told.
+        poses: (s, 4, 4) of the tip in the base, or (s, 3) positions alone, m.
+        tip: A link's or joint's name; the robot's tip when None.
+        base: Likewise; the robot's base frame when None.
+        fit: Of "base" (where the instrument stands), "tool" (the target on the tip), "offsets" (the joints'
+            zeros), "origins" (the six of each joint of the path; all cells of a table), "gains".
+        noise: Standard deviations of what was measured: m of a coordinate, rad of a turn about an axis. None:
+            estimated from what is left.
+        drop_odd: Whether poses that do not belong to the others are left out; they are told in any case.
+        complete: Without poses: whether poses will be measured, or positions alone.
+
+    Raises:
+        InputError: shapes, fewer poses than tell anything, positions that can be no metres.
+        UnknownNameError: a frame or a set of parameters that does not exist.
+        UrdfError, SourceError: as `load`.
+        VerificationError: Pinocchio computes something else of what was written.
+
+    Example:
+        >>> import urdfkin
+        >>> found = urdfkin.calibrate("ur5", fit=["base", "tool", "origins"], tip="tool0")
+        >>> found.identification.rank, len(found.parameters)
+        (30, 54)
+    """
+    robot = source if isinstance(source, Robot) else load(source)
+    names = tuple(word(name, "each of fit") for name in words(fit, "fit"))
+    model = (
+        table_model(source, names)
+        if isinstance(source, DHTable)
+        else urdf_model(
+            robot.tree, choice(tip, robot.tip_frame, "tip"), choice(base, robot.base_frame, "base"), names
+        )
+    )
+    drop_odd, complete = switch(drop_odd, "drop_odd"), switch(complete, "complete")
+    if (q is None) != (poses is None):
+        raise InputError("q and poses are given together", found="one of the two")
+    measured = None if q is None or poses is None else _measured(robot, model, q, poses)
+    if measured is not None:
+        complete = measured.complete
+    general = _values(model, robot, robot.sample(_GENERAL))
+    if measured is None:
+        could = identify(model, general, complete=complete, at=_somewhere(model))
+        return Calibration(robot, model, could, could)
+    found = _calibrated(robot, model, measured, noise, drop_odd)
+    at = None if found.fitted is None else found.fitted.at
+    found = replace(found, general=identify(model, general, complete=complete, at=at))
+    return replace(found, certificate=_held(found, measured, np.atleast_2d(np.asarray(q, dtype=np.float64))))
+
+
+def _somewhere(model: Model) -> FloatArray:
+    """(p,) the model as it is, with a target that is fitted at no special place: it may be anywhere."""
+    at = model.way.start.copy()
+    for k, parameter in enumerate(model.way.parameters):
+        if parameter.where == "tool" and parameter.unit == "m":
+            at[k] = model.way.size / (5.0 + "xyz".index(parameter.what))
+    return at
+
+
+def _values(model: Model, robot: Robot, q: FloatArray) -> FloatArray:
+    return model.coupling.values(model.coupling.select(robot.tree, q))
+
+
+def _measured(robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike) -> Measured:
+    T = checked_poses(poses)
+    if isinstance(model.source, DHTable):
+        values = model.coupling.values(q)
+    else:
+        values = _values(model, robot, np.atleast_2d(checked(robot.tree, q, "q")))
+    if len(values) != len(T) or values.ndim != 2:
+        raise InputError(
+            "each pose needs its configuration", found=f"{len(T)} poses, q of shape {np.shape(q)}"
+        )
+    if not len(T):
+        raise InputError("no poses", remedy="one is needed at least, and more than there are parameters")
+    measured = Measured(values, T[:, :3, 3], T[:, :3, :3]) if T.ndim == 3 else Measured(values, T)
+    demand_plausible(model, measured)
+    return measured
+
+
+def _calibrated(
+    robot: Robot, model: Model, measured: Measured, noise: tuple[float, float] | None, drop_odd: bool
+) -> Calibration:
+    stated, start = None if noise is None else _stated(noise), starting(model, measured)
+    identification = identify(model, measured.values, complete=measured.complete, at=start)
+    ends = [k for k in identification.kept if model.way.parameters[k].where in ("base", "tool")]
+    before = best_fit(model, measured, ends, stated, start)
+    found = best_fit(model, measured, identification.kept, stated, before.at)
+    identification, found = _more(model, measured, identification, stated, found)
+    odd, clean = odd_poses(model, measured, identification.kept, stated, found)
+    if drop_odd and odd:
+        chosen = np.ones(len(measured), dtype=bool)
+        chosen[list(odd)] = False
+        measured, found = measured.some(chosen), clean
+        before = best_fit(model, measured, ends, stated, before.at)
+    return Calibration(
+        robot,
+        model,
+        identification,
+        identification,
+        found,
+        before,
+        odd,
+        clean if odd else None,
+        _weak(robot, model, measured, identification.kept, found.at),
+    )
+
+
+def _more(
+    model: Model, measured: Measured, identification: Identification, stated: Noise | None, found: Fit
+) -> tuple[Identification, Fit]:
+    """With what can be told where the fit ended, if that explains more than chance would.
+
+    A model as it was drawn is more special than the robot: a tip on the last axis does not show how far that
+    is turned, one beside it does.
+    """
+    again = identify(model, measured.values, complete=measured.complete, at=found.at)
+    more = again.rank - identification.rank
+    if more <= 0:
+        return identification, found
+    trial = best_fit(model, measured, again.kept, stated, found.at)
+    scale = trial.noise.of(measured.complete)
+    explained = float(((found.errors / scale) ** 2).sum() - ((trial.errors / scale) ** 2).sum())
+    return (again, trial) if explained > quantile(1.0 - WRONGLY, more) else (identification, found)
+
+
+def _stated(noise: tuple[float, float]) -> Noise:
+    if not isinstance(noise, tuple | list) or len(noise) != 2:
+        raise InputError("noise is two numbers, metres and radians", found=shown(noise))
+    metres, radians = (real_number(one, "noise") for one in noise)
+    if min(metres, radians) <= 0.0:
+        raise InputError(
+            "noise is more than nothing", found=str(noise), remedy="leave it out: it is estimated"
+        )
+    return Noise(metres, radians)
+
+
+def _weak(
+    robot: Robot, model: Model, measured: Measured, kept: Sequence[int], at: FloatArray
+) -> dict[int, float]:
+    """Kept parameters that as many general configurations would tell much better."""
+    general = _values(model, robot, robot.sample(len(measured), seed=1))
+    sizes = []
+    for values in (measured.values, general):
+        J = stacked(model, values, complete=measured.complete, at=at)[:, list(kept)]
+        _, R = np.linalg.qr(J)
+        if (np.abs(np.diag(R)) <= 1e-12 * np.abs(R).max(initial=0.0)).any() or len(R) < len(kept):
+            return {}
+        sizes.append(np.linalg.norm(np.linalg.solve(R, np.eye(len(R))), axis=1))
+    ratios = sizes[0] / sizes[1]
+    return {k: float(ratio) for k, ratio in zip(kept, ratios, strict=True) if ratio > _WEAK}
+
+
+def _held(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate | None:
+    """Hold what is written against Pinocchio, at the measured configurations.
+
+    A URDF holds neither the ends nor gains; a table is held by `load`.
+    """
+    model, fitted = found.model, found.fitted
+    if fitted is None:
+        return None
+    if (table := found.table) is not None:
+        made = load(table)
+        made.placement(made.neutral(), made.tip_frame)
+        return made.certificate()
+    at = fitted.at.copy()
+    at[[p.where in ("base", "tool") or p.what == "gain" for p in found.parameters]] = 0.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a text that was warned of when it was loaded
+        written = load(found.written.text, mimic=found.robot.origin.mimic, root_joint=found.robot.root_joint)
+    T = written.placement(q, [model.base, model.tip])
+    theirs = np.linalg.solve(T[:, 0], T[:, 1])
+    away = np.abs(theirs - model.way.poses(measured.values, at))
+    bound = 4.0 * model.way.rounding(measured.values)
+    if away[:, :3, 3].max() > bound or away[:, :3, :3].max() > bound / model.way.size:
+        raise UrdfkinError(
+            "the URDF that was written is not what was fitted",
+            where=f"{found.robot.name}, {model.base} to {model.tip}",
+            found=f"{float(away.max()):.3g}, where rounding explains {bound:.3g}",
+        )
+    return written.certificate()
+
+
+def doubts(found: Calibration) -> list[str]:
+    """What to doubt, a line each."""
+    return list(_doubts(found))
+
+
+def _doubts(found: Calibration) -> Iterator[str]:
+    fitted, name = found.fitted, [str(parameter) for parameter in found.parameters]
+    if fitted is None:
+        return
+    lost = found.general.rank - found.identification.rank
+    if lost > 0:
+        untold = [k for k in found.general.kept if k not in found.identification.kept]
+        yield (
+            f"these poses tell {found.identification.rank} numbers, general ones would tell {lost} more: "
+            f"{_listed(name[k] for k in untold)} stand still"
+        )
+    if found.weak:
+        worst = sorted(found.weak.items(), key=lambda one: -one[1])
+        yield (
+            "these poses hardly tell "
+            + _listed(f"{name[k]} ({ratio:.0f} times as uncertain)" for k, ratio in worst)
+            + "; in brackets: as general configurations of their number would leave it"
+        )
+    if fitted.freedom < 0.5:
+        yield "no number is left to judge by: there are as many parameters as measured numbers"
+    elif fitted.freedom < len(found.identification.kept):
+        yield f"{fitted.freedom:.0f} numbers are left to judge {len(found.identification.kept)} parameters by"
+    if found.odd and found.without_odd is not None:
+        one = len(found.odd) == 1
+        poses = f"pose{'' if one else 's'} {_listed(map(str, found.odd))} "
+        if len(fitted.errors) == len(found.without_odd.errors):
+            yield poses + f"{'is' if one else 'are'} left out"
+        else:
+            ours, theirs = (length(each.rms()[0]) for each in (fitted, found.without_odd))
+            yield (
+                poses + f"{'does' if one else 'do'} not belong to the others: without "
+                f"{'it' if one else 'them'} {theirs} are left of {ours} (rms)"
+            )
+    gains = [k for k in found.identification.kept if found.parameters[k].what == "gain"]
+    if gains:
+        yield f"a URDF has no gains: {_listed(name[k] for k in gains)} are not written"
+
+
+def _listed(names: Iterable[str], most: int = 6) -> str:
+    every = list(names)
+    return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")

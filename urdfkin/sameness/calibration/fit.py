@@ -1,0 +1,264 @@
+"""The parameters with which a model comes closest to measured poses, and how well they are known.
+
+Damped Gauss-Newton (Levenberg, 1944; Marquardt, 1963) on the tip's errors, each divided by its noise s. At
+the minimum, with J the Jacobian of what is divided so and r what is left of it,
+
+    C = (J^T J)^-1       the covariance of the parameters,
+    H = J C J^T          what of each measurement the fit follows; 1 - H_ii of it is left to judge by.
+
+Noise that nobody states is estimated from what is left, of positions and of turns apart: the sum of their
+squares over the sum of their 1 - H_ii (Foerstner's variance components), until it stays.
+
+A pose is **odd** when r_i^T (1 - H_ii)^-1 r_i, which is distributed as chi^2 with as many degrees of freedom
+as it has numbers, is larger than the largest of so many good ones is in a hundred campaigns but one. The
+largest is taken out and the rest fitted anew, until none is odd: one bad pose hides another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urdfkin.kinematics.rotation import log_rotation
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.tree import FloatArray
+from urdfkin.sameness.calibration.models import Model
+
+_ROUNDS = 100
+#: Where damping starts, of the largest singular value; what a success leaves of it, and where it ends.
+_DAMPING, _EASING, _MOST = 1e-4, 0.03, 1e3
+#: Of the squared errors: what is no gain any more.
+_NOTHING = 1e-13
+#: How often noise is estimated, and by what share it may still change.
+_ESTIMATES, _STAYS = 20, 1e-3
+#: In how many campaigns without an odd pose one is called so.
+WRONGLY = 0.01
+#: Of all poses: more than these are no odd ones.
+_MOST_ODD = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What was measured.
+
+    Attributes:
+        values: (s, n) joint values of the path, rad or m.
+        p: (s, 3) positions in the base, m.
+        R: (s, 3, 3) orientations; None where positions alone were measured.
+    """
+
+    values: FloatArray
+    p: FloatArray
+    R: FloatArray | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether orientations are there."""
+        return self.R is not None
+
+    def __len__(self) -> int:
+        return len(self.p)
+
+    def some(self, which: NDArray[np.bool_]) -> Measured:
+        """Those that `which` (s,) chooses."""
+        return Measured(self.values[which], self.p[which], None if self.R is None else self.R[which])
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Standard deviations of each number that is measured.
+
+    Attributes:
+        metres: Of a coordinate of a position.
+        radians: Of a turn about an axis.
+    """
+
+    metres: float
+    radians: float
+
+    def of(self, complete: bool) -> FloatArray:
+        """(6,) or (3,), for one pose."""
+        return np.array([self.metres] * 3 + ([self.radians] * 3 if complete else []))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The end of a fit.
+
+    Attributes:
+        at: (p,) all parameters.
+        errors: (s, 6) or (s, 3): measured minus computed, in the base, m and rad.
+        noise: What it was weighted by.
+        covariance: (k, k) of the kept parameters, in their units; inf where nothing is left to judge by.
+        left: (s, 6) or (s, 3): which share of each number is left to judge by, 1 - H_ii.
+        odd: (s,) chi^2 of each pose.
+    """
+
+    at: FloatArray
+    errors: FloatArray
+    noise: Noise
+    covariance: FloatArray
+    left: FloatArray
+    odd: FloatArray
+
+    @property
+    def freedom(self) -> float:
+        """How many numbers more were measured than fitted."""
+        return float(self.left.sum())
+
+    @property
+    def ratio(self) -> float:
+        """The noise that is left by that which was stated: 1 but for 1/sqrt(2 freedom) or so."""
+        if self.freedom < 0.5:
+            return math.nan
+        whitened = self.errors / self.noise.of(self.errors.shape[1] == 6)
+        return math.sqrt(float((whitened**2).sum()) / self.freedom)
+
+    def rms(self) -> tuple[float, float | None]:
+        """Of positions (the vector's length, m) and of turns (rad)."""
+        position, turn = (np.sqrt((x**2).sum(axis=1).mean()) for x in np.hsplit(self.errors, [3]))
+        return float(position), float(turn) if self.errors.shape[1] == 6 else None
+
+
+def errors(model: Model, measured: Measured, at: FloatArray) -> FloatArray:
+    """(s, 6) or (s, 3) measured minus computed, [position; turn] in the base."""
+    T = model.way.poses(measured.values, at)
+    away = measured.p - T[:, :3, 3]
+    if measured.R is None:
+        return away
+    return np.hstack([away, log_rotation(measured.R @ T[:, :3, :3].swapaxes(-1, -2))])
+
+
+def best_fit(
+    model: Model, measured: Measured, kept: Sequence[int], noise: Noise | None, at: FloatArray
+) -> Fit:
+    """The best fit.
+
+    Args:
+        model: What is fitted.
+        measured: To what.
+        kept: Numbers of the parameters that may move.
+        noise: As it is known; None: to be estimated.
+        at: (p,) where to begin.
+    """
+    weights = noise or Noise(1.0, 1.0 / model.way.size)
+    for _ in range(1 if noise else _ESTIMATES):
+        at = _descended(model, measured, kept, weights, at)
+        found = _ended(model, measured, kept, weights, at)
+        if noise or found.freedom < 0.5:
+            break
+        estimated = _estimated(found, model, measured)
+        stays = abs(estimated.metres - weights.metres) <= _STAYS * weights.metres and (
+            not measured.complete or abs(estimated.radians - weights.radians) <= _STAYS * weights.radians
+        )
+        weights = estimated
+        if stays:
+            break
+    found = _ended(model, measured, kept, weights, at)
+    if noise is None and found.freedom < 0.5:
+        found = replace(found, covariance=np.full_like(found.covariance, np.inf))
+    return found
+
+
+def _estimated(found: Fit, model: Model, measured: Measured) -> Noise:
+    """Noise from what is left; no less than rounding, or there would be nothing to divide by."""
+    rounding = model.way.rounding(measured.values)
+
+    def of(part: slice, least: float, former: float) -> float:
+        left = float(found.left[:, part].sum())
+        size = float((found.errors[:, part] ** 2).sum())
+        return max(math.sqrt(size / left), least) if left > 0.5 else former
+
+    return Noise(
+        of(slice(0, 3), rounding, found.noise.metres),
+        of(slice(3, 6), rounding / model.way.size, found.noise.radians),
+    )
+
+
+def _whitened(
+    model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Errors (rows,) and columns (rows, k), divided by the noise."""
+    scale = noise.of(measured.complete)
+    _, columns = model.way.columns(measured.values, at)
+    J = columns[:, : len(scale), list(kept)] / scale[:, np.newaxis]
+    r = (errors(model, measured, at) / scale).ravel()
+    return r, J.reshape(r.size, len(kept))
+
+
+def _descended(
+    model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
+) -> FloatArray:
+    scale, damping = noise.of(measured.complete), _DAMPING
+
+    def size(at: FloatArray) -> float:
+        return float(np.linalg.norm(errors(model, measured, at) / scale))
+
+    now = size(at)
+    for _ in range(_ROUNDS):
+        r, J = _whitened(model, measured, kept, noise, at)
+        units = np.linalg.norm(J, axis=0)
+        units[units == 0.0] = 1.0
+        U, S, Vt = np.linalg.svd(J / units, full_matrices=False)
+        before, along = now, U.T @ r
+        if float(along @ along) <= _NOTHING * now**2:
+            break
+        while damping <= _MOST:
+            factor = S / (S**2 + (damping * S[0]) ** 2) if S.size else S
+            trial = at.copy()
+            trial[list(kept)] += Vt.T @ (factor * along) / units
+            if (after := size(trial)) < now:
+                at, now, damping = trial, after, _EASING * damping
+                break
+            damping = max(10.0 * damping, _DAMPING**2)
+        # What is left changes by rounding alone.
+        if now >= before * (1.0 - 4.0 * EPS * len(r)):
+            break
+        damping = 0.0 if damping < _DAMPING**3 else damping
+    return at
+
+
+def _ended(model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray) -> Fit:
+    r, J = _whitened(model, measured, kept, noise, at)
+    k = noise.of(measured.complete).size
+    units = np.linalg.norm(J, axis=0)
+    units[units == 0.0] = 1.0
+    Q, R = np.linalg.qr(J / units)
+    half = np.linalg.solve(R, np.eye(len(R))) / units[:, np.newaxis]
+    blocks = Q.reshape(len(measured), k, len(kept))
+    judged = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)
+    own = r.reshape(-1, k)
+    odd = np.einsum("si,sij,sj->s", own, np.linalg.pinv(judged, rcond=1e-9, hermitian=True), own)
+    left = np.clip(np.einsum("sii->si", judged), 0.0, 1.0)
+    return Fit(at, errors(model, measured, at), noise, half @ half.T, left, odd)
+
+
+def odd_poses(
+    model: Model, measured: Measured, kept: Sequence[int], noise: Noise | None, found: Fit
+) -> tuple[tuple[int, ...], Fit]:
+    """Numbers of the poses that do not belong to the others, and the fit without them."""
+    out = list[int]()
+    # No fewer numbers may be left than there are parameters, and a quarter is no exception any more.
+    most = min(int(_MOST_ODD * len(measured)), len(measured) - 1 - -(-len(kept) // found.errors.shape[1]))
+    clean = found
+    while len(out) < most:
+        inside = np.setdiff1d(np.arange(len(measured)), out)
+        worst = int(np.argmax(clean.odd))
+        if clean.odd[worst] <= quantile(1.0 - WRONGLY / len(measured), clean.errors.shape[1]):
+            break
+        out.append(int(inside[worst]))
+        chosen = np.ones(len(measured), dtype=bool)
+        chosen[out] = False
+        clean = best_fit(model, measured.some(chosen), kept, noise, clean.at)
+    return tuple(sorted(out)), clean
+
+
+def quantile(share: float, freedom: int) -> float:
+    """Of chi^2 (Wilson and Hilferty, 1931): right to a few per cent, also far out."""
+    step = 2.0 / (9.0 * freedom)
+    return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3

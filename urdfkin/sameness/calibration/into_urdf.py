@@ -1,0 +1,88 @@
+"""New origins written into the URDF's own text: names, meshes, comments and formatting stay byte for byte."""
+
+from __future__ import annotations
+
+import codecs
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from urdfkin.errors import InputError
+from urdfkin.kinematics.rotation import quaternion_of, rpy_of
+from urdfkin.kinematics.roundings import ANGLE, EPS
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.runner import read_urdf
+from urdfkin.model.tree import FloatArray
+from urdfkin.urdf.edit import Edit, before, edited, with_attributes
+from urdfkin.urdf.records import JointRecord, Vector
+from urdfkin.urdf.writer import numbers
+
+#: Decimals of a metre and of a radian that are written: what a double of a robot's size has.
+_DECIMALS = 15
+_SAME = 10.0**-_DECIMALS
+
+
+def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
+    """The URDF's bytes with these (4, 4) origins of joints, by name, in place of what they were.
+
+    A number that stays the same to rounding keeps its digits. Of the angles that make one rotation those are
+    taken which are nearest to the old ones.
+
+    Raises:
+        InputError: the text has errors, or no such joint.
+    """
+    report = Reporter("<text>", data)
+    urdf = read_urdf(report)
+    if urdf is None or report.failed:
+        raise InputError("a text with errors is not edited", found=str(report.findings()[0]))
+    mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
+    edits = list[Edit]()
+    for name, T in origins.items():
+        if (joint := urdf.by_name.get(name)) is None:
+            raise InputError("the text has no such joint", found=repr(name))
+        edits += _edits(report.data, joint, T)
+    return mark + edited(report.data, edits)
+
+
+def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
+    values = {"xyz": _kept(joint, "xyz", T[:3, 3], joint.xyz)}
+    if joint.quaternion is None:
+        values["rpy"] = _kept(joint, "rpy", nearest_rpy(T[:3, :3], joint.rpy), joint.rpy)
+    else:
+        quaternion = quaternion_of(T[:3, :3])
+        sign = math.copysign(1.0, float(quaternion @ np.asarray(joint.quaternion)))
+        values["quat_xyzw"] = numbers((sign * quaternion).round(_DECIMALS))
+    if joint.origin_element is not None:
+        return list(with_attributes(data, joint.origin_element, values))
+    written = " ".join(f'{name}="{value}"' for name, value in values.items())
+    # A joint without errors has a parent and a child at least.
+    return [before(data, joint.element.children[0], f"<origin {written}/>")]
+
+
+def _kept(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
+    """Three numbers as text; those that differ from the old ones by rounding as they were written."""
+    origin = joint.origin_element
+    words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
+    return " ".join(
+        word if abs(x - was) <= max(_SAME, ANGLE * EPS * abs(was)) else numbers([round(x, _DECIMALS)])
+        for word, x, was in zip(words, new.tolist(), old, strict=True)
+    )
+
+
+def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
+    """(3,) roll, pitch and yaw of a rotation, of all that make it those nearest to the old ones.
+
+    >>> from urdfkin.kinematics.rotation import rotation_from_rpy
+    >>> nearest_rpy(rotation_from_rpy([3.1, 3.0, 3.1]), (3.1, 3.0, 3.1)).round(12).tolist()
+    [3.1, 3.0, 3.1]
+    """
+    roll, pitch, yaw = rpy_of(R).tolist()
+    if math.cos(pitch) <= ANGLE * EPS:  # roll and yaw turn about one axis: only their sum has a meaning
+        roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
+    turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
+    wrapped = [
+        [x + 2.0 * math.pi * round((was - x) / (2.0 * math.pi)) for x, was in zip(rpy, old, strict=True)]
+        for rpy in turns
+    ]
+    return np.array(min(wrapped, key=lambda rpy: sum(abs(x - was) for x, was in zip(rpy, old, strict=True))))

@@ -1,0 +1,257 @@
+"""A URDF's path and a Denavit-Hartenberg table as ways with parameters, and what they are when these move.
+
+**Of a URDF** each joint of the path has the six of its origin: with A the turn that makes its axis z, the
+origin becomes  T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. So z slides along the joint's axis and
+rz turns about it, which is the joint's zero, whatever axis the file gives it; the four others move the axis.
+A joint's gain, the seventh, is no number of a URDF. `base` and `tool` are six likewise, before the first
+constant and after the last: where the instrument stands and what it looks at.
+
+**Of a table** each row has its cells, and beta where its axis is parallel to the next within `PARALLEL`
+(Hayati's fifth number: there d says nothing, and alpha alone cannot tilt the axis both ways).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urdfkin.dh.row import Convention, DHRow
+from urdfkin.dh.table import DHTable
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.kinematics.rotation import axis_aligning
+from urdfkin.kinematics.rotation.euler import coordinate_rotation
+from urdfkin.model.chain import FrameChain, chain, inverse, steps_between
+from urdfkin.model.coupling import Coupling
+from urdfkin.model.tree import FloatArray, Joint, KinematicTree
+from urdfkin.sameness.calibration.way import Motion, Parameter, Way
+
+#: Radians within which two axes of a table count as parallel: assembled arms are some mrad off, and where a
+#: common normal is used, its foot is a link's length over this angle away.
+PARALLEL = math.radians(5.0)
+
+#: What can be fitted.
+FITTED = ("base", "tool", "offsets", "origins", "gains")
+#: An origin's six as they act: what each is called, whether it turns, and its axis.
+SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
+_ALL = tuple(what for what, *_ in SIX)
+#: The order in which they are kept where some do what others do, of a joint that turns and of one that
+#: slides: the joint's zero, what moves its axis, what only moves its frame.
+_KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
+_ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
+_KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A way, and which of its parameters belong together.
+
+    Attributes:
+        way: Base to tip.
+        groups: Numbers of the parameters of each place, in the order in which they are kept.
+        coupling: From the path's coordinates to its joints' values.
+        base: The frame where it starts.
+        tip: The frame where it ends.
+        source: What it was made of: tree, or table.
+    """
+
+    way: Way
+    groups: tuple[tuple[int, ...], ...]
+    coupling: Coupling
+    base: str
+    tip: str
+    source: KinematicTree | DHTable
+
+    def end(self, which: str, at: FloatArray) -> FloatArray | None:
+        """(4, 4) of the base or tool at parameters (p,); None where it is none of them."""
+        if not any(parameter.where == which for parameter in self.way.parameters):
+            return None
+        return self._push(which, at)
+
+    def origins(self, at: FloatArray) -> dict[str, FloatArray]:
+        """(4, 4) new origins of the URDF's joints that moved, by name."""
+        found: dict[str, FloatArray] = {}
+        if not isinstance(self.source, KinematicTree):
+            return found
+        ends = ("base", "tool")
+        for name in dict.fromkeys(p.where for p in self.way.parameters if p.where not in ends):
+            push = self._push(name, at)
+            if (push != np.eye(4)).any():
+                joint = self.source.joints[self.source.joint_index(name)]
+                A = _aligning(joint)
+                found[name] = joint.T_parent_joint @ A @ push @ A.T
+        return found
+
+    def table(self, at: FloatArray) -> DHTable | None:
+        """The table with its parameters at `at`; None for a URDF's model."""
+        if not isinstance(self.source, DHTable):
+            return None
+        cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.way.parameters)}
+
+        def moved(row: DHRow) -> DHRow:
+            theta, d, a, alpha, beta = (cells.get((row.joint, cell), getattr(row, cell)) for cell, *_ in _ROW)
+            return replace(row, theta=theta, d=d, a=a, alpha=alpha, beta=beta)
+
+        rows = [moved(row) for row in self.source.rows]
+        ends = [(self._push(end, at) if (end, "x") in cells else np.eye(4)) for end in ("base", "tool")]
+        T_base, T_tool = ends[0] @ self.source.base, self.source.tool @ ends[1]
+        return replace(self.source, rows=tuple(rows), base=T_base, tool=T_tool, snap=None)
+
+    def _push(self, where: str, at: FloatArray) -> FloatArray:
+        """(4, 4) what the six of a place, those that are there, do together."""
+        values = {p.what: float(at[k]) for k, p in enumerate(self.way.parameters) if p.where == where}
+        push = np.eye(4)
+        for what, turns, axis in SIX:
+            if what in values:
+                push = push @ elementary(turns, axis, values[what])
+        return push
+
+
+class _Maker:
+    """Collects steps and parameters on the way from base to tip."""
+
+    def __init__(self, fit: Collection[str]) -> None:
+        for name in fit:
+            if name not in FITTED:
+                raise UnknownNameError("set of parameters", name, FITTED)
+        if not fit:
+            raise InputError("nothing is to be fitted", remedy=f"there are {', '.join(FITTED)}")
+        self.fit = fit
+        self.steps: list[FloatArray | Motion] = []
+        self.parameters: list[Parameter] = []
+        self.start: list[float] = []
+
+    def parameter(self, where: str, what: str, unit: str, value: float = 0.0) -> int:
+        self.parameters.append(Parameter(where, what, unit))
+        self.start.append(value)
+        return len(self.parameters) - 1
+
+    def push(self, where: str, only: Collection[str] = _ALL, *, backwards: bool = False) -> None:
+        """The six of an origin, or some of them."""
+        moves = [
+            Motion(axis, turns, self.parameter(where, what, "rad" if turns else "m"))
+            for what, turns, axis in SIX
+            if what in only
+        ]
+        self.steps += [replace(move, sense=-1.0) for move in reversed(moves)] if backwards else moves
+
+    def joint(self, where: str, number: int, *, turns: bool, sense: float) -> None:
+        gain = self.parameter(where, "gain", "") if "gains" in self.fit else None
+        self.steps.append(Motion(2, turns, gain, number, sense))
+
+    def model(
+        self,
+        source: KinematicTree | DHTable,
+        path: FrameChain | DHTable,
+        ends: tuple[str, str],
+        kept: Mapping[str, tuple[str, ...]],
+    ) -> Model:
+        """All of it; `kept` says by place in which order its parameters are."""
+        at = {(p.where, p.what): k for k, p in enumerate(self.parameters)}
+        places = dict.fromkeys(parameter.where for parameter in self.parameters)
+        # Of the ends nothing is known, of the joints nearly everything: the ends take what they can.
+        groups = tuple(
+            tuple(at[where, what] for what in kept.get(where, _KEPT[True]) if (where, what) in at)
+            for where in sorted(places, key=lambda where: {"base": 0, "tool": 1}.get(where, 2))
+        )
+        way = Way(tuple(self.steps), tuple(self.parameters), np.array(self.start))
+        return Model(way, groups, path.coupling, *ends, source)
+
+
+def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> Model:
+    """The path of a URDF, with what is to be fitted of it.
+
+    The fixed joint that is the last before the tip has an origin as well; other fixed joints stand still:
+    what they could do the moving ones next to them do.
+
+    Raises:
+        UnknownNameError: no such frame, or no such set of parameters.
+        InputError: a planar or floating joint on the way.
+    """
+    path: FrameChain = chain(tree, tip, base)
+    maker, number = _Maker(fit), 0
+    if "base" in fit:
+        maker.push("base")
+    steps = steps_between(tree, tip, base)
+    last = max((i for i, (joint, _) in enumerate(steps) if joint.kind.has_axis), default=-1)
+    ending = {len(steps) - 1} if last < len(steps) - 1 else set()
+    for i, (joint, backwards) in enumerate(steps):
+        A = _aligning(joint)
+        wanted = _wanted(fit, joint, ending=i in ending)
+        if backwards:
+            maker.steps.append(A)
+            if joint.kind.has_axis:
+                maker.joint(joint.name, number, turns=joint.kind.turns, sense=-1.0)
+            maker.push(joint.name, wanted, backwards=True)
+            maker.steps.append(inverse(joint.T_parent_joint @ A))
+        else:
+            maker.steps.append(joint.T_parent_joint @ A)
+            maker.push(joint.name, wanted)
+            if joint.kind.has_axis:
+                maker.joint(joint.name, number, turns=joint.kind.turns, sense=1.0)
+            maker.steps.append(A.T)
+        number += joint.kind.has_axis
+    if "tool" in fit:
+        maker.push("tool")
+    kept = {joint.name: _KEPT[joint.kind.turns or not joint.kind.has_axis] for joint, _ in steps}
+    return maker.model(tree, path, (base, tip), kept)
+
+
+def _wanted(fit: Collection[str], joint: Joint, *, ending: bool) -> Collection[str]:
+    if "origins" in fit and (joint.kind.has_axis or ending):
+        return _ALL
+    own = "rz" if joint.kind.turns else "z"
+    return (own,) if "offsets" in fit and joint.kind.has_axis else ()
+
+
+def _aligning(joint: Joint) -> FloatArray:
+    A = np.eye(4)
+    if joint.kind.has_axis:
+        A[:3, :3] = axis_aligning(joint.axis)
+    return A
+
+
+def table_model(table: DHTable, fit: Collection[str]) -> Model:
+    """A table, with what is to be fitted of it: "origins" are all cells, "offsets" those beside the values.
+
+    Raises:
+        UnknownNameError: no such set of parameters.
+    """
+    maker = _Maker(fit)
+    if "base" in fit:
+        maker.push("base")
+    maker.steps.append(table.base)
+    for i, row in enumerate(table.rows):
+        own = "theta" if row.kind.turns else "d"
+        cells = dict(zip(("a", "alpha", "d", "theta", "beta"), row.cells, strict=True))
+        alone = abs(math.sin(row.alpha)) > PARALLEL and not row.beta
+        motions = list[FloatArray | Motion]()
+        for cell, turns, axis in _ROW:
+            fitted = "origins" in fit and not (cell == "beta" and alone)
+            if fitted or ("offsets" in fit and cell == own):
+                unit = "rad" if turns else "m"
+                motions.append(Motion(axis, turns, maker.parameter(row.joint, cell, unit, cells[cell])))
+            else:
+                motions.append(elementary(turns, axis, cells[cell]))
+        gain = maker.parameter(row.joint, "gain", "") if "gains" in fit else None
+        along = [*motions[:2], Motion(2, row.kind.turns, gain, i, float(row.sense))]
+        between = motions[2:]
+        standard = table.convention is Convention.STANDARD
+        maker.steps += [*along, *between] if standard else [*between, *along]
+    maker.steps.append(table.tool)
+    if "tool" in fit:
+        maker.push("tool")
+    kept = dict.fromkeys((row.joint for row in table.rows), _KEPT_CELLS)
+    return maker.model(table, table, (table.base_frame, table.tip_frame), kept)
+
+
+def elementary(turns: bool, axis: int, value: float) -> FloatArray:
+    """(4, 4) a turn about, or a slide along, a coordinate axis."""
+    T = np.eye(4)
+    if turns:
+        T[:3, :3] = coordinate_rotation(axis, np.array(value))
+    else:
+        T[axis, 3] = value
+    return T

@@ -1,0 +1,72 @@
+"""Attributes exchanged in a text where they stand: every other byte stays as it is.
+
+An element's place is the one that the parser gave it (`Element.offset`), in the bytes that follow a byte
+order mark. What is new stands as the text around it does: between its quotes, with its line ends and blanks.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from urdfkin.errors import InputError
+from urdfkin.urdf.element import Element
+from urdfkin.urdf.writer import attribute
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """Bytes `start` to `end` become `text`; nothing is replaced where the two are one."""
+
+    start: int
+    end: int
+    text: str = ""
+
+
+#: A start tag: '<', then quoted values, in which '>' may stand, and everything else.
+_START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
+_ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
+_INDENTATION = re.compile(rb"((?:\r\n|\r|\n)?[ \t]*+)\Z")
+
+
+def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iterator[Edit]:
+    """Edits that give an element's attributes these values; those that it has not come behind the others."""
+    name_end = at.offset + 1 + len(at.tag.encode())
+    tag = _START_TAG.match(data, at.offset)
+    end = tag.end() if tag else name_end
+    known = {match[1].decode(): match.span(2) for match in _ATTRIBUTE.finditer(data, name_end, end)}
+    added = ""
+    for name, value in values.items():
+        if name not in known:
+            added += f' {name}="{attribute(value)}"'
+        else:
+            start, end = known[name]
+            yield Edit(start + 1, end - 1, attribute(value))
+    if added:
+        last = max((end for _, end in known.values()), default=name_end)
+        yield Edit(last, last, added)
+
+
+def before(data: bytes, at: Element, element: str) -> Edit:
+    """The edit that puts an element, as text, before another, on a line of its own if that has one."""
+    indentation = _INDENTATION.search(data[max(0, at.offset - 1000) : at.offset])
+    return Edit(at.offset, at.offset, element + (indentation[1].decode() if indentation else ""))
+
+
+def edited(data: bytes, edits: Iterable[Edit]) -> bytes:
+    """The text with all edits made.
+
+    >>> edited(b"a=1 b=2", [Edit(6, 7, "3"), Edit(2, 3, "10")])
+    b'a=10 b=3'
+
+    Raises:
+        InputError: two of them overlap.
+    """
+    parts, cursor = list[bytes](), 0
+    for edit in sorted(edits, key=lambda one: (one.start, one.end)):
+        if edit.start < cursor:
+            raise InputError("two edits of one place", found=f"byte {edit.start}")
+        parts += [data[cursor : edit.start], edit.text.encode()]
+        cursor = edit.end
+    return b"".join([*parts, data[cursor:]])
