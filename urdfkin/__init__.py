@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from urdfkin.model.chain import FrameChain
     from urdfkin.model.reference import Reference
     from urdfkin.robot import Robot
+    from urdfkin.sameness.calibration.calibrate import calibrate
     from urdfkin.sameness.changes import diff
     from urdfkin.sameness.judging import same
     from urdfkin.urdf.catalogue import robots
@@ -51,6 +52,7 @@ _HOMES = {
     "UrdfWarning": "urdfkin.lint",
     "UrdfkinError": "urdfkin.errors",
     "VerificationError": "urdfkin.verify.certificate",
+    "calibrate": "urdfkin.sameness.calibration.calibrate",
     "check": "urdfkin.lint",
     "diff": "urdfkin.sameness.changes",
     "load": "urdfkin.loading",
@@ -85,6 +87,7 @@ __all__ = [
     "UrdfWarning",
     "UrdfkinError",
     "VerificationError",
+    "calibrate",
     "check",
     "diff",
     "load",

@@ -42,6 +42,7 @@ _AFTER: dict[str, tuple[str, str]] = {
     "chain": ("urdfkin.cli.chain", "the joint axes between two frames: where they stand and how they point"),
     "dh": ("urdfkin.cli.dh", "Denavit-Hartenberg tables, checked, compared, in many forms"),
     "diff": ("urdfkin.cli.diff", "what changed between two versions of a description, and what that moves"),
+    "calibrate": ("urdfkin.cli.calibrate", "a robot's numbers from measured poses, in its own text"),
     "same": ("urdfkin.cli.same", "whether two models are the same robot, proven"),
     "export": ("urdfkin.cli.export", "kinematics as code in many languages, with its proof"),
     "screws": ("urdfkin.cli.screws", "product of exponentials: home pose and screws, checked"),

@@ -51,7 +51,8 @@ def read_poses(
     )
     q, T = found
     T = T.copy()
-    T[..., :3, 3] *= UNITS[unit]
+    positions = T if T.ndim == 2 else T[:, :3, 3]
+    positions *= UNITS[unit]
     return q, T
 
 

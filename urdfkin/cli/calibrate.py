@@ -1,0 +1,197 @@
+"""`urdfkin calibrate`: a robot's numbers from measured poses, or from another model, in its own text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from urdfkin.cli.arguments import load_robot, robot_argument
+from urdfkin.cli.door import say_file
+from urdfkin.cli.idle import refuse_idle
+from urdfkin.cli.output import check_line, compiling, console, exit_code, write_file
+from urdfkin.cli.reports import check_writable
+from urdfkin.errors import InputError
+from urdfkin.errors.printable import json_text
+
+if TYPE_CHECKING:
+    from urdfkin.dh.table import DHTable
+    from urdfkin.robot import Robot
+    from urdfkin.sameness.calibration.calibrate import Calibration
+    from urdfkin.sameness.calibration.rewritten import Rewritten
+
+_FILE = click.Path(path_type=Path)
+
+
+@click.command(epilog="Example: urdfkin calibrate ur5 --tip tool0 --fit base,tool,origins")
+@robot_argument
+@click.option("--poses", type=_FILE, help="What was measured: CSV or .npz, see docs/calibration.md.")
+@click.option("--like", metavar="MODEL", help="Move as this robot or table does, and keep the own frames.")
+@click.option("--ur", type=_FILE, help="The YAML of a Universal Robots arm's factory calibration.")
+@click.option(
+    "--order",
+    type=click.Choice(["driver", "urdf"]),
+    default="driver",
+    show_default=True,
+    help="With --ur: how its angles turn.",
+)
+@click.option("--tip", metavar="NAME", help="A link or joint. Default: the robot's tip.")
+@click.option("--base", metavar="NAME", help="A link or joint. Default: the robot's base.")
+@click.option(
+    "--fit",
+    "fit",
+    default="origins",
+    show_default=True,
+    metavar="SETS",
+    help="Of base, tool, offsets, origins, gains, with commas.",
+)
+@click.option("--positions", is_flag=True, help="Without --poses: positions alone will be measured.")
+@click.option(
+    "--noise", metavar="M,RAD", help="Standard deviations of what was measured. Default: estimated."
+)
+@click.option(
+    "--unit", type=click.Choice(["m", "mm"]), default="m", show_default=True, help="Of measured positions."
+)
+@click.option("--drop-odd", is_flag=True, help="Leave out poses that do not belong to the others.")
+@click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
+@click.option("--output", "-o", type=_FILE, help="Write the calibrated URDF, or the table as TOML.")
+@click.pass_context
+def command(
+    context: click.Context,
+    robot: str,
+    mimic: bool | None,
+    root_joint: str | None,
+    poses: Path | None,
+    like: str | None,
+    ur: Path | None,
+    order: str,
+    tip: str | None,
+    base: str | None,
+    fit: str,
+    positions: bool,
+    noise: str | None,
+    unit: str,
+    drop_odd: bool,
+    format_: str,
+    output: Path | None,
+) -> None:
+    """Which parameters of a path poses can tell, fitted to measured ones, and the URDF with them in it.
+
+    Of the written URDF every byte but the numbers that moved is as it was; Pinocchio checks it at the
+    measured configurations. ROBOT may be a table's file: then its cells are fitted. Without --poses, --like
+    and --ur it says what general poses would tell.
+
+    Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
+    """
+    from urdfkin.report.calibration import as_data, print_calibration, print_moved  # noqa: PLC0415
+    from urdfkin.report.changes import print_changes  # noqa: PLC0415  keeps --help fast
+
+    check_writable(output)
+    given = [name for name in ("poses", "like", "ur") if context.params[name] is not None]
+    if len(given) > 1:
+        raise InputError("one model at a time", found=", ".join(f"--{name}" for name in given))
+    _refuse_idle(context, given)
+    loaded = load_robot(robot, mimic, root_joint)
+    with compiling():
+        found = None if ur is not None else _calibrated(context, loaded)
+        written = _of_the_factory(loaded, ur, order) if ur is not None else found.written if found else None
+    out, data = console(), {} if found is None else as_data(found)
+    if format_ == "json":
+        data |= {"origins": {joint: T.tolist() for joint, T in written.origins.items()}} if written else {}
+        say_file(json_text(data) + "\n")
+    elif found is not None:
+        print_calibration(found, out, stated=noise is not None)
+    if written is None or (found is not None and found.fitted is None):
+        return
+    if format_ == "table" and written.origins:
+        print_moved(written, out)
+    if output is not None:
+        table = None if found is None else found.table
+        write_file(output, written.text if table is None else _as_toml(table))
+        if format_ == "table" and table is None:
+            print_changes(written.changes, out)
+    certificate = written.certificate if found is None else found.certificate
+    if certificate is not None:
+        (out if format_ == "table" else console(err=True)).print(
+            check_line(certificate), style="green" if certificate.verified else "bold yellow"
+        )
+        context.exit(exit_code(certificate))
+
+
+def _refuse_idle(context: click.Context, given: list[str]) -> None:
+    measured = ("noise", "drop_odd", "unit")
+    if given != ["poses"]:
+        refuse_idle(context, measured, "without --poses")
+    if given != ["ur"]:
+        refuse_idle(context, ("order",), "without --ur")
+    if given:
+        refuse_idle(context, ("positions",), f"with --{given[0]}")
+    else:
+        refuse_idle(context, ("output",), "without --poses, --like and --ur")
+    if given in (["ur"], ["like"]):
+        refuse_idle(context, ("fit",), f"with --{given[0]}")
+    if given == ["ur"]:
+        refuse_idle(context, ("tip", "base"), "with --ur")
+
+
+def _calibrated(context: click.Context, robot: Robot) -> Calibration:
+    """What the running command asks of measured poses, of another model, or of poses in general."""
+    from urdfkin.dh.read import is_table_file, read_table_or_screws  # noqa: PLC0415
+    from urdfkin.dh.table import DHTable  # noqa: PLC0415
+    from urdfkin.sameness.calibration.calibrate import calibrate  # noqa: PLC0415
+    from urdfkin.sameness.calibration.like import calibrate_like  # noqa: PLC0415
+    from urdfkin.sameness.calibration.poses import read_poses  # noqa: PLC0415
+
+    asked = context.params
+    tip, base = asked["tip"], asked["base"]
+    if asked["like"] is not None:
+        return calibrate_like(robot, asked["like"], tip=tip, base=base)
+    table = read_table_or_screws(asked["robot"]) if is_table_file(asked["robot"]) else None
+    source = table if isinstance(table, DHTable) else robot
+    path = robot.chain(tip, base)
+    names = path.joint_names if source is robot else source.joint_names
+    coordinates = robot.coordinate_names if source is robot else names
+    q, T = read_poses(asked["poses"], coordinates, names, asked["unit"]) if asked["poses"] else (None, None)
+    return calibrate(
+        source,
+        q,
+        T,
+        tip=tip,
+        base=base,
+        fit=[name.strip() for name in asked["fit"].split(",")],
+        noise=_noise(asked["noise"]),
+        drop_odd=asked["drop_odd"],
+        complete=not asked["positions"],
+    )
+
+
+def _noise(text: str | None) -> tuple[float, float] | None:
+    from urdfkin.motion.columns import numbers  # noqa: PLC0415
+
+    if text is None:
+        return None
+    metres, radians = numbers(text.split(","), "--noise", ["metres", "radians"])
+    return metres, radians
+
+
+def _of_the_factory(robot: Robot, path: Path, order: str) -> Rewritten:
+    """A Universal Robots arm with its calibration; and what the order of its angles comes to."""
+    from urdfkin.cli.door import say  # noqa: PLC0415
+    from urdfkin.sameness.calibration.like import distance, universal_robots  # noqa: PLC0415
+    from urdfkin.sameness.calibration.universal_robots import ORDERS, read_calibration  # noqa: PLC0415
+    from urdfkin.sameness.result import angle, length  # noqa: PLC0415
+
+    metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))
+    say(
+        f"the angles' two orders, the driver's and a URDF's, put the tool {length(metres)} and "
+        f"{angle(radians)} apart at most: --order {order} is taken (docs/calibration.md)",
+        err=True,
+    )
+    return universal_robots(robot, path, order)
+
+
+def _as_toml(table: DHTable) -> bytes:
+    from urdfkin.dh.export import export  # noqa: PLC0415
+
+    return export(table, "toml").encode()

@@ -1,0 +1,137 @@
+"""A calibration to read, and as data: what the poses tell, what moved, and what to doubt."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from urdfkin.kinematics.rotation import rpy_of
+from urdfkin.model.tree import FloatArray
+from urdfkin.report.listing import print_named
+from urdfkin.report.words import counted
+from urdfkin.sameness.calibration.calibrate import Calibration, doubts
+from urdfkin.sameness.calibration.fit import Fit
+from urdfkin.sameness.calibration.rewritten import Rewritten
+from urdfkin.sameness.result import angle, length
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def print_calibration(found: Calibration, out: Console, *, stated: bool = False) -> None:
+    """Print it.
+
+    Args:
+        found: The calibration.
+        out: Where to.
+        stated: Whether the noise was stated.
+    """
+    model, told = found.model, found.identification
+    poses = f", {counted(len(found.fitted.errors), 'pose')}" if found.fitted is not None else ""
+    out.print(f"{found.robot.name}: {model.base} to {model.tip}{poses}", style="bold")
+    out.print(f"{told.rank} of {len(found.parameters)} parameters can be told, {len(told.still)} stand still")
+    if found.fitted is None:
+        print_named(out, ["can be told"], [(str(found.parameters[k]),) for k in sorted(told.kept)])
+    else:
+        rows = [
+            (
+                str(found.parameters[k]),
+                _amount(found.values[k], found.parameters[k].unit),
+                _amount(found.deviations[k], found.parameters[k].unit),
+            )
+            for k in sorted(told.kept)
+        ]
+        print_named(out, ["parameter", "moved by", "uncertain by"], rows)
+    print_named(
+        out,
+        ["stands still", "because it"],
+        [(str(found.parameters[k]), reason) for k, reason in sorted(told.still.items())],
+        left=(0, 1),
+    )
+    if found.fitted is None or found.before is None:
+        return
+    noise = found.fitted.noise
+    said = f"{length(noise.metres)}" + (
+        f", {angle(noise.radians)}" if found.fitted.errors.shape[1] == 6 else ""
+    )
+    out.print(f"before: {_rms(found.before)} (rms); after: {_rms(found.fitted)}")
+    if stated:
+        spread = 1.0 / np.sqrt(2.0 * max(found.fitted.freedom, 1.0))
+        out.print(f"noise: {said} as stated; {found.fitted.ratio:.3g} +- {spread:.2g} times that is left")
+    else:
+        out.print(f"noise: {said}, estimated from what is left")
+    for name, T in (("base", found.base), ("tool", found.tool)):
+        if T is not None:
+            out.print(f"{name}: {_written(T)}", soft_wrap=True)
+    for line in doubts(found):
+        out.print(f"doubt: {line}", soft_wrap=True, style="bold yellow")
+
+
+def print_moved(written: Rewritten, out: Console) -> None:
+    """By how much each joint's origin moved."""
+    rows = [(joint, length(shift), angle(turn)) for joint, (shift, turn) in written.moved.items()]
+    print_named(out, ["joint", "its origin shifted by", "turned by"], rows)
+
+
+def _amount(value: float, unit: str) -> str:
+    if not np.isfinite(value):
+        return "unknown"
+    return length(value) if unit == "m" else angle(value) if unit == "rad" else f"{value:.3g}"
+
+
+def _rms(fit: Fit) -> str:
+    metres, radians = fit.rms()
+    return length(metres) if radians is None else f"{length(metres)}, {angle(radians)}"
+
+
+def _written(T: FloatArray) -> str:
+    xyz, rpy = (" ".join(f"{x:.9g}" for x in three) for three in (T[:3, 3], rpy_of(T[:3, :3])))
+    return f'xyz="{xyz}" rpy="{rpy}"'
+
+
+def as_data(found: Calibration) -> dict[str, Any]:
+    """For a program: null for what is not known."""
+    told = found.identification
+    data: dict[str, Any] = {
+        "robot": found.robot.name,
+        "source": found.robot.source,
+        "base": found.model.base,
+        "tip": found.model.tip,
+        "rank": told.rank,
+        "parameters": [
+            {
+                "place": parameter.where,
+                "name": parameter.what,
+                "unit": parameter.unit or "1",
+                "fitted": k in told.kept,
+                "moved": float(found.values[k]) if found.fitted is not None else None,
+                "deviation": _finite(found.deviations[k]) if found.fitted is not None else None,
+                "still_because": told.still.get(k),
+            }
+            for k, parameter in enumerate(found.parameters)
+        ],
+    }
+    if found.fitted is None:
+        return data
+    fitted = found.fitted
+    names = ("base", found.base), ("tool", found.tool)
+    return data | {
+        "covariance_of": [str(found.parameters[k]) for k in told.kept],
+        "covariance": [[_finite(x) for x in row] for row in fitted.covariance],
+        "noise": {"metres": fitted.noise.metres, "radians": fitted.noise.radians},
+        "rms": {
+            when: dict(zip(("metres", "radians"), fit.rms(), strict=True))
+            for when, fit in (("before", found.before), ("after", fitted))
+            if fit is not None
+        },
+        "residuals": fitted.errors.tolist(),
+        "odd_poses": list(found.odd),
+        "doubts": doubts(found),
+        "placements": {name: T.tolist() for name, T in names if T is not None},
+        "origins": {joint: T.tolist() for joint, T in found.origins.items()},
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
