@@ -45,6 +45,7 @@ ROBOT = {
         ["--flip", FILE], ["--near-parallel", "strict"], ["--compare", "TABLE", "--no-fit"],
     ],
     "screws": [["--no-mimic", "--format", form] for form in SCREWS] + [["--base", FILE]],
+    "calibrate": [[], ["--fit", FILE], ["--poses", FILE], ["--ur", FILE], ["--tip", FILE]],
     "structure": [[], ["--json"], ["--opw", "1"]],
     "export": [["--no-mimic", "--to", form] for form in LANGUAGES] + [["--to", "c", "--frame", FILE]],
     "check": [["--format", form] for form in ("terminal", "concise", "json", "sarif", "github")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -110,7 +111,7 @@ def command(
         table = None if found is None else found.table
         write_file(output, written.text if table is None else _as_toml(table))
         if format_ == "table" and table is None:
-            print_changes(written.changes, out)
+            print_changes(replace(written.changes, sources=(loaded.source, str(output))), out)
     certificate = written.certificate if found is None else found.certificate
     if certificate is not None:
         (out if format_ == "table" else console(err=True)).print(

@@ -33,6 +33,12 @@ def print_calibration(found: Calibration, out: Console, *, stated: bool = False)
     out.print(f"{told.rank} of {len(found.parameters)} parameters can be told, {len(told.still)} stand still")
     if found.fitted is None:
         print_named(out, ["can be told"], [(str(found.parameters[k]),) for k in sorted(told.kept)])
+        print_named(
+            out,
+            ["stands still", "because it"],
+            [(str(found.parameters[k]), reason) for k, reason in sorted(told.still.items())],
+            left=(0, 1),
+        )
     else:
         rows = [
             (
@@ -43,12 +49,6 @@ def print_calibration(found: Calibration, out: Console, *, stated: bool = False)
             for k in sorted(told.kept)
         ]
         print_named(out, ["parameter", "moved by", "uncertain by"], rows)
-    print_named(
-        out,
-        ["stands still", "because it"],
-        [(str(found.parameters[k]), reason) for k, reason in sorted(told.still.items())],
-        left=(0, 1),
-    )
     if found.fitted is None or found.before is None:
         return
     noise = found.fitted.noise
@@ -86,7 +86,7 @@ def _rms(fit: Fit) -> str:
 
 
 def _written(T: FloatArray) -> str:
-    xyz, rpy = (" ".join(f"{x:.9g}" for x in three) for three in (T[:3, 3], rpy_of(T[:3, :3])))
+    xyz, rpy = (" ".join(f"{x:.9g}" for x in three) for three in (T[:3, 3], rpy_of(T[:3, :3]) + 0.0))
     return f'xyz="{xyz}" rpy="{rpy}"'
 
 

@@ -1,0 +1,75 @@
+"""`urdfkin calibrate` writes what it says, and refuses what has no effect."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.cli.running import urdfkin
+from tests.sameness.calibration.arms import BRANCHED, bench
+from tests.sameness.calibration.test_way import table
+from urdfkin.dh.export import export
+from urdfkin.dh.read import read_table
+from urdfkin.dh.row import Convention
+from urdfkin.loading import load
+from urdfkin.sameness.calibration.models import table_model
+
+
+def test_measured_poses_become_a_urdf_and_data(tmp_path: Path) -> None:
+    true = bench(BRANCHED, ("origins",), "hand", "trunk")
+    (tmp_path / "arm.urdf").write_text(BRANCHED)
+    np.savez(tmp_path / "poses.npz", q=true.q, T=true.T)
+    words = ["calibrate", f"{tmp_path}/arm.urdf", "--tip", "hand", "--poses", f"{tmp_path}/poses.npz"]
+    out = tmp_path / "new.urdf"
+    done = urdfkin(*words, "--format", "json", "-o", str(out))
+    assert done.code == 0, done.err
+    assert done.data["rank"] == 14
+    assert sum(one["fitted"] for one in done.data["parameters"]) == 14
+    assert done.data["rms"]["after"]["metres"] < 1e-14
+    T = load(out).placement(true.q, "hand")
+    assert np.abs(T - true.T).max() < 1e-13
+    assert "measured on the bench" in out.read_text()
+    shown = urdfkin(*words)
+    assert "14 of 18 parameters can be told, 4 stand still" in shown.text
+    assert "verified by Pinocchio" in shown.text
+
+
+def test_a_tables_file_becomes_a_table(tmp_path: Path) -> None:
+    drawn = table(Convention.STANDARD)
+    model = table_model(drawn, ("origins",))
+    truth = model.way.start + 1e-3
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 4))
+    (tmp_path / "arm.toml").write_text(export(drawn, "toml"))
+    np.savez(tmp_path / "poses.npz", q=q, T=model.way.poses(q, truth))
+    out = tmp_path / "new.toml"
+    done = urdfkin("calibrate", f"{tmp_path}/arm.toml", "--poses", f"{tmp_path}/poses.npz", "-o", str(out))
+    assert done.code == 0, done.err
+    assert np.abs(read_table(out).placement(q) - model.way.poses(q, truth)).max() < 1e-13
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--noise", "1,1"], "--noise does nothing without --poses"),
+        (["--drop-odd"], "--drop-odd does nothing without --poses"),
+        (["-o", "x.urdf"], "does nothing without --poses, --like and --ur"),
+        (["--order", "urdf"], "--order does nothing without --ur"),
+        (["--ur", "x.yaml", "--tip", "tool0"], "--tip does nothing with --ur"),
+        (["--like", "ur5", "--fit", "base"], "--fit does nothing with --like"),
+        (["--like", "ur5", "--ur", "x"], "one model at a time"),
+        (["--poses", "x.csv", "--positions"], "--positions does nothing with --poses"),
+        (["--poses", "none.csv"], "none.csv"),
+        (["--fit", "origin"], "did you mean origins"),
+        (["--tip", "tool1"], "did you mean tool0"),
+    ],
+)
+def test_what_has_no_effect_or_is_not_there_is_refused(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = urdfkin("calibrate", "ur5", *words)
+    assert done.code == 2
+    assert said in done.err
+    assert not any(tmp_path.iterdir())
