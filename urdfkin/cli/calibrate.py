@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -102,7 +103,7 @@ def command(
         data |= {"origins": {joint: T.tolist() for joint, T in written.origins.items()}} if written else {}
         say_file(json_text(data) + "\n")
     elif found is not None:
-        print_calibration(found, out, stated=noise is not None)
+        print_calibration(found, out)
     if written is None or (found is not None and found.fitted is None):
         return
     if format_ == "table" and written.origins:
@@ -147,24 +148,26 @@ def _calibrated(context: click.Context, robot: Robot) -> Calibration:
     asked = context.params
     tip, base = asked["tip"], asked["base"]
     if asked["like"] is not None:
-        return calibrate_like(robot, asked["like"], tip=tip, base=base)
+        return calibrate_like(robot, load_robot(asked["like"], None, None), tip=tip, base=base)
     table = read_table_or_screws(asked["robot"]) if is_table_file(asked["robot"]) else None
     source = table if isinstance(table, DHTable) else robot
     path = robot.chain(tip, base)
     names = path.joint_names if source is robot else source.joint_names
     coordinates = robot.coordinate_names if source is robot else names
     q, T = read_poses(asked["poses"], coordinates, names, asked["unit"]) if asked["poses"] else (None, None)
-    return calibrate(
-        source,
-        q,
-        T,
-        tip=tip,
-        base=base,
-        fit=[name.strip() for name in asked["fit"].split(",")],
-        noise=_noise(asked["noise"]),
-        drop_odd=asked["drop_odd"],
-        complete=not asked["positions"],
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a table is loaded once more; it was warned of
+        return calibrate(
+            source,
+            q,
+            T,
+            tip=tip,
+            base=base,
+            fit=[name.strip() for name in asked["fit"].split(",")],
+            noise=_noise(asked["noise"]),
+            drop_odd=asked["drop_odd"],
+            complete=not asked["positions"],
+        )
 
 
 def _noise(text: str | None) -> tuple[float, float] | None:

@@ -19,14 +19,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-def print_calibration(found: Calibration, out: Console, *, stated: bool = False) -> None:
-    """Print it.
-
-    Args:
-        found: The calibration.
-        out: Where to.
-        stated: Whether the noise was stated.
-    """
+def print_calibration(found: Calibration, out: Console) -> None:
+    """Print it."""
     model, told = found.model, found.identification
     poses = f", {counted(len(found.fitted.errors), 'pose')}" if found.fitted is not None else ""
     out.print(f"{found.robot.name}: {model.base} to {model.tip}{poses}", style="bold")
@@ -56,9 +50,9 @@ def print_calibration(found: Calibration, out: Console, *, stated: bool = False)
         f", {angle(noise.radians)}" if found.fitted.errors.shape[1] == 6 else ""
     )
     out.print(f"before: {_rms(found.before)} (rms); after: {_rms(found.fitted)}")
-    if stated:
-        spread = 1.0 / np.sqrt(2.0 * max(found.fitted.freedom, 1.0))
-        out.print(f"noise: {said} as stated; {found.fitted.ratio:.3g} +- {spread:.2g} times that is left")
+    if found.stated:
+        ratio = f"{found.fitted.ratio:.3g} +- {found.fitted.spread:.2g}"
+        out.print(f"noise: {said} as stated; {ratio} times that is left")
     else:
         out.print(f"noise: {said}, estimated from what is left")
     for name, T in (("base", found.base), ("tool", found.tool)):

@@ -75,7 +75,7 @@ def bench(
     model = urdf_model(robot.tree, tip, base, fit)
     rng = np.random.default_rng(seed)
     truth = error * rng.standard_normal(len(model.way.parameters))
-    truth[[p.where in ("base", "tool") for p in model.way.parameters]] = 0.0
+    truth[[p.end for p in model.way.parameters]] = 0.0
     q = robot.sample(poses, seed)
     values = model.coupling.values(model.coupling.select(robot.tree, q))
     return Bench(robot, model, truth, q, model.way.poses(values, truth))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -58,6 +60,18 @@ def test_the_instrument_and_its_target_may_be_anywhere(complete: bool) -> None:
     # The arm's errors of 2 mm and 2 mrad a joint are what these are off by.
     assert np.linalg.norm(rough.base[:3, 3] - B[:3, 3]) < 0.02
     assert np.linalg.norm(rough.tool[:3, 3] - X[:3, 3]) < 0.02
+
+
+def test_joints_that_are_called_as_the_ends_are_no_ends() -> None:
+    text = BRANCHED.replace('"three"', '"base"').replace('"four"', '"tool"')
+    true = bench(text, ("origins",), "hand", "trunk")
+    B, X = pose(1, 4.0), pose(2, 0.3)
+    found = calibrate(true.robot, true.q, B @ true.T @ X, tip="hand", base="trunk", fit=[*ENDS, "origins"])
+    assert found.fitted is not None
+    assert found.fitted.rms()[0] < 1e-13
+    assert set(found.origins) <= {"base", "tool", "fix"}
+    assert found.base is not None
+    assert np.abs(found.base - B).max() < 0.05
 
 
 def test_joints_zeros_alone_are_found() -> None:
@@ -120,7 +134,10 @@ def test_the_covariance_and_the_noise_are_what_they_are_said_to_be() -> None:
     T = true.noisy(1e-4, 1e-4, 0)
     stated = calibrate(true.robot, true.q, T, tip="tool0", base="base", noise=(1e-4, 1e-4))
     assert stated.fitted is not None
-    assert abs(stated.fitted.ratio - 1.0) < 4.0 / np.sqrt(2.0 * stated.fitted.freedom)
+    assert abs(stated.fitted.ratio - 1.0) < 4.0 * stated.fitted.spread
+    assert not doubts(stated)
+    wrong = calibrate(true.robot, true.q, T, tip="tool0", base="base", noise=(4e-5, 4e-5))
+    assert re.match(r"2\.[3-7]\d* times the noise that was stated is left", doubts(wrong)[0])
 
 
 @pytest.mark.slow

@@ -71,6 +71,11 @@ def test_a_quaternion_stays_a_quaternion() -> None:
     assert np.dot([float(x) for x in written[1].split()], [0, 0, -0.6, -0.8]) > 0.0
 
 
+def test_a_follower_that_cannot_follow_is_no_reason_to_refuse() -> None:
+    text = BRANCHED.replace('<axis xyz="0 -1 0"/>', '<axis xyz="0 -1 0"/><mimic joint="nobody"/>').encode()
+    assert b'<mimic joint="nobody"/>' in with_origins(text, {"one": ORIGINS["one"]})
+
+
 def test_what_has_errors_or_no_such_joint_is_not_edited() -> None:
     with pytest.raises(InputError, match="a text with errors is not edited"):
         with_origins(b"<robot>", {})

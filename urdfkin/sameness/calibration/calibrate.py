@@ -30,6 +30,8 @@ from urdfkin.verify.certificate import Certificate
 
 #: Configurations that show what could be found, whatever was measured.
 _GENERAL = 40
+#: Standard deviations that what is left is off the stated noise by, and nobody wonders.
+_UNLIKELY = 4.0
 #: How many times as uncertain as general configurations leave a parameter: less is no reason to warn.
 _WEAK = 10.0
 
@@ -50,6 +52,7 @@ class Calibration:
         weak: Kept parameters that the poses hardly tell, each with how many times as uncertain it is as
             as many general configurations would leave it.
         certificate: What Pinocchio said of what was written.
+        stated: Whether the noise was stated.
     """
 
     robot: Robot
@@ -62,6 +65,7 @@ class Calibration:
     without_odd: Fit | None = None
     weak: dict[int, float] | None = None
     certificate: Certificate | None = None
+    stated: bool = False
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -172,6 +176,7 @@ def calibrate(
     found = _calibrated(robot, model, measured, noise, drop_odd)
     at = None if found.fitted is None else found.fitted.at
     found = replace(found, general=identify(model, general, complete=complete, at=at))
+    found = replace(found, stated=noise is not None)
     return replace(found, certificate=_held(found, measured, np.atleast_2d(np.asarray(q, dtype=np.float64))))
 
 
@@ -179,7 +184,7 @@ def _somewhere(model: Model) -> FloatArray:
     """(p,) the model as it is, with a target that is fitted at no special place: it may be anywhere."""
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
-        if parameter.where == "tool" and parameter.unit == "m":
+        if parameter.end and parameter.where == "tool" and parameter.unit == "m":
             at[k] = model.way.size / (5.0 + "xyz".index(parameter.what))
     return at
 
@@ -210,7 +215,7 @@ def _calibrated(
 ) -> Calibration:
     stated, start = None if noise is None else _stated(noise), starting(model, measured)
     identification = identify(model, measured.values, complete=measured.complete, at=start)
-    ends = [k for k in identification.kept if model.way.parameters[k].where in ("base", "tool")]
+    ends = [k for k in identification.kept if model.way.parameters[k].end]
     before = best_fit(model, measured, ends, stated, start)
     found = best_fit(model, measured, identification.kept, stated, before.at)
     identification, found = _more(model, measured, identification, stated, found)
@@ -286,14 +291,14 @@ def _held(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate |
     model, fitted = found.model, found.fitted
     if fitted is None:
         return None
-    if (table := found.table) is not None:
-        made = load(table)
-        made.placement(made.neutral(), made.tip_frame)
-        return made.certificate()
     at = fitted.at.copy()
-    at[[p.where in ("base", "tool") or p.what == "gain" for p in found.parameters]] = 0.0
+    at[[p.end or p.what == "gain" for p in found.parameters]] = 0.0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a text that was warned of when it was loaded
+        warnings.simplefilter("ignore")  # what there is to warn of was warned of when it was loaded
+        if (table := found.table) is not None:
+            made = load(table)
+            made.placement(made.neutral(), made.tip_frame)
+            return made.certificate()
         written = load(found.written.text, mimic=found.robot.origin.mimic, root_joint=found.robot.root_joint)
     T = written.placement(q, [model.base, model.tip])
     theirs = np.linalg.solve(T[:, 0], T[:, 1])
@@ -335,6 +340,11 @@ def _doubts(found: Calibration) -> Iterator[str]:
         yield "no number is left to judge by: there are as many parameters as measured numbers"
     elif fitted.freedom < len(found.identification.kept):
         yield f"{fitted.freedom:.0f} numbers are left to judge {len(found.identification.kept)} parameters by"
+    if found.stated and abs(fitted.ratio - 1.0) > _UNLIKELY * fitted.spread:
+        yield (
+            f"{fitted.ratio:.3g} times the noise that was stated is left: "
+            "it is another, or the model is too simple"
+        )
     if found.odd and found.without_odd is not None:
         one = len(found.odd) == 1
         poses = f"pose{'' if one else 's'} {_listed(map(str, found.odd))} "

@@ -23,7 +23,7 @@ _TURNS = 200
 def starting(model: Model, measured: Measured) -> FloatArray:
     """(p,) parameters of the model as it is, with base and tool as the poses have them."""
     at = model.way.start.copy()
-    places = {parameter.where for parameter in model.way.parameters} & {"base", "tool"}
+    places = {parameter.where for parameter in model.way.parameters if parameter.end}
     if not places:
         return at
     T = model.way.poses(measured.values)
@@ -34,7 +34,7 @@ def starting(model: Model, measured: Measured) -> FloatArray:
     for which, end in (("base", B), ("tool", X)):
         six = [*end[:3, 3], *euler_of("XYZ", end[:3, :3])]
         for k, parameter in enumerate(model.way.parameters):
-            if parameter.where == which:
+            if parameter.end and parameter.where == which:
                 at[k] = six[("x", "y", "z", "rx", "ry", "rz").index(parameter.what)]
     return at
 

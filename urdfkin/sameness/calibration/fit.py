@@ -119,6 +119,11 @@ class Fit:
         whitened = self.errors / self.noise.of(self.errors.shape[1] == 6)
         return math.sqrt(float((whitened**2).sum()) / self.freedom)
 
+    @property
+    def spread(self) -> float:
+        """The standard deviation of that ratio."""
+        return 1.0 / math.sqrt(2.0 * max(self.freedom, 0.5))
+
     def rms(self) -> tuple[float, float | None]:
         """Of positions (the vector's length, m) and of turns (rad)."""
         position, turn = (np.sqrt((x**2).sum(axis=1).mean()) for x in np.hsplit(self.errors, [3]))

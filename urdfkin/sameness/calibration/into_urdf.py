@@ -11,6 +11,7 @@ import numpy as np
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import quaternion_of, rpy_of
 from urdfkin.kinematics.roundings import ANGLE, EPS
+from urdfkin.lint.finding import Severity
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import FloatArray
@@ -33,9 +34,10 @@ def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
         InputError: the text has errors, or no such joint.
     """
     report = Reporter("<text>", data)
-    urdf = read_urdf(report)
+    urdf = read_urdf(report, mimic=False)  # who follows whom is no matter here
     if urdf is None or report.failed:
-        raise InputError("a text with errors is not edited", found=str(report.findings()[0]))
+        errors = [one for one in report.findings() if one.severity is Severity.ERROR]
+        raise InputError("a text with errors is not edited", found=str(errors[0]))
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
     edits = list[Edit]()
     for name, T in origins.items():

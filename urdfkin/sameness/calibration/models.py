@@ -66,17 +66,16 @@ class Model:
 
     def end(self, which: str, at: FloatArray) -> FloatArray | None:
         """(4, 4) of the base or tool at parameters (p,); None where it is none of them."""
-        if not any(parameter.where == which for parameter in self.way.parameters):
+        if not any(parameter.end and parameter.where == which for parameter in self.way.parameters):
             return None
-        return self._push(which, at)
+        return self._push(which, at, end=True)
 
     def origins(self, at: FloatArray) -> dict[str, FloatArray]:
         """(4, 4) new origins of the URDF's joints that moved, by name."""
         found: dict[str, FloatArray] = {}
         if not isinstance(self.source, KinematicTree):
             return found
-        ends = ("base", "tool")
-        for name in dict.fromkeys(p.where for p in self.way.parameters if p.where not in ends):
+        for name in dict.fromkeys(p.where for p in self.way.parameters if not p.end):
             push = self._push(name, at)
             if (push != np.eye(4)).any():
                 joint = self.source.joints[self.source.joint_index(name)]
@@ -88,20 +87,21 @@ class Model:
         """The table with its parameters at `at`; None for a URDF's model."""
         if not isinstance(self.source, DHTable):
             return None
-        cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.way.parameters)}
+        cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.way.parameters) if not p.end}
 
         def moved(row: DHRow) -> DHRow:
             theta, d, a, alpha, beta = (cells.get((row.joint, cell), getattr(row, cell)) for cell, *_ in _ROW)
             return replace(row, theta=theta, d=d, a=a, alpha=alpha, beta=beta)
 
         rows = [moved(row) for row in self.source.rows]
-        ends = [(self._push(end, at) if (end, "x") in cells else np.eye(4)) for end in ("base", "tool")]
+        ends = [self._push(end, at, end=True) for end in ("base", "tool")]
         T_base, T_tool = ends[0] @ self.source.base, self.source.tool @ ends[1]
         return replace(self.source, rows=tuple(rows), base=T_base, tool=T_tool, snap=None)
 
-    def _push(self, where: str, at: FloatArray) -> FloatArray:
+    def _push(self, where: str, at: FloatArray, *, end: bool = False) -> FloatArray:
         """(4, 4) what the six of a place, those that are there, do together."""
-        values = {p.what: float(at[k]) for k, p in enumerate(self.way.parameters) if p.where == where}
+        parameters = enumerate(self.way.parameters)
+        values = {p.what: float(at[k]) for k, p in parameters if (p.where, p.end) == (where, end)}
         push = np.eye(4)
         for what, turns, axis in SIX:
             if what in values:
@@ -123,15 +123,20 @@ class _Maker:
         self.parameters: list[Parameter] = []
         self.start: list[float] = []
 
-    def parameter(self, where: str, what: str, unit: str, value: float = 0.0) -> int:
-        self.parameters.append(Parameter(where, what, unit))
+    def parameter(self, where: str, what: str, unit: str, value: float = 0.0, *, end: bool = False) -> int:
+        self.parameters.append(Parameter(where, what, unit, end))
         self.start.append(value)
         return len(self.parameters) - 1
 
-    def push(self, where: str, only: Collection[str] = _ALL, *, backwards: bool = False) -> None:
-        """The six of an origin, or some of them."""
+    def end(self, which: str) -> None:
+        """The six of the base or the tool, where they are wanted."""
+        if which in self.fit:
+            self.push(which, _ALL, end=True)
+
+    def push(self, where: str, only: Collection[str], *, backwards: bool = False, end: bool = False) -> None:
+        """The six of a place, or some of them."""
         moves = [
-            Motion(axis, turns, self.parameter(where, what, "rad" if turns else "m"))
+            Motion(axis, turns, self.parameter(where, what, "rad" if turns else "m", end=end))
             for what, turns, axis in SIX
             if what in only
         ]
@@ -149,12 +154,12 @@ class _Maker:
         kept: Mapping[str, tuple[str, ...]],
     ) -> Model:
         """All of it; `kept` says by place in which order its parameters are."""
-        at = {(p.where, p.what): k for k, p in enumerate(self.parameters)}
-        places = dict.fromkeys(parameter.where for parameter in self.parameters)
+        at = {(p.where, p.end, p.what): k for k, p in enumerate(self.parameters)}
         # Of the ends nothing is known, of the joints nearly everything: the ends take what they can.
+        places = dict.fromkeys((p.where, p.end) for p in self.parameters)
         groups = tuple(
-            tuple(at[where, what] for what in kept.get(where, _KEPT[True]) if (where, what) in at)
-            for where in sorted(places, key=lambda where: {"base": 0, "tool": 1}.get(where, 2))
+            tuple(at[*place, what] for what in kept.get(place[0], _KEPT[True]) if (*place, what) in at)
+            for place in sorted(places, key=lambda place: not place[1])
         )
         way = Way(tuple(self.steps), tuple(self.parameters), np.array(self.start))
         return Model(way, groups, path.coupling, *ends, source)
@@ -172,8 +177,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     """
     path: FrameChain = chain(tree, tip, base)
     maker, number = _Maker(fit), 0
-    if "base" in fit:
-        maker.push("base")
+    maker.end("base")
     steps = steps_between(tree, tip, base)
     last = max((i for i, (joint, _) in enumerate(steps) if joint.kind.has_axis), default=-1)
     ending = {len(steps) - 1} if last < len(steps) - 1 else set()
@@ -193,8 +197,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
                 maker.joint(joint.name, number, turns=joint.kind.turns, sense=1.0)
             maker.steps.append(A.T)
         number += joint.kind.has_axis
-    if "tool" in fit:
-        maker.push("tool")
+    maker.end("tool")
     kept = {joint.name: _KEPT[joint.kind.turns or not joint.kind.has_axis] for joint, _ in steps}
     return maker.model(tree, path, (base, tip), kept)
 
@@ -220,8 +223,7 @@ def table_model(table: DHTable, fit: Collection[str]) -> Model:
         UnknownNameError: no such set of parameters.
     """
     maker = _Maker(fit)
-    if "base" in fit:
-        maker.push("base")
+    maker.end("base")
     maker.steps.append(table.base)
     for i, row in enumerate(table.rows):
         own = "theta" if row.kind.turns else "d"
@@ -241,8 +243,7 @@ def table_model(table: DHTable, fit: Collection[str]) -> Model:
         standard = table.convention is Convention.STANDARD
         maker.steps += [*along, *between] if standard else [*between, *along]
     maker.steps.append(table.tool)
-    if "tool" in fit:
-        maker.push("tool")
+    maker.end("tool")
     kept = dict.fromkeys((row.joint for row in table.rows), _KEPT_CELLS)
     return maker.model(table, table, (table.base_frame, table.tip_frame), kept)
 

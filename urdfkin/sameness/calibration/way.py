@@ -34,11 +34,13 @@ class Parameter:
         where: "base", "tool", or the name of a joint.
         what: "x", "rx" and so on of an origin, "gain"; or a cell of a table: "theta", "d", ...
         unit: "m", "rad", or "" for a gain.
+        end: Whether `where` is one of the ends, and no joint of that name.
     """
 
     where: str
     what: str
     unit: str
+    end: bool = False
 
     def __str__(self) -> str:
         return f"{self.where} {self.what}"
