@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+#: Of the noise: less than that is left only where rounding stands for it.
+_ROUNDING = 0.5
+
+
 def print_calibration(found: Calibration, out: Console) -> None:
     """Print it."""
     model, told = found.model, found.identification
@@ -53,6 +57,8 @@ def print_calibration(found: Calibration, out: Console) -> None:
     if found.stated:
         ratio = f"{found.fitted.ratio:.3g} +- {found.fitted.spread:.2g}"
         out.print(f"noise: {said} as stated; {ratio} times that is left")
+    elif found.fitted.ratio < _ROUNDING:
+        out.print("noise: none, what is left is rounding")
     else:
         out.print(f"noise: {said}, estimated from what is left")
     for name, T in (("base", found.base), ("tool", found.tool)):

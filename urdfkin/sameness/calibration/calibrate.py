@@ -299,8 +299,7 @@ def _held(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate |
             made = load(table)
             made.placement(made.neutral(), made.tip_frame)
             return made.certificate()
-        written = load(found.written.text, mimic=found.robot.origin.mimic, root_joint=found.robot.root_joint)
-    T = written.placement(q, [model.base, model.tip])
+        T = found.written.loaded.placement(q, [model.base, model.tip])
     theirs = np.linalg.solve(T[:, 0], T[:, 1])
     away = np.abs(theirs - model.way.poses(measured.values, at))
     bound = 4.0 * model.way.rounding(measured.values)
@@ -310,7 +309,7 @@ def _held(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate |
             where=f"{found.robot.name}, {model.base} to {model.tip}",
             found=f"{float(away.max()):.3g}, where rounding explains {bound:.3g}",
         )
-    return written.certificate()
+    return found.written.loaded.certificate()
 
 
 def doubts(found: Calibration) -> list[str]:

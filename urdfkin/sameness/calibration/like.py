@@ -129,7 +129,7 @@ def _is_the_descriptions(robot: Robot, prefix: str) -> bool:
 
 def _held(result: Rewritten, calibrated: FrameChain, prefix: str) -> Certificate:
     """Hold the written text, as Pinocchio reads it, against the file's own product."""
-    written = load(result.text)
+    written = result.loaded
     q = written.sample(_ASKED, seed=3)
     T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])
     values = q[:, [written.coordinate_names.index(prefix + joint) for joint in LINKS.values()]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from urdfkin.kinematics.rotation import log_rotation
+from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.sameness.calibration.into_urdf import with_origins
@@ -36,9 +38,17 @@ class Rewritten:
         return with_origins(self.robot.urdf.encode(), self.origins)
 
     @cached_property
+    def loaded(self) -> Robot:
+        """The robot of that text, loaded as the first one was."""
+        mimic = self.robot.verifier.mimic
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what there is to warn of was warned of when it was loaded
+            return load(self.text, mimic=mimic, root_joint=self.robot.root_joint)
+
+    @cached_property
     def changes(self) -> Changes:
         """What changed, in the words of `urdfkin.diff`, and how far each joint's changes move which frame."""
-        return diff(self.robot, self.text)
+        return diff(self.robot, self.loaded)
 
     @cached_property
     def moved(self) -> dict[str, tuple[float, float]]:
