@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.arguments import load_robot, robot_argument
-from urdfkin.cli.door import say_file
+from urdfkin.cli.door import say, say_file
 from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.output import check_line, compiling, console, exit_code, write_file
 from urdfkin.cli.reports import check_writable
@@ -115,9 +115,10 @@ def command(
             print_changes(replace(written.changes, sources=(loaded.source, str(output))), out)
     certificate = written.certificate if found is None else found.certificate
     if certificate is not None:
-        (out if format_ == "table" else console(err=True)).print(
-            check_line(certificate), style="green" if certificate.verified else "bold yellow"
-        )
+        if format_ == "table":
+            out.print(check_line(certificate), style="green" if certificate.verified else "bold yellow")
+        else:
+            say(check_line(certificate), err=True)
         context.exit(exit_code(certificate))
 
 
@@ -181,7 +182,6 @@ def _noise(text: str | None) -> tuple[float, float] | None:
 
 def _of_the_factory(robot: Robot, path: Path, order: str) -> Rewritten:
     """A Universal Robots arm with its calibration; and what the order of its angles comes to."""
-    from urdfkin.cli.door import say  # noqa: PLC0415
     from urdfkin.sameness.calibration.like import distance, universal_robots  # noqa: PLC0415
     from urdfkin.sameness.calibration.universal_robots import ORDERS, read_calibration  # noqa: PLC0415
     from urdfkin.sameness.result import angle, length  # noqa: PLC0415

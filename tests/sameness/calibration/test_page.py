@@ -26,6 +26,7 @@ def loose(text: str) -> str:
 @pytest.mark.slow
 def test_every_example_prints_what_the_page_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "160")
     commands = 0
     for kind, text in BLOCKS:
         if name := NAMED.match(text):
