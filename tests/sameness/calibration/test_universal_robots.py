@@ -32,6 +32,14 @@ CONTROLLER = np.array(
 )
 #: What a product with lengths of 446 m leaves, ten times over.
 ROUNDING = 10.0 * 446.0 * np.finfo(float).eps
+#: Nine lines that are a billion words.
+BOMB = "\n".join(
+    [
+        "a0: &a0 [lol]",
+        *(f"a{k + 1}: &a{k + 1} [{', '.join([f'*a{k}'] * 9)}]" for k in range(9)),
+        "kinematics: {shoulder: {x: *a9}}",
+    ]
+)
 NOMINAL = {
     "shoulder": "0 0 0.1807 0 0 0",
     "upper_arm": "0 0 0 1.570796327 0 0",
@@ -174,6 +182,9 @@ def test_a_model_with_other_joints_is_refused() -> None:
         ("kinematics: {shoulder: 1}", "no shoulder"),
         ("kinematics: {shoulder: {x: ten}}", "shoulder x"),
         ("kinematics: {shoulder: {x: .nan}}", "shoulder x"),
+        ("kinematics: {shoulder: {y: 0}}", "shoulder x: not a finite number: found NoneType"),
+        (BOMB, "shoulder x: not a finite number: found list"),
+        ("kinematics: " + "[" * 5000, "no YAML"),
     ],
 )
 def test_another_file_is_told(text: str, words: str, tmp_path: Path) -> None:

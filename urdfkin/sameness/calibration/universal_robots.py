@@ -55,7 +55,7 @@ def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]
         raise UnknownNameError("order of turns", order, ORDERS)
     try:
         data = yaml.safe_load(read_text(path))
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, RecursionError) as error:
         raise InputError("no YAML", where=str(path), found=" ".join(str(error).split())[:100]) from None
     kinematics = data.get("kinematics") if isinstance(data, Mapping) else None
     if not isinstance(kinematics, Mapping):
@@ -73,12 +73,13 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
         raise InputError("a link is missing", where=where, found=f"no {link}")
     six = []
     for name in _SIX:
-        # YAML 1.1 takes 1e-05, which the driver writes for 0.00001, for a word.
-        number = decimal(str(entry.get(name)))
+        # YAML 1.1 takes 1e-05, which the driver writes for 0.00001, for a word; and a list of lists that are
+        # one another's may be short in the file and endless when it is written out.
+        value = entry.get(name)
+        number = decimal(str(value)) if isinstance(value, int | float | str) else None
         if number is None:
-            raise InputError(
-                "not a finite number", where=f"{where}, {link} {name}", found=repr(entry.get(name))[:60]
-            )
+            found = repr(value)[:60] if isinstance(value, float | str) else type(value).__name__
+            raise InputError("not a finite number", where=f"{where}, {link} {name}", found=found)
         six.append(number)
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = rotation_from_euler(sequence, six[3:]), six[:3]
