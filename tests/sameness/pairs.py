@@ -126,8 +126,6 @@ def rerooted(tree: KinematicTree) -> KinematicTree:
     """The other way up: the last leaf behind moving joints is the root, and joints on its way run back."""
     leaf = max(tree.leaves(), key=lambda link: len(tree.path(link)))
     path = tree.path(leaf)
-    if any(tree.joints[i].kind in (JointKind.PLANAR, JointKind.FLOATING) for i in path):
-        return tree
     rows: list[Branch] = []
     on_path = set(path)
     # What stands on a link of the path is seen from the frame of the joint that now carries it.
@@ -147,6 +145,45 @@ def rerooted(tree: KinematicTree) -> KinematicTree:
             rows.append((replace(joint, T_parent_joint=T), carrier, tree.links[child]))
     rows += [(fixed(f"{tree.links[k]}_seen", T), names[k], tree.links[k]) for k, T in seen.items()]
     return build_tree(tree.name, names[leaf], rows)
+
+
+def counted_elsewhere(tree: KinematicTree) -> KinematicTree:
+    """Every planar and floating joint in another frame, and what hangs on it seen from another one."""
+    rows: list[Branch] = []
+    over, lift = np.diag([1.0, -1.0, -1.0, 1.0]), pose([0.0] * 3, [0.0, 0.0, 0.2])
+    for joint, parent, child in branches(tree):
+        if joint.kind not in (JointKind.PLANAR, JointKind.FLOATING):
+            rows.append((joint, parent, child))
+            continue
+        C, D = pose([0.3, 0.5, -0.9], [0.4, 0.1, -0.2]), pose([-0.2, 0.8, 0.1], [0.0, 0.3, 0.1])
+        if joint.kind is JointKind.PLANAR:  # in its plane, but lifted and turned over, and back
+            C = pose([0.0, 0.0, 0.7], [0.4, 0.1, 0.0]) @ over @ lift
+            D = inverse(lift) @ over @ pose([0.0, 0.0, -1.1], [-0.3, 0.2, 0.0])
+        between = f"{child}_counted"
+        rows.append((replace(joint, T_parent_joint=joint.T_parent_joint @ C), parent, between))
+        rows.append((fixed(f"{joint.name}_counted", D), between, child))
+    return build_tree(tree.name, tree.links[0], rows) if len(rows) > len(tree.joints) else tree
+
+
+def exchanged(tree: KinematicTree) -> KinematicTree:
+    """Two slides one behind the other, or a slide along a turn's axis, in the other order; the first such."""
+    for j, outer in enumerate(tree.joints):
+        i = outer.parent - 1
+        if i < 0 or sum(joint.parent == outer.parent for joint in tree.joints) > 1:
+            continue
+        inner, T = tree.joints[i], outer.T_parent_joint
+        if JointKind.PRISMATIC not in (inner.kind, outer.kind) or not (inner.kind.has_axis and outer.nv):
+            continue
+        both_slide = inner.kind is outer.kind
+        if not both_slide and np.linalg.norm(np.cross(inner.axis, T[:3, :3] @ outer.axis)) > 1e-14:
+            continue
+        first, last, child = tree.links[inner.parent], tree.links[i + 1], tree.links[j + 1]
+        rows = [row for k, row in enumerate(branches(tree)) if k not in (i, j)]
+        rows.append((replace(outer, T_parent_joint=inner.T_parent_joint @ T), first, f"{last}_exchanged"))
+        rows.append((replace(inner, T_parent_joint=inverse(T)), f"{last}_exchanged", f"{child}_behind"))
+        rows.append((fixed(f"{child}_seen", T), f"{child}_behind", child))
+        return build_tree(tree.name, tree.links[0], rows)
+    return tree
 
 
 def moving(tree: KinematicTree) -> list[int]:

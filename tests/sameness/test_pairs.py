@@ -35,6 +35,8 @@ ALIKE: dict[str, Change] = {
     "zeros shifted": pairs.shifted,
     "all renamed": pairs.renamed,
     "other way up": pairs.rerooted,
+    "counted elsewhere": pairs.counted_elsewhere,
+    "slides exchanged": pairs.exchanged,
     "all of it": everything,
 }
 UNLIKE: dict[str, Change] = {

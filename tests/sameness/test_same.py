@@ -139,6 +139,11 @@ def compared() -> tuple[Robot, Robot, dict[str, Any]]:
     return a, b, json.loads(json.dumps(certificate(urdfkin.same(a, b))))
 
 
+def test_a_certificate_of_what_is_the_same_holds() -> None:
+    a = robot("elbow")
+    assert recheck(json.loads(json.dumps(certificate(urdfkin.same(a, a)))), a, a) == []
+
+
 def test_a_certificate_holds(compared: tuple[Robot, Robot, dict[str, Any]], tmp_path: Path) -> None:
     a, b, document = compared
     (tmp_path / "c.json").write_text(json.dumps(document))

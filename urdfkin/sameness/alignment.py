@@ -13,18 +13,22 @@ nothing does, but for turns that screws on one line share.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import islice
 
 import numpy as np
 
 from urdfkin.model.chain import inverse
 from urdfkin.model.tree import FloatArray
+from urdfkin.sameness.conversion import Conversion, onto_plane, undoing
+from urdfkin.sameness.guesses import HALF_TURNS, axis_frames, zeros
 from urdfkin.sameness.mechanism import Edge, Mechanism, Screw, tolerance_of
 from urdfkin.sameness.pairing import Pairing, family
-from urdfkin.sameness.rigid import along, angle_from_to, apart, between, turn_about
+from urdfkin.sameness.rigid import along, apart, between, turn_about
 
+#: Of joints whose order does not matter, so many orders are tried: all of five slides.
+MOST_ORDERS = 120
 IDENTITY = np.eye(4)
 IDENTITY.setflags(write=False)
 
@@ -43,8 +47,9 @@ class Step:
         before: (4, 4) L, put in before the joint, at A's home.
         axis: A's screw at home, pointing away from the base.
         other: B's, likewise; `axis` itself where they agree.
-        tilt: Radians by which B's axis is tilted.
+        tilt: Radians by which B's axis is tilted, or a planar joint's normal.
         shift: Metres by which it is off, or, of a planar or floating joint, its frame.
+        conversion: B's coordinates of a planar or floating joint; None where they are A's.
         unlike: "a" or "b" where the joint is fixed in that model and moves in the other, "kind" where it
         moves
             in another way; else "".
@@ -62,6 +67,7 @@ class Step:
     tilt: float
     shift: float
     unlike: str = ""
+    conversion: Conversion | None = None
 
     @property
     def differs(self) -> bool:
@@ -132,6 +138,12 @@ class Alignment:
     matched: int = 0
     worst: float = 0.0
 
+    @property
+    def complete(self) -> bool:
+        """Whether every joint and link agrees."""
+        alike = not any(step.unlike for step in self.steps)
+        return alike and not (self.worst or self.only_a or self.only_b)
+
     def indices(self, previous: int) -> list[int]:
         """The steps from the base to one of them, itself too."""
         found = []
@@ -164,11 +176,15 @@ class Gauge:
         base: Links of A and of B on the bodies where the walk begins; None: by names.
         X: (4, 4) B's root in A's.
         zeros: Of joints of A that are not (1, 0.0).
+        conversions: Of planar and floating joints of A that count otherwise in B.
+        orders: Joints of B that are taken in another order, run by run.
     """
 
     base: tuple[str, str] | None = None
     X: FloatArray = field(default_factory=lambda: IDENTITY)
     zeros: Mapping[str, tuple[int, float]] = field(default_factory=dict)
+    conversions: Mapping[str, Conversion] = field(default_factory=dict)
+    orders: tuple[tuple[str, ...], ...] = ()
 
 
 #: B as it is written: root on root, each coordinate the same number.
@@ -184,6 +200,26 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
         given: Joints of A and their names in B.
         gauge: What is free; None: whatever makes most agree.
     """
+    if gauge is not None:
+        for taken in gauge.orders:
+            b = b.in_order(taken)
+        return _laid(a, b, given, gauge)
+    best = _laid(a, b, given, None)
+    for orders in b.orders_of_runs(tolerance_of(a, b)):
+        if best.complete:
+            break
+        as_it_is, run = best.b, next(orders)
+        for names in islice(orders, MOST_ORDERS):
+            moved = [k for k, name in enumerate(names) if name != run[k]]
+            other = as_it_is.in_order(names[moved[0] : moved[-1] + 1])
+            found = _laid(a, other, given, None)
+            if _better((found.matched, found.worst), (best.matched, best.worst)):
+                best = found
+    return best
+
+
+def _laid(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | None) -> Alignment:
+    """The best of all bodies to begin at."""
     walk = _Walk(a, b, Pairing(a, b, given), gauge)
     best: Alignment | None = None
     for base, X in walk.beginnings():
@@ -209,7 +245,8 @@ class _Walk:
         if self.gauge is not None:
             names = self.gauge.base
             base = next(self._bases()) if names is None else self._bodies_of(*names)
-            yield base, self.gauge.X
+            X = self.gauge.X
+            yield base, IDENTITY if self.tolerance.holds(*apart(IDENTITY, X)) else X
             return
         for base in self._bases():
             tried = list[FloatArray]()
@@ -236,15 +273,15 @@ class _Walk:
         if any(shared):
             yield 0, max(range(len(shared)), key=shared.__getitem__)
             return
-        yield from ((0, body) for body in range(len(self.b.bodies)))
+        yield from ((0, body) for body, links in enumerate(self.b.bodies) if links)
 
     def _by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         """Where the first two axes of B that are not parallel come to lie on A's."""
-        ours = next(_axis_frames(self.a, base[0]), None)
+        ours = next(axis_frames(self.a, base[0]), None)
         if ours is not None:
-            for theirs in _axis_frames(self.b, base[1]):
-                for flips in ((1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, -1.0, 1.0), (-1.0, 1.0, -1.0)):
-                    yield ours @ np.diag([*flips, 1.0]) @ inverse(theirs)
+            for theirs in axis_frames(self.b, base[1]):
+                for flip in HALF_TURNS:
+                    yield ours @ flip @ inverse(theirs)
 
     # -- the walk ------------------------------------------------------------------------------------
 
@@ -342,23 +379,71 @@ class _Walk:
     def _free(
         self, place: _Place, there: _Place, backwards: tuple[bool, bool], kind: str
     ) -> tuple[Step, _Place]:
-        """A planar or floating joint: its frame is taken as it is."""
+        """A planar or floating joint: where its frame stands, and what it counts from, is free."""
         e, f = _both(there.came)
-        at, seen = place.G @ self.a.homes[e.joint + 1], place.XC @ self.b.homes[f.joint + 1]
-        angle, way = apart(at, seen)
-        K = IDENTITY
-        if self.tolerance.holds(angle, way):
-            angle = way = 0.0
+        homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
+        at, seen = place.G @ homes[0], place.XC @ homes[1]
+        axis, back = Screw(homes[0][:3, 2], homes[0][:3, 3]), backwards[0] != backwards[1]
+        step = Step(e.joint, f.joint, kind, place.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0)
+        given = None if self.gauge is None else self.gauge.conversions.get(self.a.joint(e).name)
+        as_written = self.gauge is not None and given is None
+        if as_written:
+            K, tilt, shift = seen @ inverse(at), *apart(at, seen)
         else:
-            K = seen @ inverse(at)
-        axis = Screw(self.a.homes[e.joint + 1][:3, 2], self.a.homes[e.joint + 1][:3, 3])
-        unlike = "kind" if backwards[0] != backwards[1] else ""
-        before = inverse(place.G) @ K @ place.G if K is not IDENTITY else IDENTITY
-        step = Step(
-            e.joint, f.joint, kind, place.previous, 1, 0.0, before, axis, axis, angle, way, unlike
-        )  # fmt: skip
-        G = K @ place.G if K is not IDENTITY else place.G
-        return step, _Place(there.bodies, there.came, there.previous, G, place.XC)
+            K, tilt, shift = _normals_apart(at, seen) if kind == "planar" else (IDENTITY, 0.0, 0.0)
+        if not self.tolerance.holds(tilt, shift):
+            step = replace(step, before=inverse(place.G) @ K @ place.G, tilt=tilt, shift=shift)
+            there, at = replace(there, G=K @ place.G), K @ at
+        if as_written:
+            return replace(step, unlike="kind" if back else ""), there
+        M = inverse(seen) @ at
+        if given is not None:
+            tried: Iterable[FloatArray] = [inverse(given.before) if backwards[1] else given.behind]
+        else:
+            tried = self._behind(there, at, homes[1], undoing(M) if kind == "planar" else None)
+        N, moved = self._best_behind(there, at, homes[1], tried)
+        # Outwards, P_b^(1 or -1) = M P_a^(1 or -1) N.
+        pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
+        before, behind = (IDENTITY if self.tolerance.holds(*apart(IDENTITY, T)) else T for T in pair)
+        if before is IDENTITY and behind is IDENTITY and not back:
+            return step, there
+        return replace(step, conversion=Conversion(before, behind, back)), moved
+
+    def _best_behind(
+        self, there: _Place, at: FloatArray, home_b: FloatArray, tried: Iterable[FloatArray]
+    ) -> tuple[FloatArray, _Place]:
+        """The first N of P_b = M P_a N with which most of what follows agrees, and where it leads."""
+        best: tuple[FloatArray, _Place, tuple[int, float]] | None = None
+        for N in tried:
+            place = replace(there, XC=at @ N @ inverse(home_b))
+            score = self._score(place)
+            if best is None or _better(score, best[2]):
+                best = N, place, score
+            if not score[1]:
+                break
+        assert best is not None
+        return best[0], best[1]
+
+    def _behind(
+        self, there: _Place, at: FloatArray, home_b: FloatArray, plane: FloatArray | None
+    ) -> Iterator[FloatArray]:
+        """N to try: none, all as it stands at home, those with which a link or an axis behind agrees.
+
+        Args:
+            there: Behind the joint, B as it stands at home.
+            at: (4, 4) the joint's frame.
+            home_b: (4, 4) B's own.
+            plane: (4, 4) what a planar joint's N is, but for motions in its plane.
+        """
+        yield IDENTITY if plane is None else plane
+        wanted = [there.XC]
+        wanted += [
+            there.G @ self.a.homes[i] @ inverse(self.b.homes[j]) for i, j in self.pairing.links(*there.bodies)
+        ]
+        wanted += [there.G @ X for X in self._by_axes(there.bodies)]
+        for XC in wanted:
+            N = inverse(at) @ XC @ home_b
+            yield N if plane is None else plane @ onto_plane(inverse(plane) @ N)
 
     def _like(
         self, place: _Place, there: _Place, backwards: tuple[bool, bool], *, turns: bool
@@ -436,26 +521,7 @@ class _Walk:
         theirs = [f for f in self.b.edges_of[there.bodies[1]] if f is not there.came[1]]
         for e, f in [*pairs, *((e, f) for e in ours for f in theirs)]:
             if self.a.joint(e).kind.has_axis and self.b.joint(f).kind.has_axis:
-                yield from _zeros(u, self.a.screw(e).moved(G), self.b.screw(f).moved(there.XC), turns)
-
-
-def _zeros(u: Screw, ours: Screw, theirs: Screw, turns: bool) -> Iterator[float]:
-    """By how much theirs must be turned about u, or slid along it, to lie as ours does."""
-    if not turns:
-        across = u.direction - ours.direction * (ours.direction @ u.direction)
-        if across @ across > 1e-6:  # a guess to be tried, not a result
-            yield float(across @ (ours.point - theirs.point) / (across @ across))
-        return
-    guesses = angle_from_to(u.direction, theirs.direction, ours.direction)
-    if guesses is not None:
-        yield guesses
-        yield math.remainder(guesses + math.pi, 2.0 * math.pi)
-    feet = [
-        line.point - line.direction * (line.direction @ (line.point - u.point)) for line in (theirs, ours)
-    ]
-    guesses = angle_from_to(u.direction, feet[0] - u.point, feet[1] - u.point)
-    if guesses is not None:
-        yield guesses
+                yield from zeros(u, self.a.screw(e).moved(G), self.b.screw(f).moved(there.XC), turns)
 
 
 def _better(score: tuple[int, float], than: tuple[int, float]) -> bool:
@@ -486,22 +552,7 @@ def _all_beyond(mechanism: Mechanism, body: int, edges: list[Edge]) -> list[int]
     return found
 
 
-def _axis_frames(mechanism: Mechanism, body: int) -> Iterator[FloatArray]:
-    """Frames on the first axis at a body with x across to the next that is not parallel: one for each way."""
-    for first in mechanism.edges_of[body]:
-        for second in mechanism.edges_of[first.beyond(body)]:
-            if second is first or not all(mechanism.joint(k).kind.has_axis for k in (first, second)):
-                continue
-            s, t = mechanism.screw(first), mechanism.screw(second)
-            x = np.cross(s.direction, t.direction)
-            sine = float(np.linalg.norm(x))
-            if sine < 1e-3:  # too parallel to begin with
-                continue
-            x = x / sine
-            T = np.eye(4)
-            T[:3, :3] = np.stack((x, np.cross(s.direction, x), s.direction), axis=1)
-            # The foot of the common normal on the first axis.
-            way = t.point - s.point
-            along_first = float(np.cross(way, t.direction) @ x) / sine
-            T[:3, 3] = s.point + s.direction * along_first
-            yield T
+def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, float]:
+    """`between` of two planes, whichever way their normals point."""
+    start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (at, seen))
+    return between(start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False)

@@ -12,9 +12,10 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.robot import Robot
 from urdfkin.sameness.alignment import FramePair, Gauge, align
+from urdfkin.sameness.conversion import Conversion
 from urdfkin.sameness.judging import Judge, digest
 from urdfkin.sameness.lower import Search, pinocchios, urdfkins
-from urdfkin.sameness.result import Difference, Interval, Sameness, Verdict
+from urdfkin.sameness.result import Difference, Interval, JointMap, Sameness, Verdict
 from urdfkin.sameness.upper import COARSE, FINE, upper_bounds
 from urdfkin.sameness.variables import variables_of
 from urdfkin.sameness.wording import differences, put_right
@@ -36,9 +37,8 @@ def certificate(found: Sameness) -> dict[str, Any]:
         "after": list(found.after),
         "differences": [_difference(one) for one in found.differences],
         "remarks": [_difference(one) for one in found.remarks],
-        "joints": [
-            {"a": one.a, "b": one.b, "sense": one.sense, "offset": one.offset} for one in found.joints
-        ],
+        "joints": [_joint(one) for one in found.joints],
+        "orders": [list(names) for names in found.orders],
         "links": [list(pair) for pair in found.links],
         "base": found.base.tolist(),
         "base_links": list(found.base_links),
@@ -47,6 +47,14 @@ def certificate(found: Sameness) -> dict[str, Any]:
         "as_written": None if found.as_written is None else _interval(found.as_written),
         "checked": found.checked,
     }
+
+
+def _joint(one: JointMap) -> dict[str, Any]:
+    said = {"a": one.a, "b": one.b, "sense": one.sense, "offset": one.offset, "conversion": None}
+    if (made := one.conversion) is not None:
+        pair = {"before": made.before.tolist(), "behind": made.behind.tolist(), "back": made.back}
+        said["conversion"] = pair
+    return said
 
 
 def _difference(one: Difference) -> dict[str, Any]:
@@ -98,7 +106,13 @@ def _against(document: Mapping[str, Any], judge: Judge) -> Iterator[str]:
     zeros = {one["a"]: (one["sense"], one["offset"]) for one in document["joints"]}
     given = {one["a"]: one["b"] for one in document["joints"]}
     base = document["base_links"]
-    gauge = Gauge((base[0], base[1]), np.array(document["base"]), zeros)
+    conversions = {
+        one["a"]: Conversion(np.array(made["before"]), np.array(made["behind"]), made["back"])
+        for one in document["joints"]
+        if (made := one["conversion"]) is not None
+    }
+    orders = tuple(tuple(names) for names in document["orders"])
+    gauge = Gauge((base[0], base[1]), np.array(document["base"]), zeros, conversions, orders)
     found = align(*judge.mechanisms, given, gauge)
     variables = variables_of(found, judge.tolerance)
     after = put_right(found, judge.tolerance)
@@ -141,7 +155,7 @@ def _not_attained(
         yield f"{place}: its configurations do not belong together, or leave the limits"
         return
     for computed, by in ((urdfkins, "urdfkin"), (pinocchios, "Pinocchio")):
-        off = search.at(q_a, q_b, frame, computed)
+        off = float(search.at(q_a, q_b, [frame], computed)[0, 0])
         if off < claim["lower"] - rounding:
             yield f"{place}: {by} finds {off:.6g} m at its configuration, not {claim['lower']:.6g} m"
 

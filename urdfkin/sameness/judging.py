@@ -6,6 +6,7 @@ import hashlib
 import math
 from collections.abc import Iterator, Mapping
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.loading import load
+from urdfkin.model.ranges import WIDEST
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.sameness.alignment import AS_WRITTEN, Alignment, FramePair, align
@@ -94,6 +96,7 @@ class Judge:
 
     def judged(self) -> Sameness:
         """The verdict."""
+        a, b = self.trees
         found = align(*self.mechanisms, self.given)
         variables = variables_of(found, self.tolerance)
         after = put_right(found, self.tolerance)
@@ -102,7 +105,7 @@ class Judge:
         frames = self._intervals(found, variables)
         as_written = None
         if after and self.bounds:
-            written = align(*self.mechanisms, self._map(found), AS_WRITTEN)
+            written = align(*self.mechanisms, self._map(found), replace(AS_WRITTEN, orders=found.b.orders))
             as_written = self._farthest(written, variables_of(written, self.tolerance))
         return Sameness(
             names=(self.robots[0].name, self.robots[1].name),
@@ -113,10 +116,11 @@ class Judge:
             differences=wrong,
             remarks=remarks(found, variables, self.tolerance),
             joints=tuple(
-                JointMap(self.trees[0].joints[s.a].name, self.trees[1].joints[s.b].name, s.sense, s.offset)
+                JointMap(a.joints[s.a].name, b.joints[s.b].name, s.sense, s.offset, s.conversion)
                 for s in found.steps
             ),
             links=tuple((self.trees[0].links[f.a], self.trees[1].links[f.b]) for f in found.frames),
+            orders=found.b.orders,
             base=found.X,
             base_links=(self.trees[0].links[found.base[0]], self.trees[1].links[found.base[1]]),
             rounding=self.rounding(found, variables),
@@ -134,13 +138,17 @@ class Judge:
         return {self.trees[0].joints[s.a].name: self.trees[1].joints[s.b].name for s in found.steps}
 
     def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
-        """What everything that was taken for rounding can do together: each step's share, in turn."""
+        """What everything that was taken for rounding can do together: each step's share, in turn.
+
+        A joint that goes anywhere counts as if it went no further than it is tried.
+        """
         ways = [
             max(abs(end) for end in ends)
             for step, pair in zip(found.steps, variables.pairs, strict=True)
             if pair is not None and step.kind == "prismatic"
             if math.isfinite(sum(ends := variables.range(pair.a)))
         ]
+        ways += [WIDEST for step in found.steps if step.kind in ("planar", "floating")]
         reach = max(self.mechanisms[0].size, self.mechanisms[1].size) + sum(ways)
         deepest = 1 + max((len(found.path(i)) for i in range(len(found.steps))), default=0)
         return deepest * (self.tolerance.way + self.tolerance.angle * reach), deepest * self.tolerance.angle
@@ -204,7 +212,8 @@ class Judge:
             if (reason := robot.verifier.cannot()) is not None:
                 return f"not verified by Pinocchio: {reason}"
         search = self.search(found, variables)
-        off = search.metres(search.random(CONFIRMED), found.frames, pinocchios).max(axis=0, initial=0.0)
+        q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
+        off = search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0)
         for interval, metres in zip(frames, off, strict=False):
             if metres > interval.upper * (1.0 + EPS):
                 raise UrdfkinError(

@@ -20,6 +20,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.sameness.alignment import Alignment, FramePair
 from urdfkin.sameness.variables import Line, Variables
+from urdfkin.verify.sampling import sample
 
 SAMPLES, STARTS, ALONG = 512, 4, 13
 #: Frames that climb in one batch.
@@ -60,11 +61,24 @@ class Search:
             low + 2.0 * widest if math.isinf(high) else high
         )
 
-    def configurations(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(n, nq) of A and of B for values (n, variables)."""
+    def configurations(self, z: FloatArray, *, moved: bool = False) -> tuple[FloatArray, FloatArray]:
+        """(n, nq) of A and of B for values (n, variables).
+
+        Args:
+            z: The values.
+            moved: Whether A's planar and floating joints are anywhere, not at home.
+        """
         values = dict(zip(self.names, z.T, strict=True))
         tree_a, tree_b = (robot.tree for robot in self.robots)
-        q_a, q_b = (np.tile(neutral(tree), (len(z), 1)) for tree in (tree_a, tree_b))
+        q_a = sample(tree_a, len(z), self.rng) if moved else np.tile(neutral(tree_a), (len(z), 1))
+        q_b = np.tile(neutral(tree_b), (len(z), 1))
+        for step in self.found.steps:
+            joint = tree_a.joints[step.a]
+            if joint.kind.nq > 1 and not step.unlike:
+                at, to = tree_a.q_index[step.a], tree_b.q_index[step.b]
+                own = q_a[:, at : at + joint.kind.nq]
+                converted = own if step.conversion is None else step.conversion(joint.kind, own)
+                q_b[:, to : to + joint.kind.nq] = converted
         for joint, at in zip(tree_a.joints, tree_a.q_index, strict=True):
             if joint.nq == 1:
                 q_a[:, at] = values.get(f"a:{joint.name}", 0.0)
@@ -109,9 +123,11 @@ class Search:
         tools = np.array([inverse(frame.tool) for frame in frames]).reshape(-1, 4, 4)
         return Ts_a, self._hold @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
 
-    def at(self, q_a: FloatArray, q_b: FloatArray, frame: FramePair, computed: Placements) -> float:
-        """How far (m) a frame is off at one configuration of each robot, (1, nq)."""
-        return float(_distances(*self._poses(q_a, q_b, [frame], computed))[0, 0])
+    def at(
+        self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
+    ) -> FloatArray:
+        """(n, frames) how far (m) frames are off at configurations of each robot, (n, nq)."""
+        return _distances(*self._poses(q_a, q_b, frames, computed))
 
     def random(self, n: int) -> FloatArray:
         """(n, variables) values within their ranges."""

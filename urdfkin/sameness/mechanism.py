@@ -8,8 +8,9 @@ from another body, what lies on the way is passed backwards, with its screw reve
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -78,6 +79,8 @@ class Mechanism:
                 bodies[body[-1]].append(i + 1)
         self.homes, self.body_of, self.edges = homes, body, edges
         self.bodies = bodies
+        #: Joints that are taken in another order than the tree's, run by run.
+        self.orders: tuple[tuple[str, ...], ...] = ()
         #: How far (m) the way from the root to each link is, and how many joints it passes, fixed ones too.
         self.lengths, self.depths = lengths, depths
 
@@ -89,6 +92,58 @@ class Mechanism:
         """Of a joint that turns or slides, at home, seen from the root."""
         T = self.homes[edge.joint + 1]
         return Screw(T[:3, :3] @ self.joint(edge).axis, T[:3, 3])
+
+    def in_order(self, names: Sequence[str]) -> Mechanism:
+        """The same motion with joints one behind the other taken in another order, which their axes allow.
+
+        Links between them that other joints then carry are on no body any more.
+
+        Args:
+            names: Joints of a run, from the inner body outwards.
+        """
+        joints = [self.tree.joint_index(name) for name in names]
+        run = [edge for edge in self.edges if edge.joint in joints]
+        other = copy(self)
+        vars(other).pop("edges_of", None)
+        places = dict(zip(run, joints, strict=True))
+        other.edges = [replace(edge, joint=places[edge]) if edge in places else edge for edge in self.edges]
+        other.bodies = list(self.bodies)
+        for k, edge in enumerate(run[:-1]):
+            if {one.joint for one in run[: k + 1]} != set(joints[: k + 1]):
+                other.bodies[edge.outer] = []
+        other.orders = (*self.orders, tuple(names))
+        return other
+
+    def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
+        """For each run of joints, nothing else on the bodies between, its orders that move alike."""
+        run: list[Edge] = []
+        for edge in self.edges:  # depth first: what follows is next where the body between has no other
+            if run and edge.inner == run[-1].outer and len(self.edges_of[edge.inner]) == 2:
+                run.append(edge)
+                continue
+            yield self._orders(run, tolerance)
+            run = [edge]
+        yield self._orders(run, tolerance)
+
+    def _orders(self, run: Sequence[Edge], tolerance: Tolerance) -> Iterator[list[str]]:
+        """All that exchanging neighbours leads to, the run's own first."""
+        if not run:
+            yield []
+        for k, edge in enumerate(run):
+            if all(self._commute(one, edge, tolerance) for one in run[:k]):
+                for others in self._orders([*run[:k], *run[k + 1 :]], tolerance):
+                    yield [self.joint(edge).name, *others]
+
+    def _commute(self, one: Edge, other: Edge, tolerance: Tolerance) -> bool:
+        """Two slides, a slide along a turn's axis, two turns about one line."""
+        kinds = [self.joint(edge).kind for edge in (one, other)]
+        if not all(kind.has_axis and kind.nv for kind in kinds):
+            return False
+        if not any(kind.turns for kind in kinds):
+            return True
+        s, t = self.screw(one), self.screw(other)
+        angle, way = between_lines(s, t, placed=all(kind.turns for kind in kinds))
+        return tolerance.holds(angle, way)
 
     @cached_property
     def edges_of(self) -> list[list[Edge]]:
@@ -129,3 +184,12 @@ def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
     """What two texts of one robot may differ by."""
     k = a.rounding + b.rounding
     return Tolerance(k, k * max(a.size, b.size, 1e-9))
+
+
+def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
+    """By what angle (rad), and if they have a place by what way (m), two axes differ as lines."""
+    angle = float(
+        np.arctan2(np.linalg.norm(np.cross(s.direction, t.direction)), abs(s.direction @ t.direction))
+    )
+    way = s.point - t.point
+    return angle, float(np.linalg.norm(way - t.direction * (t.direction @ way))) if placed else 0.0

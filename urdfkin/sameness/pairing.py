@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-import numpy as np
-
 from urdfkin.model.tree import FloatArray, JointKind
-from urdfkin.sameness.mechanism import Edge, Mechanism, Screw, tolerance_of
+from urdfkin.sameness.mechanism import Edge, Mechanism, Screw, between_lines, tolerance_of
 from urdfkin.sameness.rigid import apart
 
 Pair = tuple[Edge, Edge]
@@ -122,15 +120,10 @@ class Pairing:
         kind = family(self.a.joint(e).kind)
         if kind != family(self.b.joint(f).kind):
             return 0.0, 0.0
-        if kind not in ("turns", "prismatic"):
-            return apart(G @ self.a.homes[e.joint + 1], XC @ self.b.homes[f.joint + 1])
+        if kind == "floating":  # goes anywhere, wherever it counts from
+            return 0.0, 0.0
+        if kind == "planar":
+            normals = (T[:3, 2] for T in (G @ self.a.homes[e.joint + 1], XC @ self.b.homes[f.joint + 1]))
+            return between_lines(*(Screw(normal, normal) for normal in normals), placed=False)
         s, t = self.a.screw(e).moved(G), self.b.screw(f).moved(XC)
-        return _between_lines(s, t, placed=kind == "turns")
-
-
-def _between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
-    angle = float(
-        np.arctan2(np.linalg.norm(np.cross(s.direction, t.direction)), abs(s.direction @ t.direction))
-    )
-    way = s.point - t.point
-    return angle, float(np.linalg.norm(way - t.direction * (t.direction @ way))) if placed else 0.0
+        return between_lines(s, t, placed=kind == "turns")

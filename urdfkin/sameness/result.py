@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from urdfkin.errors import InputError
 from urdfkin.model.configuration import checked, neutral
 from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.sameness.conversion import Conversion
 
 
 class Verdict(Enum):
@@ -70,18 +71,14 @@ class Difference:
 class JointMap:
     """A joint of A and what it is in B: value_b = sense * value_a + offset (rad, m).
 
-    `sense` and `offset` are those of the joints' values; a planar or floating joint has 1 and 0.
+    A planar or floating joint has the sense 1 and the offset 0, and a conversion where it counts otherwise.
     """
 
     a: str
     b: str
     sense: int
     offset: float
-
-    @property
-    def changed(self) -> bool:
-        """Whether the value is another."""
-        return self.sense < 0 or self.offset != 0.0
+    conversion: Conversion | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,6 +95,7 @@ class Sameness:
         remarks: What is no matter of where things move: limits, kinds, links that only one has.
         joints: Joints of A and of B that are each other's.
         links: Likewise.
+        orders: Joints of B that were taken in another order, which their axes allow, run by run.
         base: (4, 4) pose of B's root in A's root frame, at home; the identity where both stand alike.
         base_links: The link of A, and the one of B on the same body, that both are seen from.
         rounding: (m, rad) that frames may lie apart where nothing is said to differ.
@@ -116,6 +114,7 @@ class Sameness:
     remarks: tuple[Difference, ...]
     joints: tuple[JointMap, ...]
     links: tuple[tuple[str, str], ...]
+    orders: tuple[tuple[str, ...], ...]
     base: FloatArray
     base_links: tuple[str, str]
     rounding: tuple[float, float]
@@ -190,6 +189,8 @@ def _mapped(
             continue
         at_a, at_b, n = tree_a.q_index[i], tree_b.q_index[j], joint.kind.nq
         own = q[..., at_a : at_a + n]
+        if one.conversion is not None:
+            own = one.conversion(joint.kind, own)
         if joint.mimic is not None:
             own = joint.mimic.multiplier * own + joint.mimic.offset
         out[..., at_b : at_b + n] = own if n != 1 else one.sense * own + one.offset

@@ -10,6 +10,7 @@ from urdfkin.dh.units import units_of
 from urdfkin.kinematics.rotation.euler import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
 from urdfkin.sameness.alignment import IDENTITY, Alignment, FramePair, Step
+from urdfkin.sameness.conversion import Conversion
 from urdfkin.sameness.mechanism import Tolerance
 from urdfkin.sameness.result import Difference, angle, length
 from urdfkin.sameness.variables import Variables, limits
@@ -27,6 +28,8 @@ def put_right(found: Alignment, rounding: Tolerance) -> tuple[str, ...]:
     if found.X is not IDENTITY:
         lines.append(f"B's root stands in A's root frame at {pose_words(found.X, rounding)}")
     for step in found.steps:
+        if step.conversion is not None:
+            lines.append(_conversion_words(found, step, step.conversion, rounding))
         if step.sense < 0 or step.offset:
             sign = "-" if step.sense < 0 else ""
             least = rounding.angle if step.kind == "turns" else rounding.way
@@ -46,6 +49,15 @@ def put_right(found: Alignment, rounding: Tolerance) -> tuple[str, ...]:
         moved = pose_words(found.frames[k].tool, rounding)
         lines.append(f"frame {names[0]} is A's {names[1]} moved by {moved}")
     return tuple(lines)
+
+
+def _conversion_words(found: Alignment, step: Step, made: Conversion, rounding: Tolerance) -> str:
+    names = found.b.tree.joints[step.b].name, found.a.tree.joints[step.a].name
+    own = f"the {'inverse of the ' if made.back else ''}pose of q[{names[1]}]"
+    M, N = (
+        "" if T is IDENTITY else f"the pose {pose_words(T, rounding)}" for T in (made.before, made.behind)
+    )
+    return f"the pose of q[{names[0]}] is {' times '.join(part for part in (M, own, N) if part)}"
 
 
 def pose_words(T: FloatArray, rounding: Tolerance) -> str:
@@ -156,7 +168,7 @@ def _rule(joint: Joint) -> str:
 def _axis_words(place: str, step: Step) -> tuple[str, str]:
     """The parameter, and the line."""
     if step.kind in ("planar", "floating"):
-        return "frame", f"{place}: its frame is turned by {angle(step.tilt)} and {length(step.shift)} off"
+        return "frame", f"{place}: its plane is tilted by {angle(step.tilt)}"
     parts = [f"tilted by {angle(step.tilt)}"] if step.tilt > 1e-15 else []
     parts += [f"{length(step.shift)} off"] if step.shift > 1e-15 else []
     alone = " (what hangs on it is not)" if step.other is not step.axis else ""
