@@ -18,13 +18,14 @@ from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError,
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rules.axes import tilts
 from urdfkin.lint.rules.dialect import NEWER_VERSION
+from urdfkin.lint.rules.left_out import LEFT_OUT, LEFT_OUT_MOTION
 from urdfkin.lint.rules.mimic import MIMIC_CONTINUOUS
 from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home
 from urdfkin.urdf.descriptions import described
-from urdfkin.urdf.mjcf import Listed, is_mjcf, read_mjcf
+from urdfkin.urdf.mjcf import Listed, is_mjcf, name_of, read_mjcf
 from urdfkin.urdf.origin import Origin
 from urdfkin.urdf.pinocchio_model import is_model, tree_of_model
 from urdfkin.urdf.reader import read_tree
@@ -56,9 +57,9 @@ def load(
 
     Args:
         source: A path (.urdf, .xacro, or .xml for MJCF, see `docs/mjcf.md`), a name of the catalogue
-            (`urdfkin robots` lists them), URDF or MJCF text, bytes, an open file, or `-` for standard input;
-            or a Denavit-Hartenberg table, as it is or as a file (.toml, .json, .csv, .tsv, .md, .tex, .txt):
-            its base frame is the root, its tip the leaf; or a product of exponentials
+            (`urdfkin robots` lists them), URDF or MJCF as text, bytes, an open file, or `-` for standard
+            input; or a Denavit-Hartenberg table, as it is or as a file (.toml, .json, .csv, .tsv, .md, .tex,
+            .txt): its base frame is the root, its tip the leaf; or a product of exponentials
             (`urdfkin.dh.screws`), as it is or as a file with M and screws; or what another library holds: a
             `pinocchio.Model` (or RobotWrapper), a `yourdfpy.URDF`, an ElementTree of Python's or of lxml's, a
             module of robot_descriptions or, where that package is installed, its name, such as
@@ -96,13 +97,16 @@ def load(
     if isinstance(source, DHTable | Screws) or is_table_file(source):
         return _load_table(source, xacro_args, **how)
     if is_mjcf(source):
-        return _load_mjcf(source, xacro_args, **how)
+        return _load_mjcf(source, xacro_args, None, **how)
     if is_model(source):
         return _load_model(source, xacro_args, **how)
     if (written := text_of(source)) is not None:
         _refuse_arguments(xacro_args, written[1])
         return robot_of(Text(written[0].encode(), written[1], written[1]), **how)
-    return robot_of(read_source(cast("Source", source), xacro_args=xacro_args), **how)
+    text = read_source(cast("Source", source), xacro_args=xacro_args)
+    if (source == "-" or hasattr(source, "read")) and is_mjcf(text.data):
+        return _load_mjcf(text.data, None, text, **how)
+    return robot_of(text, **how)
 
 
 def _load_table(
@@ -140,8 +144,9 @@ def _load_table(
 
 
 def _load_mjcf(
-    source: str | os.PathLike[str],
+    source: str | bytes | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,
+    streamed: Text | None,
     *,
     verify: Verify,
     mimic: bool | None,
@@ -150,8 +155,8 @@ def _load_mjcf(
 ) -> Robot:
     _refuse_arguments(xacro_args, "MJCF")
     read = read_mjcf(source)
-    path = None if read.is_text else at_home(source)
-    name = "<text>" if path is None else as_word(path)
+    path = None if isinstance(source, bytes) or read.is_text else at_home(source)
+    name = as_word(path) if path is not None else streamed.source if streamed else name_of(source)
     text = Text(write_urdf(read.tree).encode(), f"{name} (as a URDF)", name)
     listed = tuple(_listed(one, name) for one in read.listed)
     robot = robot_of(
@@ -191,9 +196,9 @@ def _refuse_arguments(xacro_args: Mapping[str, object] | None, found: str) -> No
 
 def _listed(one: Listed, file: str) -> Finding:
     """What an MJCF says that the tree does not hold, as a finding: a warning where motion depends on it."""
-    code, severity = ("MJCF101", Severity.WARNING) if one.moves else ("MJCF102", Severity.NOTE)
+    rule = LEFT_OUT_MOTION if one.moves else LEFT_OUT
     message = one.what if one.where is None else f"{one.where}: {one.what}"
-    return Finding(code, severity, message, file=file)
+    return Finding(rule.id, rule.severity, message, file=file)
 
 
 def robot_of(

@@ -91,7 +91,7 @@ def test_a_file_of_pages_holds_nothing_that_is_not_read(topic: str) -> None:
 
 
 def test_every_module_of_rules_is_a_topic() -> None:
-    assert {path.stem for path in HERE.glob("*.py")} - {"__init__"} == set(TOPICS)
+    assert {path.stem for path in HERE.glob("*.py")} - {"__init__"} == {*TOPICS, "left_out"}  # of MJCF
     assert {path.stem for path in HERE.glob("*.toml")} == set(TOPICS)
     assert sum(map(len, TOPICS.values())) == len(RULES)
 

@@ -1,5 +1,6 @@
 """MJCF files become the robots that MuJoCo makes of them, and what a tree cannot hold is listed."""
 
+import io
 import json
 import math
 import time
@@ -14,9 +15,11 @@ import urdfkin
 from tests.cli.running import urdfkin as command
 from tests.lint.cases.arm import arm
 from urdfkin.errors import InputError, OracleError
+from urdfkin.lint.pages import find_rule, page
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf import mjcf
 from urdfkin.urdf.mjcf import is_mjcf, read_mjcf
+from urdfkin.urdf.sources import Source
 
 TWO = """
 <mujoco model="two">
@@ -50,7 +53,7 @@ TWO = """
 """
 
 
-def loaded(source: str | Path, **options: object) -> urdfkin.Robot:
+def loaded(source: Source, **options: object) -> urdfkin.Robot:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
         return urdfkin.load(source, **options)  # type: ignore[arg-type]
@@ -240,8 +243,34 @@ def test_what_is_mjcf_is_told_by_its_root(tmp_path: Path) -> None:
     assert [is_mjcf(tmp_path / name) for name in texts] == [True, False, True, False]
     assert loaded(tmp_path / "b.xml").nq == 2
     assert not is_mjcf(tmp_path / "nothing.xml")
-    with pytest.raises(urdfkin.UrdfError, match="with the extra urdfkin\\[mujoco\\]"):
-        urdfkin.load(TWO.encode())
+    with pytest.raises(urdfkin.UrdfError, match="this is MJCF, which `load` and all other commands read"):
+        urdfkin.load(tmp_path / "d.urdf")
+
+
+def test_it_may_come_as_bytes_or_from_a_stream(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = one_joint('<joint name="j" axis="0 0 1" pos="0 2 0"/>')
+    standard_input = io.TextIOWrapper(io.BytesIO(text.encode()))
+    monkeypatch.setattr("sys.stdin", standard_input)
+    data = text.encode()
+    sources: list[Source] = [text, data, b"\xef\xbb\xbf" + data, io.StringIO(text), io.BytesIO(data), "-"]
+    for source in sources:
+        robot = loaded(source)
+        assert robot.placement([math.pi], "b")[:3, 3] == pytest.approx([1.0, 4.0, 0.0])
+        assert robot.certificate().verified
+    with pytest.raises(InputError, match="<bytes>: MuJoCo does not accept this MJCF"):
+        loaded(b"<mujoco>\xff</mujoco>")
+
+
+@pytest.mark.parametrize("code", ["MJCF101", "MJCF102"])
+def test_each_of_its_findings_has_a_page_whose_examples_are_true(code: str) -> None:
+    said, rule = page(code), find_rule(code.lower())
+    assert [
+        {finding.code for finding in loaded(text, verify=False).findings} & {code}
+        for text in (said.example, said.cure)
+    ] == [{code}, set()]
+    assert next(f for f in loaded(said.example).findings if f.code == code).severity is rule.severity
+    shown = command("explain", rule.slug)
+    assert shown.text.startswith(f"{code} {rule.slug} ({rule.severity.value})")
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from urdfkin.cli.completing import complete_topic
 from urdfkin.cli.questions import answers
 from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.lint.explain import explain
-from urdfkin.lint.pages import RULES, find_rule, page
+from urdfkin.lint.pages import OF_MJCF, RULES, find_rule, page
 
 
 @click.command("explain")
@@ -28,7 +28,7 @@ def command(topic: str | None) -> None:
       urdfkin explain reference-frames
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
     if topic is None:
-        for rule in RULES.values():
+        for rule in (*RULES.values(), *OF_MJCF.values()):
             click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")
     elif (equation := explain_equation(topic)) is not None:
         click.echo(equation)

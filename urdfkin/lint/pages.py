@@ -24,6 +24,7 @@ from urdfkin.lint.rules import (
     encoding,
     inertials,
     joints,
+    left_out,
     materials,
     meshes,
     mimic,
@@ -48,11 +49,15 @@ TOPICS: dict[str, tuple[Rule, ...]] = {
 
 #: Code -> rule, in the order of the codes.
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
+#: The same for what `load` says of MJCF, which is no text that `check` reads.
+OF_MJCF = {rule.id: rule for rule in (left_out.LEFT_OUT_MOTION, left_out.LEFT_OUT)}
 
 #: What a code may be called, in lower case: itself, its number, its short name.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
-_TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own}
+_TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(
+    OF_MJCF, "left_out"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +90,9 @@ def topic_pages(topic: str) -> dict[str, Page]:
     """The pages of a topic's file."""
     data = tomllib.loads((resources.files(rules) / f"{topic}.toml").read_text(encoding="utf-8"))
     defaults = {key: value for key, value in data.items() if isinstance(value, str)}
-    return {code: _page({**data, **defaults, **data[code]}) for code in data if code.startswith("URDF")}
+    return {
+        code: _page({**data, **defaults, **data[code]}) for code in data if code.startswith(("URDF", "MJCF"))
+    }
 
 
 def _page(entry: dict[str, Any]) -> Page:
@@ -107,9 +114,11 @@ def find_rule(word: str) -> Rule:
     Raises:
         UnknownNameError: there is none; the nearest are offered.
     """
-    if (code := CODES.get(word.strip().lower())) is None:
-        raise UnknownNameError("code", word, [*RULES, *(rule.slug for rule in RULES.values())])
-    return RULES[code]
+    known, wanted = RULES | OF_MJCF, word.strip().lower()
+    codes = CODES | {name: rule.id for rule in OF_MJCF.values() for name in (rule.id.lower(), rule.slug)}
+    if wanted not in codes:
+        raise UnknownNameError("code", word, [*known, *(rule.slug for rule in known.values())])
+    return known[codes[wanted]]
 
 
 def find_rules(word: str) -> tuple[Rule, ...]:

@@ -105,12 +105,14 @@ class Mjcf:
         return out
 
 
-def is_mjcf(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Whether a source is MJCF: text, or a file ending in .xml or .mjcf, whose root is <mujoco>.
+def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
+    """Whether a source is MJCF: text, bytes, or a file ending in .xml or .mjcf, whose root is <mujoco>.
 
-    >>> is_mjcf("<mujoco/>"), is_mjcf("<robot/>"), is_mjcf("panda")
-    (True, False, False)
+    >>> is_mjcf("<mujoco/>"), is_mjcf(b"<mujoco/>"), is_mjcf("<robot/>"), is_mjcf("panda")
+    (True, True, False, False)
     """
+    if isinstance(source, bytes):
+        return _ROOT.match(source.decode("utf-8-sig", "replace")) is not None
     if _is_text(source):
         return _ROOT.match(str(source).lstrip("\ufeff")) is not None
     if not isinstance(source, str | os.PathLike) or Path(source).suffix.lower() not in _ENDINGS:
@@ -123,18 +125,20 @@ def is_mjcf(source: object) -> TypeGuard[str | os.PathLike[str]]:
     return _ROOT.match(head.decode("utf-8-sig", "replace")) is not None
 
 
-def read_mjcf(source: str | os.PathLike[str]) -> Mjcf:
+def read_mjcf(source: str | bytes | os.PathLike[str]) -> Mjcf:
     """The robot of an MJCF file or text.
 
     Args:
-        source: A path, or text; files that the file includes are read, meshes are not.
+        source: A path, or text, or its bytes; files that the file includes are read, meshes are not.
 
     Raises:
         InputError: MuJoCo is not installed, does not accept the file, or the robot has a ball joint.
     """
     mujoco = library()
     try:
-        if _is_text(source):
+        if isinstance(source, bytes):
+            spec = mujoco.MjSpec.from_string(source.decode("utf-8-sig"))
+        elif _is_text(source):
             spec = mujoco.MjSpec.from_string(str(source).lstrip("\ufeff"))
         else:
             spec = mujoco.MjSpec.from_file(str(at_home(source)))
@@ -146,12 +150,18 @@ def read_mjcf(source: str | os.PathLike[str]) -> Mjcf:
         found = str(error).strip().replace("\n", "; ")
         raise InputError(
             "MuJoCo does not accept this MJCF",
-            where="<text>" if _is_text(source) else str(source),
+            where=name_of(source),
             found=found,
         ) from None
     reader = _Reader(mujoco, model, spec.modelname or "robot")
     tree = reader.tree()
-    return Mjcf(tree, model, reader.frames, reader.coordinates, (*reader.listed, *left), _is_text(source))
+    text = isinstance(source, bytes) or _is_text(source)
+    return Mjcf(tree, model, reader.frames, reader.coordinates, (*reader.listed, *left), text)
+
+
+def name_of(source: str | bytes | os.PathLike[str]) -> str:
+    """What to call a source in messages."""
+    return "<bytes>" if isinstance(source, bytes) else "<text>" if _is_text(source) else str(source)
 
 
 def _is_text(source: object) -> bool:

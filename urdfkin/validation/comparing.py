@@ -44,12 +44,15 @@ class SecondWitness:
     def three_sides(
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
     ) -> ThreeSides:
-        """Its answers beside urdfkin's and Pinocchio's."""
+        """Its answers beside urdfkin's and Pinocchio's, about the block's frames or joints."""
         inputs = block.x.q, block.x.v, block.x.a
-        answers = block.clock.witness(row.theirs, self.oracle, inputs, block.frames, reference)
+        asked = block.joints if row.of == "joints" else block.frames
+        answers = block.clock.witness(row.theirs, self.oracle, inputs, asked, reference)
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.witness.size(block.size))
         )
+        if row.of == "joints":
+            bounds = (Bound(one.scale[:, block.places], one.k[:, block.places]) for one in bounds)
         return three_sides(self.witness.name, ours, theirs, answers, *bounds)
 
 
@@ -147,8 +150,12 @@ class _Block(_Work):
                 for joint in joints:
                     theirs = self.clock.theirs(joint.theirs, self.oracle, inputs, self.joints, reference)
                     part = Bound(bound.scale[:, self.places], bound.k[:, self.places])
-                    tally = self.tally(ours[:, self.places], theirs, part, self.joint_names)
-                    yield (joint.name, name), tally
+                    own = ours[:, self.places]
+                    found = self.tally(own, theirs, part, self.joint_names)
+                    if second is not None:
+                        sides = second.three_sides(self, joint, reference, own, theirs)
+                        found = replace(found, witness=sides)
+                    yield (joint.name, name), found
 
 
 class _Screws(_Work):

@@ -150,6 +150,8 @@ def subject(
     if isinstance(source, str) and source != "-":
         return _word(source, mimic, root_joint)
     text = read_source(source)  # an open file, or standard input, is read once, here
+    if is_mjcf(text.data):
+        return subject(text.data, mimic, root_joint)
     return _text(text.data, Origin(text.source, mimic, root_joint), text.label)
 
 

@@ -120,6 +120,7 @@ class MujocoOracle:
         self._places = list(self._laid_out([*carrier, *joints], rules))
         self.nq, self.nv = tree.nq, tree.nv
         self._demand_the_same(tree, moving, rules)
+        self._moving = [JointFrame.of(name) for name in moving]
         self._constant = all(place.kind not in _PARTS for place in self._places)
         self._local = threading.local()
 
@@ -330,6 +331,16 @@ class MujocoOracle:
         if which is Reference.WORLD:  # p x J_angular changes with p, too
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
+
+    def joint_jacobians(self, q: FloatArray, among: slice, reference: Reference | str) -> FloatArray:
+        """(n, joints, 6, nv): of the bodies that a run of the moving joints carry, in the tree's order."""
+        return self.jacobians(q, self._moving[among], reference)
+
+    def joint_jacobian_rates(
+        self, q: FloatArray, v: FloatArray, among: slice, reference: Reference | str
+    ) -> FloatArray:
+        """(n, joints, 6, nv), likewise."""
+        return self.jacobian_rates(q, v, self._moving[among], reference)
 
     def _moved(
         self,

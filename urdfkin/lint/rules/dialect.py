@@ -27,7 +27,7 @@ _T = TypeVar("_T")
 #: What another root element is the sign of.
 _FORMATS = {
     "sdf": "this is an SDF file; convert it to a URDF first",
-    "mujoco": "this is an MJCF file; `load` reads it from a path or text, with the extra urdfkin[mujoco]",
+    "mujoco": "this is MJCF, which `load` and all other commands read; a file of it ends in .xml or .mjcf",
     "mujocoinclude": "this is a part of an MJCF file; load the file that includes it",
     "model": "this is a part of an SDF file; convert it to a URDF first",
     "world": "this is a part of an SDF file; convert it to a URDF first",
