@@ -91,8 +91,9 @@ def test_a_file_of_pages_holds_nothing_that_is_not_read(topic: str) -> None:
 
 
 def test_every_module_of_rules_is_a_topic() -> None:
-    assert {path.stem for path in HERE.glob("*.py")} - {"__init__"} == {*TOPICS, "left_out"}  # of MJCF
-    assert {path.stem for path in HERE.glob("*.toml")} == set(TOPICS)
+    topics = {*TOPICS, "left_out"}  # which is of MJCF: `load` says it, not `check`
+    assert {path.stem for path in HERE.glob("*.py")} - {"__init__"} == topics
+    assert {path.stem for path in HERE.glob("*.toml")} == topics
     assert sum(map(len, TOPICS.values())) == len(RULES)
 
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache, partial, reduce
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+import urdfkin
 from urdfkin.kinematics.rotation import exp_rotation, rotation_from_rpy, rpy_of
 from urdfkin.model.chain import inverse
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree
+from urdfkin.robot import Robot
+from urdfkin.urdf.writer import to_urdf
 
 Change = Callable[[KinematicTree], KinematicTree]
 Branch = tuple[Joint, str, str]
@@ -265,3 +270,52 @@ def bounded(tree: KinematicTree) -> KinematicTree:
         else:
             rows.append((joint, parent, child))
     return build_tree(tree.name, tree.links[0], rows)
+
+
+def everything(tree: KinematicTree) -> KinematicTree:
+    """Five of them, one after the other."""
+    changes: list[Change] = [merged, split, flipped, shifted, on_a_stand]
+    return reduce(lambda changed, change: change(changed), changes, tree)
+
+
+#: Changes that leave a robot the same.
+ALIKE: dict[str, Change] = {
+    "base moved": on_a_stand,
+    "links split": split,
+    "links merged": merged,
+    "axes flipped": flipped,
+    "zeros shifted": shifted,
+    "all renamed": renamed,
+    "other way up": rerooted,
+    "counted elsewhere": counted_elsewhere,
+    "slides exchanged": exchanged,
+    "all of it": everything,
+}
+#: Changes that do not; a file rounded to four digits may be what it was.
+UNLIKE: dict[str, Change] = {
+    **{f"tilted by {a:g}": partial(tilted, angle=a) for a in (1e-9, 1e-7, 1e-5, 1e-3, 1e-2)},
+    **{f"moved by {x:g}": partial(lengthened, metres=x) for x in (1e-9, 1e-4)},
+    "axis bent": partial(bent_axis, angle=1e-3),
+    "other rule": with_another_rule,
+    "rounded": rounded,
+}
+
+
+@cache
+def robot(name: str) -> Robot:
+    """A robot of the catalogue, unverified, with limits that a URDF can hold."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        tree = urdfkin.load(name, verify=False).tree
+        return urdfkin.load(to_urdf(bounded(tree)), verify=False)
+
+
+def changed(name: str, what: str) -> Robot | None:
+    """The robot after a change by its name; None where there is nothing to change."""
+    change = (ALIKE | UNLIKE)[what]
+    if what in UNLIKE and not moving(robot(name).tree):
+        return None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        tree = change(robot(name).tree)
+        return None if tree is robot(name).tree else urdfkin.load(to_urdf(tree), verify=False)

@@ -15,7 +15,7 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.sameness import pairs
-from tests.sameness.test_pairs import ALIKE, UNLIKE, changed, robot
+from tests.sameness.pairs import changed, robot
 from urdfkin.report.certificates import read_certificate
 from urdfkin.robot import Robot
 from urdfkin.sameness.certificate import certificate, recheck
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.filterwarnings("ignore")
 
 
 def other(name: str, what: str) -> Robot:
-    found = changed(name, (ALIKE | UNLIKE)[what])
+    found = changed(name, what)
     assert found is not None
     return found
 
