@@ -76,6 +76,8 @@ def searched(a: Robot, b: Robot, at_b: Callable[[FloatArray], FloatArray], inter
         metres = np.linalg.norm(T_a[:, :3, 3] - T_b[:, :3, 3], axis=-1)
         return -np.where(within(a, q) & within(b, at_b(q)), metres, 0.0)
 
+    if not joints:  # nothing moves it
+        return far(a, b, a.neutral(), at_b(a.neutral()), interval)
     best = differential_evolution(
         off, ends, seed=3, popsize=20, maxiter=60, vectorized=True, polish=False, updating="deferred"
     )

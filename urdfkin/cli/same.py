@@ -10,7 +10,7 @@ import click
 from urdfkin.cli.arguments import load_robot, xacro_option
 from urdfkin.cli.completing import complete_robot
 from urdfkin.cli.door import say, say_file
-from urdfkin.cli.numbers import NumberFrom
+from urdfkin.cli.numbers import NumberFrom, Whole
 from urdfkin.cli.output import compiling, console, write_file
 from urdfkin.cli.reports import check_writable
 from urdfkin.errors.printable import json_text
@@ -43,6 +43,11 @@ _PATH = click.Path(path_type=Path, dir_okay=False)
     type=NumberFrom(0.0),
     help="Exit 0 too where no frame is ever off by more, metres and radians: by the proven bound.",
 )
+@click.option(
+    "--boxes",
+    type=Whole(0),
+    help="More than 131072 for sharper bounds where many things differ, in more time; 0 for none.",
+)
 @click.option("--all", "all_", is_flag=True, help="Show every line.")
 @click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
 @click.option("--certificate", type=_PATH, help="Write what was found as JSON that --recheck verifies.")
@@ -59,6 +64,7 @@ def command(
     pairs: tuple[str, ...],
     strict: bool,
     within: float | None,
+    boxes: int | None,
     all_: bool,
     format_: str,
     certificate: Path | None,
@@ -99,9 +105,10 @@ def command(
                 else f"the certificate holds: {document['verdict']}"
             )
             context.exit(1 if against or document["verdict"] == "differs" else 0)
+        from urdfkin.sameness.boxes import MOST  # noqa: PLC0415
         from urdfkin.sameness.judging import parse_map, same  # noqa: PLC0415
 
-        found = same(*robots, map=parse_map(pairs))
+        found = same(*robots, map=parse_map(pairs), boxes=MOST if boxes is None else boxes)
     paths = {"certificate": certificate, "markdown": markdown, "html": html}
     _write(found, robots, format_, paths, all_=all_)
     context.exit(found.exit_code(strict=strict, within=within))

@@ -12,12 +12,14 @@ import numpy as np
 
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.errors.demands import whole_number
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.loading import load
 from urdfkin.model.ranges import WIDEST
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.sameness.alignment import AS_WRITTEN, Alignment, FramePair, align
+from urdfkin.sameness.boxes import MOST, tightened
 from urdfkin.sameness.lower import Search, pinocchios, urdfkins
 from urdfkin.sameness.mechanism import Mechanism, Tolerance, tolerance_of
 from urdfkin.sameness.result import Interval, JointMap, Sameness, Verdict, demand_joint_names
@@ -33,6 +35,8 @@ from urdfkin.verify.pinocchio_module import version
 CONFIRMED = 8
 #: Frames that are far off at random configurations, one of which is the farthest.
 FARTHEST = 4
+#: How near to what a search finds a bound is near enough.
+NEAR = 1.05
 
 
 def same(
@@ -41,6 +45,7 @@ def same(
     *,
     map: Mapping[str, str] | None = None,
     bounds: bool = True,
+    boxes: int = MOST,
 ) -> Sameness:
     """Whether two models move alike in every configuration, proven.
 
@@ -54,6 +59,8 @@ def same(
         b: Likewise.
         map: Joints of `a` and what they are called in `b`, where names and places do not tell.
         bounds: Whether the largest distances are bounded, which takes longest where models differ.
+        boxes: How many boxes of configurations may be looked at at a time, for sharper bounds where many
+            things differ; 0: none.
 
     Returns:
         The verdict with the map that it found, the first difference, and for every frame an interval in
@@ -73,10 +80,11 @@ def same(
     """
     robots = _robot(a), _robot(b)
     given = dict(map or {})
+    whole_number(boxes, "boxes", 0)
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
     # Copies, whose accounts are their own: what is computed here nobody was handed.
-    return Judge((copy(robots[0]), copy(robots[1])), given, bounds).judged()
+    return Judge((copy(robots[0]), copy(robots[1])), given, bounds, boxes).judged()
 
 
 def _robot(source: Robot | Source | DHTable) -> Robot:
@@ -86,8 +94,10 @@ def _robot(source: Robot | Source | DHTable) -> Robot:
 class Judge:
     """Two robots on their way to a verdict."""
 
-    def __init__(self, robots: tuple[Robot, Robot], given: dict[str, str], bounds: bool) -> None:
-        self.robots, self.given, self.bounds = robots, given, bounds
+    def __init__(
+        self, robots: tuple[Robot, Robot], given: dict[str, str], bounds: bool, boxes: int = MOST
+    ) -> None:
+        self.robots, self.given, self.bounds, self.boxes = robots, given, bounds, boxes
         trees = robots[0].tree, robots[1].tree
         parting = _fixed_here(trees[0], trees[1]), _fixed_here(trees[1], trees[0])
         self.mechanisms = Mechanism(trees[0], parting[0]), Mechanism(trees[1], parting[1])
@@ -166,6 +176,15 @@ class Judge:
             fine.add(widest)
         search = self.search(found, variables)
         seen = dict(zip(off, search.worst([frames[k] for k in off]), strict=True)) if off else {}
+        target = NEAR * max((way for way, _ in seen.values()), default=0.0)
+        for _ in range(FARTHEST if off else 0):  # whichever is widest now
+            widest = max(off, key=lambda k: uppers[k])
+            if uppers[widest][0] <= target:
+                break
+            sharper = tightened(search, frames[widest], target, uppers[widest][0], self.boxes)
+            uppers[widest] = sharper, uppers[widest][1]
+            if sharper > target:
+                break
         return tuple(
             self._interval(found, frame, search, seen.get(k), (uppers[k][0] + metres, uppers[k][1] + radians))
             for k, frame in enumerate(frames)

@@ -49,7 +49,8 @@ class Search:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        self._hold = found.X @ found.b.homes[found.base[1]]
+        #: (4, 4) where B's base link stands, seen from A's root.
+        self.hold = found.X @ found.b.homes[found.base[1]]
 
     def _ends(self, name: str) -> tuple[float, float]:
         low, high = self.variables.ranges[name]
@@ -121,7 +122,7 @@ class Search:
         base = b.tree.link_frames[self.found.base[1]]
         Ts_b = computed(b, q_b, [base, *(b.tree.link_frames[frame.b] for frame in frames)])
         tools = np.array([inverse(frame.tool) for frame in frames]).reshape(-1, 4, 4)
-        return Ts_a, self._hold @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
+        return Ts_a, self.hold @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
 
     def at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements

@@ -39,15 +39,22 @@ def upper_bounds(
     0 where nothing on its way differs; inf where a joint that nothing bounds lets it grow, or a joint is of
     another kind.
     """
-    steps = found.path(frame.previous)
-    pairs = [variables.pairs[i] for i in found.indices(frame.previous)]
-    first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
-    if first == len(steps) and frame.end is IDENTITY:
+    steps, pairs = behind_first(found, variables, frame)
+    if not steps and frame.end is IDENTITY:
         return 0.0, 0.0
     if any(step.unlike and pair is None for step, pair in zip(steps, pairs, strict=True)):
         return math.inf, math.inf
-    steps, pairs = steps[first:], pairs[first:]
     return _metres(steps, pairs, variables, frame, grid), _radians(steps, pairs, variables, frame)
+
+
+def behind_first(
+    found: Alignment, variables: Variables, frame: FramePair
+) -> tuple[list[Step], list[Pair | None]]:
+    """The steps on the way to a frame, and their values, from the first one that differs."""
+    steps = found.path(frame.previous)
+    pairs = [variables.pairs[i] for i in found.indices(frame.previous)]
+    first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
+    return steps[first:], pairs[first:]
 
 
 def _differs(step: Step, pair: Pair | None) -> bool:
@@ -75,25 +82,42 @@ def _radians(
 def _metres(
     steps: Sequence[Step], pairs: Sequence[Pair | None], variables: Variables, frame: FramePair, grid: Grid
 ) -> float:
-    p = frame.home[:3, 3]
-    y = point(grid, frame.end[:3, :3] @ p + frame.end[:3, 3])
-    d = point(grid, (frame.end[:3, :3] - np.eye(3)) @ p + frame.end[:3, 3])
+    d, y = at_the_frame(frame, grid)
     for step, pair in zip(reversed(steps), reversed(pairs), strict=True):
-        if pair is None:  # a planar or floating joint may turn to where it is worst, and go anywhere
-            d = Support(grid, d.largest() * grid.lengths)
-            y = Support(grid, np.full(len(grid.points), math.inf))
-        else:
-            d = _difference(step, pair, variables, y, d)
-            ends = variables.range(pair.b)
-            y = y.turned(step.other, *ends) if step.kind == "turns" else y.slid(step.other.direction, *ends)
-        if step.before is not IDENTITY:
-            G, L = grid.points, step.before
-            d = Support(grid, d.values + y.at(G @ (L[:3, :3] - np.eye(3))) + G @ L[:3, 3])
-            y = y.moved(L)
+        d, y = passed(step, pair, variables, d, y)
     return d.largest()
 
 
-def _difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Support) -> Support:
+def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
+    """D and y behind the last joint."""
+    p, end = frame.home[:3, 3], frame.end
+    y = end[:3, :3] @ p + end[:3, 3]
+    return point(grid, y - p), point(grid, y)
+
+
+def passed(
+    step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
+) -> tuple[Support, Support]:
+    """D and y in front of a step, from those behind it."""
+    if pair is None:  # a planar or floating joint may turn to where it is worst, and go anywhere
+        d = Support(d.grid, d.largest() * d.grid.lengths)
+        y = Support(d.grid, np.full(len(d.grid.points), math.inf))
+    else:
+        d = difference(step, pair, variables, y, d)
+        ends = variables.range(pair.b)
+        y = y.turned(step.other, *ends) if step.kind == "turns" else y.slid(step.other.direction, *ends)
+    return before_it(step, d, y)
+
+
+def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
+    """D and y in front of a step's L."""
+    if step.before is IDENTITY:
+        return d, y
+    G, L = d.grid.points, step.before
+    return Support(d.grid, d.values + y.at(G @ (L[:3, :3] - np.eye(3))) + G @ L[:3, 3]), y.moved(L)
+
+
+def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Support) -> Support:
     """Of (e(S' t') - e(S t)) y + e(S t) d, over what t and t' range over."""
     same = step.other is step.axis and pair.a == pair.b
     if step.kind == "turns":

@@ -1,0 +1,82 @@
+"""Branch and bound: its second derivatives are bounds, and it proves what no sum of differences can."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.sameness.pairs import changed, robot
+from urdfkin.sameness.alignment import FramePair, align
+from urdfkin.sameness.boxes import Boxes, tightened
+from urdfkin.sameness.certificate import certificate, recheck
+from urdfkin.sameness.curvature import curvature
+from urdfkin.sameness.judging import Judge
+from urdfkin.sameness.lower import Search
+from urdfkin.sameness.upper import FINE, behind_first, upper_bounds
+from urdfkin.sameness.variables import variables_of
+
+#: Robots, changes, frames: turns alone, a slide, followers, an axis that alone is bent.
+CASES = [
+    ("panda", "rounded", "panda_hand_tcp"),
+    ("panda", "rounded", "panda_leftfinger"),
+    ("ur3_gripper", "tilted by 0.01", "wrist_3_link"),
+    ("elbow", "axis bent", "tool"),
+    ("panda", "other rule", "panda_rightfinger"),
+    ("so100", "rounded", "jaw"),
+]
+
+
+def searched(name: str, what: str, link: str) -> tuple[Search, FramePair]:
+    a, b = robot(name), changed(name, what)
+    assert b is not None
+    judge = Judge((a, b), {}, bounds=True)
+    found = align(*judge.mechanisms, {})
+    frame = next(one for one in found.frames if a.tree.links[one.a] == link)
+    return judge.search(found, variables_of(found, judge.tolerance)), frame
+
+
+@pytest.mark.parametrize(("name", "what", "link"), CASES)
+def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, link: str) -> None:
+    search, frame = searched(name, what, link)
+    steps, some = behind_first(search.found, search.variables, frame)
+    pairs = [pair for pair in some if pair is not None]
+    names, M = curvature(steps, pairs, search.variables, frame)
+    if not np.isfinite(M).all():
+        assert what == "other rule"
+        return
+    boxes = Boxes(search, frame, names)
+    c, step = search.random(200)[:, boxes.at], 1e-3
+    largest = np.zeros_like(M)
+    for i in range(len(names)):
+        h = step * np.eye(len(names))[i]
+        D, G = boxes.at_middles(c)
+        ahead, behind = boxes.at_middles(c + h), boxes.at_middles(c - h)
+        slope = (ahead[0] - behind[0]) / (2.0 * step)
+        size = np.abs(G).max() + np.abs(D).max()
+        assert np.abs(slope - G[..., i]).max() <= 1e-5 * size + 1e-12
+        largest[i] = np.linalg.norm((ahead[1] - behind[1]) / (2.0 * step), axis=1).max(axis=0)
+    assert (largest <= M + 1e-11).all()
+    assert M.max() <= 10.0 * largest.max()
+
+
+def test_where_many_things_differ_the_bound_comes_near_to_what_is_found() -> None:
+    search, frame = searched("panda", "rounded", "panda_hand_tcp")
+    lower, _ = search.worst([frame])[0]
+    upper, _ = upper_bounds(search.found, search.variables, frame, FINE)
+    assert upper > 1.6 * lower
+    assert tightened(search, frame, 1.05 * lower, upper) == 1.05 * lower
+    assert tightened(search, frame, 0.99 * lower, upper, most=2**14) > lower, "what is wrong is not proven"
+    assert tightened(search, frame, 1.05 * lower, upper, most=0) == upper
+
+
+@pytest.mark.slow
+def test_what_boxes_prove_is_proven_again() -> None:
+    a, b = robot("so100"), changed("so100", "rounded")
+    assert b is not None
+    plain, found = urdfkin.same(a, b, boxes=0), urdfkin.same(a, b)
+    assert plain.worst is not None
+    assert found.worst is not None
+    assert found.worst.lower == plain.worst.lower
+    assert found.worst.upper <= plain.worst.upper
+    assert recheck(certificate(found), a, b) == []

@@ -1,0 +1,141 @@
+"""A sharper bound where many things differ: branch and bound on boxes of configurations.
+
+`urdfkin.sameness.upper` adds up what each difference does at its own worst configuration. Here D(q), how far
+B's frame is from A's, is looked at in boxes of all variables together. In one with middle c, half widths h,
+
+    |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i,
+
+with M_ij the most that second derivatives are anywhere (`urdfkin.sameness.curvature`). Boxes that cannot hold
+a distance of interest are dropped, the others halved.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from urdfkin.model.chain import inverse
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+from urdfkin.sameness.alignment import FramePair
+from urdfkin.sameness.curvature import curvature
+from urdfkin.sameness.lower import Search, urdfkins
+from urdfkin.sameness.upper import behind_first
+from urdfkin.sameness.variables import Line
+
+#: How many boxes there may be at a time: a second or two of a processor for a frame.
+MOST = 2**17
+
+
+class Boxes:
+    """One frame's distance, looked at in boxes.
+
+    Args:
+        search: Both robots.
+        frame: The frame.
+        names: Of the variables that move it behind the first difference.
+    """
+
+    def __init__(self, search: Search, frame: FramePair, names: Sequence[str]) -> None:
+        self.search = search
+        self.at = [search.names.index(name) for name in names]
+        self.middle = search.ends.mean(axis=1)
+        trees = [robot.tree for robot in search.robots]
+        self.frames = trees[0].link_frames[frame.a], trees[1].link_frames[frame.b]
+        # B's frame is seen from A's root, where it is another tool.
+        q = search.configurations(self.middle[np.newaxis])[1]
+        base = trees[1].link_frames[search.found.base[1]]
+        self.seen = search.hold @ inverse(urdfkins(search.robots[1], q, [base])[0, 0])
+        self.tool = inverse(frame.tool)[:3, 3]
+        #: (nv, variables) rates of either robot by the variables'.
+        self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
+        lines = {joint.name: Line(f"a:{joint.name}", 1.0, 0.0) for joint in trees[0].joints if joint.nv == 1}
+        for rates, tree, own in zip(self.rates, trees, (lines, search.variables.leaders), strict=True):
+            for joint, line in own.items():
+                if line.variable in names:
+                    rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope
+
+    def bounds(self, c: FloatArray, h: FloatArray) -> FloatArray:
+        """(n,) the largest |D + sum_i D_i x_i| over |x_i| <= h_i, at middles (n, variables)."""
+        D, G = self.at_middles(c)
+        size = np.sqrt((D * D).sum(axis=1))
+        along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, 1e-300)[:, np.newaxis]
+        across = np.sqrt(np.maximum((G * G).sum(axis=1) - along * along, 0.0))
+        return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
+
+    def at_middles(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(n, 3) D and (n, 3, variables) its derivatives at values (n, variables)."""
+        z = np.tile(self.middle, (len(c), 1))
+        z[:, self.at] = c
+        (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
+        p_a, J_a = self._origin(a, q_a, self.frames[0], np.zeros(3))
+        p_b, J_b = self._origin(b, q_b, self.frames[1], self.tool)
+        R, p = self.seen[:3, :3], self.seen[:3, 3]
+        return p_b @ R.T + p - p_a, R @ (J_b @ self.rates[1]) - J_a @ self.rates[0]
+
+    def _origin(
+        self, robot: Robot, q: FloatArray, frame: str, tool: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """(n, 3) where a point of a frame is, and (n, 3, nv) its Jacobian."""
+        T, J = urdfkins(robot, q, [frame])[:, 0], robot.jacobian(q, frame, verify=False)
+        if not tool.any():
+            return T[:, :3, 3], J[:, :3]
+        lever = T[:, :3, :3] @ tool
+        return T[:, :3, 3] + lever, J[:, :3] + np.cross(J[:, 3:], lever[:, :, np.newaxis], axis=1)
+
+
+def tightened(search: Search, frame: FramePair, target: float, upper: float, most: int = MOST) -> float:
+    """A bound on a frame's distance, metres: `target` where that can be proven, else one of up to `upper`.
+
+    Args:
+        search: Both robots.
+        frame: The frame.
+        target: What would be enough.
+        upper: What is proven already.
+        most: How many boxes there may be at a time.
+    """
+    variables = search.variables
+    steps, pairs = behind_first(search.found, variables, frame)
+    some = [pair for pair in pairs if pair is not None]
+    all_round = all(
+        step.kind == "turns" and abs(line.slope) == 1.0
+        for step, pair in zip(steps, some, strict=False)
+        for line in (pair.a, pair.b)
+        if line.slope and math.inf in np.abs(variables.ranges[line.variable])
+    )
+    stands = search.found.b.body_of[search.found.base[1]] == 0
+    if not target < upper < math.inf or len(some) < len(pairs) or not (stands and all_round):
+        return upper
+    names, M = curvature(steps, some, variables, frame)
+    boxes = Boxes(search, frame, names)
+    ends = search.ends[boxes.at]
+    c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
+    if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
+        return upper
+    while len(c) and 2 * len(c) <= most:
+        i = _longest(h, M)
+        h[i] /= 2.0
+        c, proven = np.repeat(c, 2, axis=0), np.repeat(proven, 2)
+        c[::2, i] -= h[i]
+        c[1::2, i] += h[i]
+        if (rest := 0.5 * float(h @ M @ h)) < upper:
+            proven = np.minimum(proven, boxes.bounds(c, h) + rest)
+            keep = proven > target
+            c, proven = c[keep], proven[keep]
+    return float(proven.max(initial=target))
+
+
+def _longest(h: FloatArray, M: FloatArray) -> int:
+    """The variable whose half width leaves most open."""
+    return int((h * (M @ h)).argmax())
+
+
+def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
+    """How often a box has to be halved before it can tell anything."""
+    h, count = h.copy(), 0
+    while 0.5 * h @ M @ h >= upper:
+        h[_longest(h, M)] /= 2.0
+        count += 1
+    return count
