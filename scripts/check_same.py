@@ -100,7 +100,8 @@ def told(some: list[dict[str, Any]]) -> Iterator[str]:
         found = [one["lower"] / one["truth"] for one in bounded if one["change"] == what and one["truth"]]
         if widths:
             above = f"{statistics.median(widths) - 1:.1%} (median), {max(widths) - 1:.1%} (most)"
-            yield f"{what}: {len(widths)}; at most: {above} above the search's; at least: {min(found):.2%} of it"
+            below = f"{1 - min(found):.1%}"
+            yield f"{what}: {len(widths)}; at most is above the search's by {above}, at least {below} below"
     seconds = [one["seconds"] for one in some if one["change"] in UNLIKE]
     if seconds:
         yield f"seconds with bounds: median {statistics.median(seconds):.1f}, most {max(seconds):.1f}"
