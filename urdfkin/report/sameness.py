@@ -67,7 +67,10 @@ def where(found: Sameness, frame: Interval) -> str:
 def renamed(found: Sameness) -> list[str]:
     """Joints and links that are called otherwise."""
     joints = [f"joint {one.a} is {one.b}" for one in found.joints if one.a != one.b]
-    joints += [f"in another order, which their axes allow: {', '.join(names)}" for names in found.orders]
+    joints += [
+        f"joints of B stand in another order, which their axes allow; taken as {', '.join(names)}"
+        for names in found.orders
+    ]
     return joints + [f"link {ours} is {theirs}" for ours, theirs in found.links if ours != theirs]
 
 

@@ -177,7 +177,7 @@ class Judge:
         search = self.search(found, variables)
         seen = dict(zip(off, search.worst([frames[k] for k in off]), strict=True)) if off else {}
         target = NEAR * max((way for way, _ in seen.values()), default=0.0)
-        for _ in range(FARTHEST if off else 0):  # whichever is widest now
+        for _ in off:  # whichever is widest now
             widest = max(off, key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
                 break
