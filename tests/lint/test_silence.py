@@ -21,7 +21,7 @@ def test_load_does_not_warn_of_it() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         robot = urdfkin.load(COMMENT.format("URDF503") + text.partition("\n")[2])
-    assert robot.findings == ()
+    assert list(robot.findings) == []
 
 
 def test_a_robot_that_pinocchio_refuses_stays_unverified() -> None:

@@ -98,7 +98,10 @@ def _other_lengths(tree: KinematicTree, what: str) -> dict[int, str]:
         for mimic in (False, True):
             length = _pinocchio_length(tree, mimic=mimic)
             asks = f", mimic={mimic}" if follow else ""
-            found[length] = f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) gives urdfkin's"
+            found[length] = (
+                f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) gives urdfkin's;"
+                f" {Question.CONTINUOUS_JOINTS}"
+            )
         if follow:
             both = found.get(tree.nq + of_followers)
             found[tree.nq + of_followers] = f"{both}; or {free}" if both else free
