@@ -7,4 +7,4 @@ ruff format --check .
 ruff check .
 mypy
 python scripts/changelog_gate.py
-exec pytest -n 2 "$@"
+exec pytest -n 2 --dist worksteal "$@"

@@ -25,7 +25,15 @@ ROOT = Path(__file__).parents[1]
 #: What builds urdfkin, and what the hook installs: pure Python, as is all that these need.
 PACKAGES = ("hatchling", "click")
 #: What a build needs of the repository.
-SOURCES = ("pyproject.toml", "README.md", "LICENSE", ".pre-commit-hooks.yaml", "urdfkin", "robots")
+SOURCES = (
+    "pyproject.toml",
+    "README.md",
+    "LICENSE",
+    ".pre-commit-hooks.yaml",
+    "urdfkin",
+    "robots",
+    "docs/questions.md",
+)
 
 LONG = """<robot name="r"><link name="a"/><link name="b"/>
   <joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 2"/></joint>
@@ -106,6 +114,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Repository:
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, made.folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         else:
+            (made.folder / name).parent.mkdir(exist_ok=True)
             shutil.copy(ROOT / name, made.folder / name)
     made.commit()
     return made

@@ -16,6 +16,8 @@ _COMPILED = {
 }  # fmt: skip
 
 
+#: They make slips of their own, in processes of their own.
+_OF_SLIPS = ("test_mutate", "test_named_slips")
 _OF_ROBOTS = ("test_robot.py", "verify", "laws")
 
 
@@ -39,7 +41,10 @@ def near_tests(path: Path) -> list[str]:
 
     A part without tests of its own serves all the others, by way of a robot.
     """
-    named = re.compile(rf"\b{re.escape(module_of(path))}\b(?!\.)|\b{re.escape(path.stem)}\b")
+    package, _, name = module_of(path).rpartition(".")
+    named = re.compile(
+        rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
+    )
     part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
     near = {test for test, text in _texts().items() if named.search(text)}
     own = _tests_of(part, f"test_{part}.py") or _tests_of(*_OF_ROBOTS)
@@ -53,4 +58,5 @@ def _tests_of(*parts: str) -> set[Path]:
 
 @cache
 def _texts() -> dict[Path, str]:
-    return {path: path.read_text(encoding="utf-8") for path in TESTS.rglob("test_*.py")}
+    tests = (path for path in TESTS.rglob("test_*.py") if path.stem not in _OF_SLIPS)
+    return {path: path.read_text(encoding="utf-8") for path in tests}

@@ -60,7 +60,7 @@ def disguised(table: DHTable, seed: int) -> DHTable:
     return replace(table, rows=tuple(rows), base=np.eye(4), tool=np.eye(4))
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 def test_what_cannot_matter_is_forgiven(seed: int, convention: str) -> None:
     path = chain(elbow(), "tip")
@@ -80,7 +80,7 @@ def test_sliding_joints_are_fitted_as_well(kinds: str) -> None:
 
 
 @given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_a_table_agrees_with_the_chain_it_came_from(tree: KinematicTree, seed: int) -> None:
     path = chain(tree, "tip")
     assume(path.reach > 1e-3)

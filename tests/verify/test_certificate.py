@@ -17,7 +17,7 @@ import urdfkin
 from tests.laws.subjects import state
 from urdfkin.errors import InputError
 from urdfkin.robot import Robot
-from urdfkin.verify.certificate import NOT_ASKED_FOR
+from urdfkin.verify.certificate import NOT_ASKED_FOR, Certificate
 
 FRAME = "panda_hand"
 
@@ -166,3 +166,11 @@ def test_a_certificate_says_which_file_it_was_and_can_be_saved(tmp_path: Path) -
     assert data == certificate.as_dict()
     assert (data["verified"], data["sha256"], data["lines"][0]["checked"]) == (True, digest, 1)
     assert urdfkin.load(file.read_text()).path is None
+
+
+@pytest.mark.parametrize("reading", ["", "MuJoCo 4.0.0 at 9 configurations"])
+def test_who_vouches_for_a_reading_is_said_where_somebody_does(reading: str) -> None:
+    certificate = Certificate("arm", "Pinocchio 4.1.0", (), (), reading=reading)
+    for text in (str(certificate), certificate._repr_markdown_(), certificate._repr_html_()):
+        assert ("read: " in text.lower()) == bool(reading)
+        assert reading in text

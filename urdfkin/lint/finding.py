@@ -14,8 +14,8 @@ from typing import Any
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.printable import printable
 from urdfkin.errors.showing import Sheet, Shown, Table
-from urdfkin.lint.edits import Fix
 from urdfkin.lint.escape import shortened
+from urdfkin.lint.fixes import Fix
 
 
 class Severity(Enum):

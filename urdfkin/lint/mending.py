@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from urdfkin.lint.edits import apply
 from urdfkin.lint.finding import Finding, Severity
+from urdfkin.lint.fixes import apply
 from urdfkin.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from urdfkin.lint.edits import Fix
 from urdfkin.lint.finding import Finding
+from urdfkin.lint.fixes import Fix
 from urdfkin.lint.pages import RULES, page
 from urdfkin.lint.rule import Rule
 

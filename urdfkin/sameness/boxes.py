@@ -114,6 +114,8 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
     c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
     if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
         return upper
+    if not names:  # nothing on the way moves one against the other
+        return min(upper, float(boxes.bounds(c, h)[0]))
     while len(c) and 2 * len(c) <= most:
         i = _longest(h, M)
         h[i] /= 2.0

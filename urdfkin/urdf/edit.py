@@ -1,4 +1,4 @@
-"""Attributes exchanged in a text where they stand: every other byte stays as it is.
+"""Attributes and elements put into a URDF where they belong, as edits of its text.
 
 An element's place is the one that the parser gave it (`Element.offset`), in the bytes that follow a byte
 order mark. What is new stands as the text around it does: between its quotes, with its line ends and blanks.
@@ -7,22 +7,11 @@ order mark. What is new stands as the text around it does: between its quotes, w
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 
-from urdfkin.errors import InputError
+from urdfkin.system.edits import Edit
 from urdfkin.urdf.element import Element
 from urdfkin.urdf.writer import attribute
-
-
-@dataclass(frozen=True, slots=True)
-class Edit:
-    """Bytes `start` to `end` become `text`; nothing is replaced where the two are one."""
-
-    start: int
-    end: int
-    text: str = ""
-
 
 #: A start tag: '<', then quoted values, in which '>' may stand, and everything else.
 _START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
@@ -52,21 +41,3 @@ def before(data: bytes, at: Element, element: str) -> Edit:
     """The edit that puts an element, as text, before another, on a line of its own if that has one."""
     indentation = _INDENTATION.search(data[max(0, at.offset - 1000) : at.offset])
     return Edit(at.offset, at.offset, element + (indentation[1].decode() if indentation else ""))
-
-
-def edited(data: bytes, edits: Iterable[Edit]) -> bytes:
-    """The text with all edits made.
-
-    >>> edited(b"a=1 b=2", [Edit(6, 7, "3"), Edit(2, 3, "10")])
-    b'a=10 b=3'
-
-    Raises:
-        InputError: two of them overlap.
-    """
-    parts, cursor = list[bytes](), 0
-    for edit in sorted(edits, key=lambda one: (one.start, one.end)):
-        if edit.start < cursor:
-            raise InputError("two edits of one place", found=f"byte {edit.start}")
-        parts += [data[cursor : edit.start], edit.text.encode()]
-        cursor = edit.end
-    return b"".join([*parts, data[cursor:]])

@@ -15,7 +15,7 @@ from urdfkin.kinematics.rotation import rotation_from_rpy
 from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
 from urdfkin.sameness.calibration.into_urdf import nearest_rpy, with_origins
-from urdfkin.urdf.edit import Edit, edited
+from urdfkin.system.edits import Edit, edited
 
 ORIGINS = {name: pose(k, 0.5) for k, name in enumerate(["one", "two", "three", "fix"])}
 

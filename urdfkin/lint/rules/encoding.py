@@ -5,10 +5,11 @@ from __future__ import annotations
 import codecs
 import re
 
-from urdfkin.lint.edits import Edit, Fix
 from urdfkin.lint.escape import quoted
+from urdfkin.lint.fixes import Fix
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
+from urdfkin.system.edits import Edit
 
 EMPTY = Rule("URDF101", "empty-file", ERROR)
 ENCODING = Rule("URDF102", "not-utf8", ERROR)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from urdfkin.lint.edits import Fix
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.finding import Severity
+from urdfkin.lint.fixes import Fix
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
 from urdfkin.lint.rules import joints

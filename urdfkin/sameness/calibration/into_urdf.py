@@ -15,7 +15,8 @@ from urdfkin.lint.finding import Severity
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import FloatArray
-from urdfkin.urdf.edit import Edit, before, edited, with_attributes
+from urdfkin.system.edits import Edit, edited
+from urdfkin.urdf.edit import before, with_attributes
 from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import numbers
 

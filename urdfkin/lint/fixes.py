@@ -9,14 +9,7 @@ import codecs
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-
-@dataclass(frozen=True, slots=True)
-class Edit:
-    """The bytes from `start` up to `end` become `text`."""
-
-    start: int
-    end: int
-    text: str = ""
+from urdfkin.system.edits import Edit, edited
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,14 +32,9 @@ def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
     b'<axis xyz="0 0 1"/>'
     """
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
-    text = data.removeprefix(mark)
-    taken: list[Fix] = []
-    pieces, cursor = [mark], 0
+    taken, end = list[Fix](), 0
     for fix in sorted(fixes, key=lambda fix: fix.edits[0].start):
-        if fix.edits[0].start < cursor:
-            continue
-        taken.append(fix)
-        for edit in fix.edits:
-            pieces += [text[cursor : edit.start], edit.text.encode()]
-            cursor = edit.end
-    return b"".join([*pieces, text[cursor:]]), taken
+        if fix.edits[0].start >= end:
+            taken.append(fix)
+            end = fix.edits[-1].end
+    return mark + edited(data.removeprefix(mark), [edit for fix in taken for edit in fix.edits]), taken
