@@ -29,6 +29,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units, read_number, units_of
 from urdfkin.dh.written_row import name_of, refuse_other_order, written_row
 from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.errors.questions import Question
 from urdfkin.model.tree import FloatArray
 
 _TABLE_KEYS = (
@@ -109,7 +110,9 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
     """
     if "convention" not in data:
         raise InputError(
-            "the table does not say its convention", remedy="write convention = 'standard' or 'modified'"
+            "the table does not say its convention",
+            remedy="write convention = 'standard' or 'modified', in a sheet a line `convention: standard`;"
+            f" {Question.WHICH_DH_CONVENTION}",
         )
     for key in data:
         if key not in _TABLE_KEYS and key not in NOTES:

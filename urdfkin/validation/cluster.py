@@ -241,18 +241,25 @@ class Cluster:
     def _found(self, future: Future[Any], flight: _Flight) -> Answer | None:
         """The answer; None: to be sent again."""
         if future.status == "finished":
-            return self._answer(future.result(), flight.task)
+            try:
+                result = future.result()
+            except OSError as gone:  # results come by way of the scheduler: it went before this one did
+                raise self._lost() from gone
+            return self._answer(result, flight.task)
         if self._client.status != "running":
-            raise ClusterError(
-                "the scheduler is lost",
-                where=str(self._client.scheduler.address if self._client.scheduler else "the cluster"),
-                remedy="what a store holds stays; start it again and give the same command to go on",
-            )
+            raise self._lost()
         error = future.exception() if future.status == "error" else None
         if flight.tries < _TRIES and (error is None or isinstance(error, KilledWorker)):
             return None
         return lost(
             "the cluster lost it", error if isinstance(error, Exception) else RuntimeError(future.status)
+        )
+
+    def _lost(self) -> ClusterError:
+        return ClusterError(
+            "the scheduler is lost",
+            where=str(self._client.scheduler.address if self._client.scheduler else "the cluster"),
+            remedy="what a store holds stays; start it again and give the same command to go on",
         )
 
     def _answer(self, found: remote.Found, task: Task) -> Answer:

@@ -13,6 +13,7 @@ from urdfkin.dh.compare.fit import CELLS, Model, columns, fit_cells, hidden_cell
 from urdfkin.dh.compare.freedoms import fit_freedoms
 from urdfkin.dh.compare.result import CellDifference, Comparison, TakenUp
 from urdfkin.dh.convert import to_standard
+from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.dh.row import Convention
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHTable
@@ -178,7 +179,25 @@ def _best_fit(
             best, best_size = model, its_size
         if best_size <= max(enough, 1e-12 * scale):
             break
-    return best
+    return _ends_gathered(best, written)
+
+
+def _ends_gathered(model: Model, written: Model) -> Model:
+    """The same with the first joint's offset in the base and the last one's in the tool, where it is seen."""
+    cells, n = model.cells.copy(), len(model.cells)
+    _, _, a, alpha, beta = cells[-1]
+    step = between_axes(a, alpha, beta)
+    base, tool = model.base, model.tool
+    for i in dict.fromkeys((0, n - 1)):
+        k = _own(model, i)
+        change = cells[i, k] - written.cells[i, k]
+        cells[i, k] = written.cells[i, k]
+        S = along_axis(change, 0.0) if model.turns[i] else along_axis(0.0, change)
+        if i == 0:
+            base = base @ S
+        else:
+            tool = np.linalg.solve(step, S @ step) @ tool
+    return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(tool))
 
 
 def _starts(chain: FrameChain, standard: DHTable, written: Model, *effort: int) -> Iterator[Model]:
