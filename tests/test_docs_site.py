@@ -116,6 +116,7 @@ def test_a_lesson_is_a_notebook_with_what_it_prints(page: str) -> None:
     assert "`$" not in words
 
 
+@pytest.mark.slow
 def test_a_doctest_in_a_docstring_is_a_block_of_code() -> None:
     from scripts.docs_docstrings import fenced  # noqa: PLC0415  imports griffe, of the extra `docs`
 

@@ -38,6 +38,7 @@ def runs(page: str) -> bool:
 SLOW = {"same.md": pytest.mark.slow}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "page", [pytest.param(page, marks=SLOW.get(page, ())) for page in pages() if runs(page)]
 )

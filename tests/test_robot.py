@@ -104,6 +104,7 @@ def test_the_line_of_a_text_takes_it_from_standard_input_and_that_of_a_file_quot
         assert command(*words[1:]).code == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quantity", METHODS)
 @pytest.mark.parametrize("batch", [(), (2, 3)])
 @pytest.mark.usefixtures("no_room")

@@ -93,6 +93,7 @@ def test_a_table_writes_itself_as_the_command_line_does(robot: Robot) -> None:
         table.to_latex("turns")
 
 
+@pytest.mark.slow
 def test_a_report_writes_itself_as_the_command_line_does() -> None:
     report = urdfkin.validate("planar_two_link", samples=3)
     document = cast("Document", report.as_dict())

@@ -62,6 +62,7 @@ def test_a_slip_of_the_rate_matrix_is_caught(
         ur5.analytical_jacobian(ur5.sample(5, 3), "tool0", representation)
 
 
+@pytest.mark.slow
 def test_it_has_a_line_of_its_own_in_the_certificate() -> None:
     robot = urdfkin.load("ur5")
     robot.analytical_jacobian(robot.sample(7), "tool0", "xyz")

@@ -104,6 +104,7 @@ RACK = """<robot name="rack"><link name="a"/><link name="b"/><link name="c"/><li
  <origin xyz="0.4 0.1 0.3" rpy="1.3 0.4 0.5"/><axis xyz="0 0.6 0.8"/></joint></robot>"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("multiplier", [1, 30, 1000, 1e5])
 @pytest.mark.parametrize("ends", [("d", "a"), ("a", "d"), ("d", "b")])
 def test_a_right_table_of_a_rack_and_pinion_is_right_whatever_the_multiplier(
@@ -183,6 +184,7 @@ def test_so101_has_no_foot_at_the_inverse_of_rounding() -> None:
     assert max(abs(row.d) for row in table.rows) < 1.0
 
 
+@pytest.mark.slow
 def test_a_table_with_cells_of_rounded_angles_recommends_the_snap_that_cures_it() -> None:
     done = command("dh", "baxter")
     assert done.code == 0

@@ -119,6 +119,7 @@ def lost(text: str) -> tuple[float, float]:
     return float(found[1]), float(found[2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["terminal", "markdown"])
 @pytest.mark.parametrize("units", [(), ("--degrees", "--millimetres")])
 def test_three_digits_are_said_to_lose_nearly_a_millimetre(form: str, units: tuple[str, ...]) -> None:

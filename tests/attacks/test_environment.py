@@ -164,6 +164,7 @@ WITH_FILES = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("long", LONG)
 @pytest.mark.parametrize("words", WITH_FILES)
 def test_a_name_too_long_for_a_file_is_told_in_a_line(

@@ -81,6 +81,7 @@ def robot(request: pytest.FixtureRequest) -> Robot:
     return loaded(ROBOTS[request.param])
 
 
+@pytest.mark.slow
 def test_every_language_holds_the_same_code_under_any_names(robot: Robot) -> None:
     written = code(robot, quantities=("placement",))
     words = set(re.findall(r"\w+", written.name)) | {x for row in written.words.values() for x in row}
@@ -142,6 +143,7 @@ def test_identifiers_are_words_no_two_alike(names: list[str]) -> None:
         assert not word.startswith("_")
 
 
+@pytest.mark.slow
 @given(st.text(max_size=60) | st.sampled_from([*_WORDS, *NAMES.values()]))
 def test_words_of_a_comment_end_none(name: str) -> None:
     for text in (shown(name), shown(name * 50)):

@@ -351,6 +351,7 @@ def test_a_mesh_that_a_pull_request_takes_away_is_missed_in_a_file_that_it_left(
     assert found("--changed-since", "HEAD") == [("shaped.urdf", "URDF706")]
 
 
+@pytest.mark.slow
 def test_a_xacro_file_is_told_in_full_when_what_it_may_include_changed(repository: Path) -> None:
     pytest.importorskip("xacrodoc")
     macro = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="l" value="{}"/></robot>'

@@ -11,6 +11,7 @@ from tests.attacks.hostile import urdf
 from tests.cli.running import urdfkin
 
 
+@pytest.mark.slow
 def test_a_file_is_written_and_checks_itself(tmp_path: Path) -> None:
     path = tmp_path / "elbow.py"
     words = ("--to", "numpy", "--quantity", "jacobian,velocity", "--quantity", "placement", "-o", str(path))

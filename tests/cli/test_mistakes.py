@@ -66,6 +66,7 @@ MISTAKES = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_gives_one_clear_message_and_exit_2(
     mistake: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -23,6 +23,7 @@ from urdfkin.model.tree import FloatArray
 MOVED = "0,0,1,0,0,0.5235987755982988"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("written", ["rpy", "quaternion"])
 @pytest.mark.parametrize("relative_to", [None, "forearm_link"])
 def test_few_numbers_are_the_same_pose(written: str, relative_to: str | None) -> None:
@@ -127,6 +128,7 @@ TAKES: dict[str, list[str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", TAKES)
 def test_every_quantity_takes_what_it_needs_of_the_bases_motion(command: str) -> None:
     given = [f"--{x}" for x in "va" if command in ("velocity", "jacobian-rate", "acceleration", "imu")][

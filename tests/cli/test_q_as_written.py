@@ -45,6 +45,7 @@ def test_degrees_typed_as_radians_are_recognised() -> None:
     assert "warning: joint panda_joint1: 30 is outside [-2.8973, 2.8973]; degrees? write 30deg" in done.err
 
 
+@pytest.mark.slow
 def test_every_command_that_takes_q_reads_it_so(tmp_path: Path) -> None:
     q = "shoulder_pan_joint=30deg, shoulder_lift_joint=-90deg, elbow_joint=90deg, wrist_1_joint=0,"
     q += "wrist_2_joint=pi/2 , wrist_3_joint=0"

@@ -323,6 +323,7 @@ def test_a_table_is_a_robot_to_every_command() -> None:
 LONG = "a_joint_of_the_left_manipulator_whose_name_is_as_long_as_names_of_people_who_use_prefixes_are"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

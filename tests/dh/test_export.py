@@ -141,6 +141,7 @@ def test_numbers_in_symbols_are_those_that_somebody_wrote() -> None:
     assert "vpa('0.3333333333333333'), sym(pi)/12, -sym(1)/10, q2 - 5*sym(pi)/12\n" in matlab
 
 
+@pytest.mark.slow
 def test_what_sympy_makes_of_a_table_is_exact() -> None:
     sympy = pytest.importorskip("sympy")
     scope: dict[str, Any] = {}

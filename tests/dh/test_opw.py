@@ -66,6 +66,7 @@ def test_a_calibrated_arm_is_refused_with_its_distance_or_taken_for_one() -> Non
     assert found.lengths["c2"] == pytest.approx(0.5, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5", "panda"])
 def test_an_arm_of_another_kind_is_refused(name: str) -> None:
     with pytest.raises(InputError, match=r"OPW arm has six|no ortho-parallel one"):

@@ -162,6 +162,7 @@ def test_what_is_no_cell_is_refused(text: str) -> None:
         cell_of(text)
 
 
+@pytest.mark.slow
 @given(st.text(max_size=30))
 @settings(max_examples=300)
 def test_any_text_is_a_cell_or_is_refused(text: str) -> None:

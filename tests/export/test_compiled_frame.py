@@ -107,6 +107,7 @@ def test_without_a_compiler_the_walk_computes(monkeypatch: pytest.MonkeyPatch) -
     assert fast.jacobian(np.tile(q, (3, 1)))[2].tobytes() == fast.jacobian(q).tobytes()
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_machine_code_that_computes_something_else_is_not_used(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path

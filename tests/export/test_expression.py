@@ -40,6 +40,7 @@ def written(draw: st.DrawFn) -> list[tuple[str, int, int]]:
     return [(draw(letters), draw(st.integers(0, 30)), draw(st.integers(0, 30))) for _ in range(12)]
 
 
+@pytest.mark.slow
 @given(written())
 def test_an_expression_has_the_value_of_its_arithmetic(steps: list[tuple[str, int, int]]) -> None:
     graph = Graph()

@@ -33,6 +33,7 @@ def test_the_findings_stand_on_their_lines(case: Case) -> None:
     assert set(case.findings) <= found, [str(finding) for finding in findings]
 
 
+@pytest.mark.slow
 @EVERY_CASE
 def test_the_column_points_at_what_is_meant(case: Case) -> None:
     lines = re.split(rb"\r\n|\r|\n", case.data)

@@ -76,6 +76,7 @@ def test_a_byte_order_mark_stays_where_it_is() -> None:
     assert done.text.data == codecs.BOM_UTF8 + TIDY.encode()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_of_every_odd_document_what_is_fixed_is_gone_and_nothing_new_is_found(case: Case) -> None:
     before, done = examine(Text(case.data, "<bytes>", "<bytes>")), mended(case.data)
@@ -145,6 +146,7 @@ def test_a_fix_that_does_more_than_it_says_is_not_made(damage: bytes, objection:
 numbers = st.floats(-1e3, 1e3).filter(lambda x: x == 0.0 or abs(x) > 1e-6)
 
 
+@pytest.mark.slow
 @given(st.tuples(numbers, numbers, numbers).filter(lambda v: math.hypot(*v) > 1e-3))
 def test_a_unit_vector_tilts_by_less_than_a_rounding(vector: tuple[float, float, float]) -> None:
     a, b = [list(map(Fraction, v)) for v in (vector, unit_vector(vector))]

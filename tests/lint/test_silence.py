@@ -39,6 +39,7 @@ def test_the_nearest_comment_speaks_and_the_others_are_told_to_be_unused() -> No
     assert (unused.code, unused.line) == ("URDF121", 1)
 
 
+@pytest.mark.slow
 def test_more_findings_than_are_written_out_are_silenced_too() -> None:
     links = '<link name="a"/>' + "<link name='b'/>"
     joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/>{}</joint>'

@@ -186,6 +186,7 @@ def test_a_printed_number_is_read_back_in_its_unit(value: float, unit: str) -> N
     assert found.value == scaled
 
 
+@pytest.mark.slow
 @given(st.text(max_size=30) | st.from_regex(r"[0-9.eEpi*/+ deg°πms^-]{0,30}", fullmatch=True))
 @settings(max_examples=400)
 def test_any_text_is_finite_numbers_or_an_error_of_our_own(text: str) -> None:

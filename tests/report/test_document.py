@@ -48,6 +48,7 @@ def test_a_robot_that_cannot_be_read_keeps_to_the_schema_and_brings_its_findings
     assert {finding["severity"] for finding in robot["findings"]} >= {"error"}
 
 
+@pytest.mark.slow
 def test_a_judged_run_keeps_to_the_schema() -> None:
     report = validate("panda", samples=0)
     judged = replace(report, judgements=(judge(load("panda"), samples=1),))

@@ -26,6 +26,7 @@ def test_the_robots_with_a_pose_of_their_own_are_those_named_here() -> None:
     assert {name for name, entry in catalogue().items() if entry.poses} == set(SRDF)
 
 
+@pytest.mark.slow
 def test_ready_lies_within_every_limit_of_every_robot() -> None:
     outside = {}
     for name in catalogue():

@@ -36,6 +36,7 @@ def searched(name: str, what: str, link: str) -> tuple[Search, FramePair]:
     return judge.search(found, variables_of(found, judge.tolerance)), frame
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "what", "link"), CASES)
 def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, link: str) -> None:
     search, frame = searched(name, what, link)
@@ -60,6 +61,7 @@ def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, lin
     assert M.max() <= 10.0 * largest.max()
 
 
+@pytest.mark.slow
 def test_where_many_things_differ_the_bound_comes_near_to_what_is_found() -> None:
     search, frame = searched("panda", "rounded", "panda_hand_tcp")
     lower, _ = search.worst([frame])[0]

@@ -46,6 +46,7 @@ def moves_alike(found: Sameness, a: Robot, b: Robot) -> bool:
     return bool(np.abs(T_a - seen).max() <= 1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["floating", "planar"])
 @pytest.mark.parametrize("also", ["", "renamed", "rerooted"])
 def test_a_free_joint_may_count_from_another_place(kind: str, also: str) -> None:
@@ -65,6 +66,7 @@ def test_a_free_joint_may_count_from_another_place(kind: str, also: str) -> None
     assert recheck(document, a, b) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["floating", "planar"])
 def test_what_hangs_on_a_free_joint_is_still_compared(kind: str) -> None:
     a, b = loaded(CHAIN.format(kind, "0")), loaded(CHAIN.format(kind, "0.001"))
@@ -111,6 +113,7 @@ def gantry(order: str, wrist: str = "turn", tilt: str = "0") -> Robot:
     return loaded(f'<robot name="gantry">{links}{text}</robot>')
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "wrist"), [("xyz", "quill"), ("zyx", "turn"), ("yzx", "quill")])
 def test_slides_may_come_in_any_order_and_one_along_an_axis_before_it_or_behind(
     order: str, wrist: str
@@ -124,6 +127,7 @@ def test_slides_may_come_in_any_order_and_one_along_an_axis_before_it_or_behind(
     assert recheck(json.loads(json.dumps(certificate(found))), a, b) == []
 
 
+@pytest.mark.slow
 def test_every_order_of_slides_is_the_same_robot() -> None:
     a = gantry("xyz")
     for order in permutations("xyz"):
@@ -143,6 +147,7 @@ def test_a_carriage_that_another_joint_carries_is_a_difference() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_schema_knows_conversions_and_orders() -> None:
     from jsonschema import Draft202012Validator  # noqa: PLC0415
 

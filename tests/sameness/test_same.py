@@ -51,6 +51,7 @@ def test_limits_are_told_apart_from_motion() -> None:
     assert (found.exit_code(), found.exit_code(strict=True)) == (0, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["all of it", "axes flipped", "zeros shifted", "all renamed"])
 @pytest.mark.parametrize("name", ["panda", "talos", "polar"])
 def test_what_has_to_be_done_makes_them_move_alike(name: str, what: str) -> None:
@@ -81,6 +82,7 @@ def test_a_follower_that_was_dropped_is_found() -> None:
     assert found.worst.lower == pytest.approx(0.04)  # one finger open, the other closed
 
 
+@pytest.mark.slow
 def test_a_joint_that_is_fixed_in_one_model_is_named_and_its_effect_bounded() -> None:
     found = urdfkin.same("icub", "icub_reduced")
     assert {one.place for one in found.differences} == {
@@ -168,6 +170,7 @@ FORGED: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("said", FORGED)
 def test_a_forged_certificate_does_not(compared: tuple[Robot, Robot, dict[str, Any]], said: str) -> None:
     a, b, document = compared

@@ -51,6 +51,7 @@ def test_7_128_and_so_does_linear_velocity() -> None:
         assert close(robot(moving.name).velocity(moving.q, moving.v, ENDS[moving.name])[:3], vel, 4.0)
 
 
+@pytest.mark.slow
 def test_7_129_angular_acceleration_gains_a_term_where_a_turning_link_carries_an_axis() -> None:
     alphas = robot("elbow").acceleration(ELBOW.q, ELBOW.v, ELBOW.a, LINKS["elbow"])[:, 3:]
     before = np.zeros(3)

@@ -317,6 +317,7 @@ def test_a_module_with_a_xacro_file_brings_its_arguments(tmp_path: Path) -> None
     assert urdfkin.load(module, xacro_args={"tool": "saw"}).link_names == ("base_saw",)
 
 
+@pytest.mark.slow
 def test_without_the_package_its_name_says_what_to_install() -> None:
     code = (
         "import sys\nsys.modules['robot_descriptions'] = None\nimport importlib.util as u\n"

@@ -113,6 +113,7 @@ def test_an_error_of_sixteen_units_in_the_last_place_is_found(monkeypatch: pytes
     assert found["placement"].pinocchio == right["placement"].pinocchio
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_judgement() -> None:
     first, again = (judge(urdfkin.load("polar"), samples=3, seed=4).as_dict() for _ in range(2))
     assert first == again

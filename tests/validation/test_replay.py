@@ -35,6 +35,7 @@ def replayed(report: RobotReport, stdin: str = "") -> int:
     return len(lines)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("root_joint", [None, "planar"])
 def test_every_line_of_a_text_works_with_the_text_on_standard_input(root_joint: str | None) -> None:

@@ -77,6 +77,7 @@ def files(folder: Path) -> list[Path]:
     return sorted((folder / "chunks").glob("*/*"))
 
 
+@pytest.mark.slow
 def test_a_stores_report_is_the_one_of_a_single_run(undisturbed: str, tmp_path: Path) -> None:
     assert numbers(validate(ROBOTS, samples=SAMPLES, store=tmp_path)) == undisturbed
     assert numbers(stored(tmp_path)) == undisturbed

@@ -75,6 +75,7 @@ def off(method: Any) -> Any:
     return lambda *given: method(*given) + 1e-6
 
 
+@pytest.mark.slow
 def test_three_that_agree_are_told_side_by_side_in_every_form() -> None:
     document = document_of()
     robot = document["robots"][0]

@@ -40,6 +40,7 @@ def holds(found: Between, true: list[mpmath.mpf]) -> bool:
     return all(mp.mpf(low) <= x <= mp.mpf(high) for low, x, high in ends)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rows", ROWS)
 @pytest.mark.parametrize(("name", "frame"), [("ur5", "tool0"), ("panda", "panda_hand"), ("polar", "slider")])
 def test_what_the_equations_have_at_fifty_digits_lies_between(name: str, frame: str, rows: str) -> None:

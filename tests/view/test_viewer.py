@@ -52,6 +52,7 @@ def test_it_answers_on_loopback_and_nowhere_else(viewer: Viewer) -> None:
             socket.create_connection((own, port), timeout=2).close()
 
 
+@pytest.mark.slow
 def test_a_slider_moves_its_own_joint_and_the_numbers_are_checked(viewer: Viewer) -> None:
     viewer.set_q(viewer.robot.sample(1, 5)[0])
     before = viewer.q
@@ -112,6 +113,7 @@ def test_each_joint_has_a_rate_of_its_own(viewer: Viewer) -> None:
     viewer.set_rates(np.zeros(6), np.zeros(6))
 
 
+@pytest.mark.slow
 def test_tables_frames_are_seen_through_the_shapes(viewer: Viewer) -> None:
     viewer.dh.value = "modified"
     assert viewer.shapes.value == "see-through"

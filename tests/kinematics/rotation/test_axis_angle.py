@@ -18,6 +18,7 @@ from urdfkin.kinematics.rotation import (
 )
 
 
+@pytest.mark.slow
 @given(axes, angles)
 def test_rotation_about_is_scipys_and_pinocchios(axis: FloatArray, angle: float) -> None:
     R = rotation_about(axis, angle)

@@ -30,6 +30,7 @@ def test_a_product_of_quaternions_is_the_product_of_rotations(
     assert np.abs(rotation_of(multiply(p, q)) - rotation_of(p) @ rotation_of(q)).max() <= 2 * ROUNDING
 
 
+@pytest.mark.slow
 @given(axes, angles)
 def test_the_conjugate_is_the_inverse(axis: FloatArray, angle: float) -> None:
     quat = quaternion_of(rotation_about(axis, angle))

@@ -42,6 +42,7 @@ def test_the_rate_of_a_vector_fixed_in_a_turning_frame_is_its_derivative() -> No
     assert np.abs(turning_vector_rate(w, p_0) - expected).max() <= 8 * ROUNDING
 
 
+@pytest.mark.slow
 @given(axes, angles, vectors3)
 def test_a_turned_skew_matrix_is_the_skew_matrix_of_the_turned_vector(
     k: FloatArray, phi: float, w: FloatArray

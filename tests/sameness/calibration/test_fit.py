@@ -26,6 +26,7 @@ def elsewhere(arm: Bench, at: FloatArray, n: int = 20) -> FloatArray:
     return arm.model.way.poses(values, at)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize(("arm", "tip", "base"), [("ur5", "tool0", "base"), (BRANCHED, "hand", "b")])
 def test_without_noise_the_true_arm_is_found_to_rounding(
@@ -44,6 +45,7 @@ def test_without_noise_the_true_arm_is_found_to_rounding(
     assert np.abs(T - elsewhere(true, found.fitted.at)).max() < 1e-13
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("complete", [True, False])
 def test_the_instrument_and_its_target_may_be_anywhere(complete: bool) -> None:
     true = bench("panda", ("origins",), "panda_hand", "panda_link0", poses=40)

@@ -13,6 +13,7 @@ from urdfkin.sameness.calibration.identify import stacked
 ARMS = {"ur5": ("tool0", "base"), "panda": ("panda_hand", "panda_link0"), BRANCHED: ("hand", "b")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize("arm", ARMS, ids=["ur5", "panda", "branched, up and down"])
 def test_turning_joints_have_four_numbers_sliding_ones_two_and_the_tip_six(arm: str, complete: bool) -> None:
@@ -60,6 +61,7 @@ def test_a_joint_that_never_moved_is_told_of() -> None:
     )
 
 
+@pytest.mark.slow
 def test_poses_that_hardly_excite_a_parameter_are_told_of() -> None:
     arm = bench("ur5", ("origins",), "tool0", "base", poses=40)
     q = arm.q.copy()

@@ -128,6 +128,7 @@ def test_the_drivers_angles_turn_about_x_y_and_z_in_that_order_and_a_urdfs_do_no
     assert 1e-7 < metres < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("prefix", ["", "left_"])
 def test_the_ros_descriptions_urdf_gets_the_files_numbers(prefix: str, file: Path) -> None:
     robot = load(description(prefix))
@@ -167,6 +168,7 @@ def test_the_controllers_own_table_is_taken_as_well() -> None:
     assert np.abs(np.linalg.solve(T[:, 0], T[:, 1]) - controller().placement(q)).max() < ROUNDING
 
 
+@pytest.mark.slow
 def test_a_model_with_other_joints_is_refused() -> None:
     with pytest.raises(InputError, match="not as many coordinates: found 6 and 7"):
         calibrate_like("ur5", "panda", tip="tool0")
@@ -174,6 +176,7 @@ def test_a_model_with_other_joints_is_refused() -> None:
         calibrate_like("ur5", load("ur5").urdf.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -1"/>'))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "words"),
     [

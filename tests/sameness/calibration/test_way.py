@@ -121,6 +121,7 @@ def table(convention: Convention) -> DHTable:
     return DHTable(convention, rows, base=T, tool=inverse(T))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", list(Convention))
 def test_a_tables_columns_are_the_difference_quotients_of_its_product_at_fifty_digits(
     convention: Convention,

@@ -145,6 +145,7 @@ def test_pinocchios_doubles_are_those_that_it_is_asked_for(base: BaseMotion | No
     assert (enclosed.placement.pinocchio == asked.placements(q, [frame], base)[0, 0]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("equation", "term", "quantity"),
     [

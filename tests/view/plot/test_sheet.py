@@ -105,6 +105,7 @@ def test_no_axis_mixes_metres_and_radians(case: Case) -> None:
         np.testing.assert_allclose(np.asarray(axes.lines[0].get_ydata()), np.sqrt(determinant), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_floating_base_is_plotted_with_its_place_and_its_quaternion(tmp_path: Path) -> None:
     robot = urdfkin.load("a1", root_joint="floating")
     x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
