@@ -47,6 +47,7 @@ def _raised(error: Exception) -> None:
     raise error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("question", Question, ids=lambda question: question.value)
 def test_a_message_leads_to_a_section_that_stands_on_the_page(question: Question) -> None:
     for call in ASKED[question]:

@@ -190,6 +190,7 @@ def test_an_odd_name_is_told_in_a_line(name: str) -> None:
 # -- pipes -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_named_pipe_that_nobody_writes_to_is_given_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

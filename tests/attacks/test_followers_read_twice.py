@@ -35,6 +35,7 @@ def chain_of_followers(rules: list[tuple[int, float, float]]) -> str:
 numbers = st.floats(-2.0, 2.0).filter(lambda x: x == 0.0 or abs(x) > 1e-3)
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(data=st.data(), n=st.integers(1, 5))
 def test_chains_of_followers_end_at_the_same_joint_with_the_same_rule(data: st.DataObject, n: int) -> None:

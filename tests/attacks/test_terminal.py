@@ -186,6 +186,7 @@ def test_each_name_alone_adds_no_line(kind: str, tmp_path: Path, monkeypatch: py
     assert lines[0] == lines[1]
 
 
+@pytest.mark.slow
 def test_machine_formats_say_the_names_as_they_are(files: dict[str, str]) -> None:
     names = [f"{name} " for name in IN_XML.values()]
     assert set(names) <= {

@@ -53,11 +53,13 @@ def test_a_warning_exits_0_and_1_when_strict(folder: Path) -> None:
     assert (done.returncode, "URDF405 error" in done.stdout) == (1, True)
 
 
+@pytest.mark.slow
 def test_an_ignored_code_does_not_count(folder: Path) -> None:
     done = urdfkin("check", "--ignore", "URDF402", "bad.urdf", cwd=folder)
     assert (done.returncode, done.stdout) == (0, "no findings in 1 file\n")
 
 
+@pytest.mark.slow
 def test_a_missing_file_exits_2_and_the_others_are_checked(folder: Path) -> None:
     done = urdfkin("check", "nowhere.urdf", "bad.urdf", cwd=folder)
     assert done.returncode == 2

@@ -53,6 +53,7 @@ def test_every_form_is_written(form: str, tmp_path: Path) -> None:
     assert "ur5" in file.read_text()
 
 
+@pytest.mark.slow
 def test_a_written_table_is_taken_back_and_converted(tmp_path: Path) -> None:
     file = tmp_path / "arm.toml"
     run(*UR5, "--snap", "1e-6", "--format", "toml", "-o", str(file))

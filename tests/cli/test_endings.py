@@ -40,6 +40,7 @@ def test_a_breakdown_goes_by_the_ending_too(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "parts.json").read_text())["quantity"] == "acceleration breakdown"
 
 
+@pytest.mark.slow
 def test_a_table_goes_by_the_ending_too(tmp_path: Path) -> None:
     for ending in ("toml", "json", "csv", "urdf", "tex", "md", "c", "py", "m"):
         assert urdfkin("dh", "elbow", "-o", str(tmp_path / f"t.{ending}")).code == 0

@@ -52,6 +52,7 @@ def elbow() -> str:
     return (robots_dir() / "elbow.urdf").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", commands())
 def test_every_command_has_help_with_an_example_of_itself(command: str) -> None:
     done = urdfkin(command, "--help")

@@ -66,6 +66,7 @@ def test_so_does_the_command_that_explains_what_it_found(tmp_path: Path) -> None
     assert bare("explain", "URDF411").returncode == 0
 
 
+@pytest.mark.slow
 def test_a_command_that_needs_more_says_so() -> None:
     done = bare("placement", ROBOT)
     assert done.returncode == 2

@@ -77,6 +77,7 @@ def test_options_that_do_not_go_together_are_refused(
     assert said in done.err
 
 
+@pytest.mark.slow
 def test_a_shard_says_what_it_came_to_and_what_comes_next(tmp_path: Path) -> None:
     where = str(tmp_path / "s")
     words = ("validate", "planar_two_link", "double_pendulum", "--samples", "0", "--store", where)

@@ -141,6 +141,7 @@ def test_an_unwritable_report_spoils_no_file_that_is_there(tmp_path: Path) -> No
     assert there.read_text() == "old"
 
 
+@pytest.mark.slow
 def test_plot_says_what_was_checked(tmp_path: Path) -> None:
     done = urdfkin(
         "plot", "ur5", "--to", "random", "--samples", "11", "--panel", "position", "-o", tmp_path / "a.png"

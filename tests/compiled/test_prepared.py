@@ -115,6 +115,7 @@ GIVEN: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", GIVEN)
 @pytest.mark.parametrize("method", METHODS)
 def test_whatever_is_given(panda: Robot, method: str, given: str) -> None:

@@ -115,6 +115,7 @@ def test_a_frame_that_nothing_moves_has_code_too(to: str, tmp_path: Path) -> Non
     assert check(file(code(still, quantities=("placement",)), to, tmp_path)).good
 
 
+@pytest.mark.slow
 def test_a_file_can_say_so_without_urdfkin(tmp_path: Path) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "numpy", tmp_path)
     assert "urdfkin" not in "".join(

@@ -51,6 +51,7 @@ def assert_converges(error: FloatArray, reach: float, order: int) -> None:
     assert error.min() < 300.0 * reach * EPS ** (2.0 / (2.0 + order))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("name", NAMES)
 def test_the_jacobian_is_the_limit_of_difference_quotients_of_second_order(name: str, seed: int) -> None:

@@ -85,6 +85,7 @@ def test_it_is_the_difference_quotient_of_the_jacobian_at_fifty_digits(
     assert np.abs(ours - found.astype(float)).max() < 100.0 * EPS * size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reference", Reference)
 @pytest.mark.parametrize("name", NAMES)
 def test_summed_over_the_rates_it_is_the_jacobians_rate(name: str, reference: Reference) -> None:

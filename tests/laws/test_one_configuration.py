@@ -103,6 +103,7 @@ def test_planar_floating_and_following_joints(floating: bool) -> None:
     assert list(faults(robot, robot.tip_frame, *state(robot, SAMPLES, 3))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("branches", "joints"), [(2, 4), (3, 8), (5, 7), (4, 17)])
 def test_each_tip_of_a_tree_though_it_needs_only_some_of_the_coordinates(branches: int, joints: int) -> None:
     robot = broom(branches, joints)

@@ -26,6 +26,7 @@ def schema() -> Any:
     return json.loads(text)
 
 
+@pytest.mark.slow
 def test_sarif_keeps_to_the_official_schema(findings: list[Finding], schema: Any) -> None:
     log = json.loads(as_sarif(findings, "1.2.3"))
     jsonschema.Draft4Validator(schema).validate(log)

@@ -57,6 +57,7 @@ def test_what_pinocchio_refuses_is_found_and_what_is_marked_it_refuses(kind: str
             assert marked or refused, (limit, [str(finding) for finding in findings])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FURTHER_LIMITS)
 @pytest.mark.parametrize("value", ["-1", "inf", "nan", "", "fast"])
 @pytest.mark.parametrize("kind", KINDS)

@@ -64,6 +64,7 @@ WORSE: list[tuple[Callable[[Any], None], str]] = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("spoil", "line"), WORSE, ids=[spoil.__name__ for spoil, _ in WORSE])
 def test_what_got_worse_is_a_regression_and_its_return_is_not(
     spoil: Callable[[Any], None], line: str

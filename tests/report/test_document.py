@@ -57,6 +57,7 @@ def test_a_judged_run_keeps_to_the_schema() -> None:
     assert len(document["robots"][0]["judge"]["lines"]) > 5
 
 
+@pytest.mark.slow
 def test_the_schema_describes_everything_that_is_written() -> None:
     strict = copy.deepcopy(schema())
     for part in [strict, *strict["$defs"].values()]:

@@ -66,6 +66,7 @@ def test_nothing_is_told_where_nothing_moved_or_nothing_can_be_told() -> None:
     assert tip_motion(old, gone) is None
 
 
+@pytest.mark.slow
 def test_compare_tells_it_and_what_its_exit_code_means(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,6 +39,7 @@ def test_ready_lies_within_every_limit_of_every_robot() -> None:
     assert {name: lines for name, lines in outside.items() if lines} == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SRDF)
 def test_pinocchio_finds_ready_within_its_limits_and_neutral_outside(name: str) -> None:
     robot = urdfkin.load(name, verify=False)
@@ -52,6 +53,7 @@ def test_pinocchio_finds_ready_within_its_limits_and_neutral_outside(name: str) 
     assert not within("neutral")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SRDF)
 def test_ready_is_the_srdfs_pose(name: str) -> None:
     folder = Path(example_robots_dir()) / catalogue()[name].relative_path.parts[0] / "srdf"

@@ -138,6 +138,7 @@ def test_an_order_that_axes_do_not_allow_is_a_difference() -> None:
     assert not urdfkin.same(gantry("xyz", tilt="0.001"), gantry("xyz", "quill", tilt="0.001"), bounds=False)
 
 
+@pytest.mark.slow
 def test_a_carriage_that_another_joint_carries_is_a_difference() -> None:
     a, b = gantry("xyz"), gantry("yxz")
     named = loaded(b.urdf.replace('"yxz', '"xyz'))

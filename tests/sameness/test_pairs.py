@@ -47,6 +47,7 @@ def test_what_is_not_is_found_out_and_the_joint_named(turn: int) -> None:
 FOLLOWED = ["panda", "pr2", "talos", "baxter"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FOLLOWED)
 def test_a_follower_that_moves_by_a_tenth_more_is_found_out(name: str) -> None:
     found = urdfkin.same(robot(name), changed(name, "other rule") or robot(name), bounds=False)

@@ -64,6 +64,7 @@ def test_what_has_to_be_done_makes_them_move_alike(name: str, what: str) -> None
     assert np.abs(T_a - found.base @ T_b).max() <= 1e-12
 
 
+@pytest.mark.slow
 def test_two_models_differ_whichever_is_called_a() -> None:
     a, b = robot("elbow"), other("elbow", "tilted by 0.001")
     there, back = urdfkin.same(a, b).worst, urdfkin.same(b, a).worst
@@ -108,6 +109,7 @@ def test_another_tool_is_something_to_be_done_not_a_difference() -> None:
     assert (found.exit_code(), found.exit_code(strict=True)) == (0, 1)
 
 
+@pytest.mark.slow
 def test_a_table_is_the_robot_that_it_was_made_of() -> None:
     found = urdfkin.same("ur5", urdfkin.load("ur5").dh("tool0", "base"))
     assert found.differences == ()

@@ -117,6 +117,7 @@ def turning(first: str) -> Any:
     return lambda t: QUARTER * np.eye(3)[order[0] if t < 1.0 else order[1]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("first", "z1_ends_as"), [("x", [0, -1, 0]), ("y", [1, 0, 0])])
 def test_example_7_3_equal_integrals_of_w_end_in_different_orientations(
     first: str, z1_ends_as: list[int]

@@ -33,6 +33,7 @@ def elbow_velocity() -> FloatArray:
 # -- a single joint ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("i", range(1, 7))
 def test_7_62_a_rotary_joint_turns_its_link_about_its_axis(i: int) -> None:
     alone = only(ELBOW, i)
@@ -62,6 +63,7 @@ def test_7_65_with_one_rotary_joint_moving_only_the_normal_turns(i: int) -> None
     assert close(np.cross(w, float(alone.rows[i - 1].a) * alone.x(i)), alone.between_rate(i))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("i", range(1, 7))
 def test_7_66_so_the_interorigin_vector_moves_with_the_joints_angular_velocity(i: int) -> None:
     alone = only(ELBOW, i)

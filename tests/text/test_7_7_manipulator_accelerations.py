@@ -41,6 +41,7 @@ def test_7_127_angular_velocity_goes_from_link_to_link() -> None:
             before = w[i - 1]
 
 
+@pytest.mark.slow
 def test_7_128_and_so_does_linear_velocity() -> None:
     for moving, turning in ((ELBOW, [True] * 6), (POLAR, [True, False])):
         vel = np.zeros(3)

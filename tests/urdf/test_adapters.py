@@ -304,6 +304,7 @@ def test_a_description_that_is_not_there_is_told_and_nothing_else_is_imported(pa
     sys.modules.pop("robot_descriptions")
 
 
+@pytest.mark.slow
 def test_a_module_with_a_xacro_file_brings_its_arguments(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf.xacro"
     path.write_text(

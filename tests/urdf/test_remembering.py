@@ -38,6 +38,7 @@ def same(one: KinematicTree, other: KinematicTree) -> bool:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "talos", "icub", "ur5"])
 def test_the_second_reading_needs_no_parser_and_gives_the_same_tree(
     name: str, monkeypatch: pytest.MonkeyPatch

@@ -210,6 +210,7 @@ def test_it_judges_a_moving_base_too(name: str, root_joint: str | None) -> None:
             assert line.pinocchio.worst < 40.0, line
 
 
+@pytest.mark.slow
 def test_a_base_that_one_side_takes_for_another_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     robot, base = urdfkin.load("ur5"), draw_base(2, np.random.default_rng(1))
     original = recursion_base.BaseMotion.state
@@ -239,6 +240,7 @@ def angles(name: str, R: object) -> list[object]:
     return [mp.atan2(z[1], z[2]), -mp.asin(z[0]), mp.atan2(y[0], x[0])]  # xyz: roll, pitch, yaw
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ZYZ", "xyz", "quaternion"])
 def test_the_analytical_jacobian_at_fifty_digits_is_the_difference_quotient_of_its_numbers(name: str) -> None:
     robot = urdfkin.load("panda")

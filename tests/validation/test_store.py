@@ -96,6 +96,7 @@ def test_what_is_there_is_not_computed_again(
     assert len(ran) == 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "said"),
     [
@@ -225,6 +226,7 @@ def test_no_byte_of_a_chunk_can_be_changed_or_cut_off_unnoticed() -> None:
         read("k", whole + b"\0")
 
 
+@pytest.mark.slow
 def test_a_damaged_store_is_reported_and_made_whole(undisturbed: str, tmp_path: Path) -> None:
     validate(ROBOTS, samples=SAMPLES, store=tmp_path)
     there = files(tmp_path)

@@ -109,6 +109,7 @@ def test_a_slip_in_a_new_row_is_found_and_its_line_computes_it_again(monkeypatch
     assert command(*shlex.split(line)[1:]).code == 1
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("row")
 def test_a_new_row_is_validated_and_stands_in_every_report() -> None:
     report = urdfkin.validate("ur5", samples=4)

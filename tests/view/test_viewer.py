@@ -73,6 +73,7 @@ def shown(viewer: Viewer) -> list[float]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("units", ["radians", "degrees"])
 def test_every_slider_equals_q_however_q_was_set(viewer: Viewer, units: str) -> None:
     viewer.units.value = units

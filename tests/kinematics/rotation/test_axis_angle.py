@@ -43,6 +43,7 @@ def test_log_undoes_exp_also_at_half_a_turn(axis: FloatArray, angle: float) -> N
     assert np.abs(exp_rotation(vector) - R).max() <= ROUNDING
 
 
+@pytest.mark.slow
 @given(axes)
 def test_log_is_pinocchios_log3_away_from_half_a_turn(axis: FloatArray) -> None:
     # Near half a turn Pinocchio's own error grows; there the law above is the test.

@@ -44,6 +44,7 @@ def test_quaternion_rates_are_the_derivative_of_the_quaternion(frame: Literal["f
     assert np.abs(quaternion_rates(quat(t), w, frame) - slope).max() <= ROUNDING / step
 
 
+@pytest.mark.slow
 @given(axes, angles, vectors3)
 def test_angular_velocity_comes_back_and_the_norm_stays(k: FloatArray, phi: float, w: FloatArray) -> None:
     quat = quaternion_of(rotation_about(k, phi))
@@ -60,6 +61,7 @@ def test_the_columns_of_the_rate_matrix_are_perpendicular_and_half_long(k: Float
     assert np.abs(E.T @ E - np.eye(3) / 4).max() <= ROUNDING
 
 
+@pytest.mark.slow
 @given(axes, angles, vectors3)
 def test_the_body_sees_the_fixed_frames_rates_turned(k: FloatArray, phi: float, w: FloatArray) -> None:
     R = rotation_about(k, phi)

@@ -10,6 +10,7 @@ from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.rotation import skew, unskew
 
 
+@pytest.mark.slow
 @given(vectors3, vectors3)
 def test_the_skew_matrix_times_a_vector_is_the_cross_product(w: FloatArray, p: FloatArray) -> None:
     assert np.abs(skew(w) @ p - np.cross(w, p)).max() <= ROUNDING
