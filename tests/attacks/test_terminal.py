@@ -42,7 +42,7 @@ ROBOT = {
     "dh": [
         *(["--format", form, "--no-mimic"] for form in (*FORMATS, "urdf", "svg")),
         *(["--tree", "--format", form] for form in ("terminal", "markdown", "csv", "json")),
-        ["--flip", FILE], ["--near-parallel", "strict"], ["--compare", "TABLE", "--no-fit"],
+        ["--flip", FILE], ["--near-parallel", "strict"], ["--compare", "TABLE"],
     ],
     "screws": [["--no-mimic", "--format", form] for form in SCREWS] + [["--base", FILE]],
     "calibrate": [[], ["--fit", FILE], ["--poses", FILE], ["--ur", FILE], ["--tip", FILE]],
@@ -278,6 +278,7 @@ def test_what_is_printed_goes_through_the_door() -> None:
         "info.py": ("click.echo()",), "robots.py": ("click.echo()",),
         "explain.py": (
             "click.echo(equation)", "click.echo(answer)", "click.echo(explain(", 'click.echo(f"{rule.id}',
+            'click.echo(f"questions: ',
         ),
         "checked.py": ("click.echo(as_json(", "click.echo(as_sarif("),
         "report.py": ("click.echo(asset(",), "compare.py": ("click.echo(json.dumps(",),

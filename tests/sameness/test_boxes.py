@@ -13,6 +13,7 @@ from urdfkin.sameness.certificate import certificate, recheck
 from urdfkin.sameness.curvature import curvature
 from urdfkin.sameness.judging import Judge
 from urdfkin.sameness.lower import Search
+from urdfkin.sameness.result import Verdict
 from urdfkin.sameness.upper import FINE, behind_first, upper_bounds
 from urdfkin.sameness.variables import variables_of
 
@@ -82,3 +83,16 @@ def test_what_boxes_prove_is_proven_again() -> None:
     assert found.worst.lower == plain.worst.lower
     assert found.worst.upper <= plain.worst.upper
     assert recheck(certificate(found), a, b) == []
+
+
+def test_of_robots_that_nothing_moves_the_distance_is_told_too() -> None:
+    text = (
+        '<robot name="r"><link name="base"/><link name="mount"/>'
+        '<joint name="j" type="fixed"><parent link="base"/><child link="mount"/>'
+        '<origin xyz="0.3 {} 0"/></joint></robot>'
+    )
+    found = urdfkin.same(text.format(0), text.format(0.004))
+    assert found.verdict is Verdict.SAME_AFTER  # as a tool frame it may lie elsewhere; as written it does
+    assert found.worst_as_written is not None
+    assert found.worst_as_written.lower == pytest.approx(0.004, rel=1e-9)
+    assert 0.004 <= found.worst_as_written.upper <= 0.00402

@@ -6,9 +6,11 @@ import click
 
 from urdfkin.cli.completing import complete_topic
 from urdfkin.cli.questions import answers
+from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.lint.explain import explain
 from urdfkin.lint.pages import OF_MJCF, RULES, find_rule, page
+from urdfkin.lint.rule import Rule
 
 
 @click.command("explain")
@@ -17,8 +19,8 @@ def command(topic: str | None) -> None:
     """Explain a code: why it matters, a bad and a good example, and what other programs do with it.
 
     CODE is a finding's code or its short name. EQUATION is a number of the chapter: what it says, which
-    function computes it, and what checks it. QUESTION is one that messages lead to. Without any, all codes
-    are listed.
+    function computes it, and what checks it. QUESTION is one that people ask. Without any, all codes and
+    questions are listed.
 
     \b
     Example:
@@ -30,9 +32,19 @@ def command(topic: str | None) -> None:
     if topic is None:
         for rule in (*RULES.values(), *OF_MJCF.values()):
             click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")
+        click.echo(f"questions: {', '.join(answers())}")
     elif (equation := explain_equation(topic)) is not None:
         click.echo(equation)
     elif (answer := answers().get(topic.strip().lower())) is not None:
         click.echo(answer)
     else:
-        click.echo(explain(find_rule(topic)))
+        click.echo(explain(_rule(topic)))
+
+
+def _rule(topic: str) -> Rule:
+    try:
+        return find_rule(topic)
+    except UnknownNameError:
+        rules = (*RULES.values(), *OF_MJCF.values())
+        known = [name for rule in rules for name in (rule.id, rule.slug)]
+        raise UnknownNameError("code, equation or question", topic, [*known, *answers()]) from None

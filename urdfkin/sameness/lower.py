@@ -195,7 +195,8 @@ class Search:
 
     def _own(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
         """(frames, starts, values) distances of each frame at values of its own, with variables last."""
-        off = self.metres(z.reshape(-1, z.shape[-1]), frames).reshape(*z.shape[:-1], len(frames))
+        flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # of robots that nothing moves, too
+        off = self.metres(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
         return np.asarray(off[n, :, :, n])
 
