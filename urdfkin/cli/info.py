@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -13,12 +12,11 @@ import click
 from urdfkin.cli.arguments import load_robot, robot_argument
 
 if TYPE_CHECKING:
-    from urdfkin.model.tree import Joint, KinematicTree
+    from urdfkin.model.tree import KinematicTree
     from urdfkin.robot import Robot
 
 EXAMPLE = "urdfkin info panda"
 
-_COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "follows")
 #: How a link hangs from one with several children: (guide of itself, guide of what is below) while more of
 #: them come, then of the last. A terminal that knows no lines gets the second pair of pairs.
 _GUIDES = {False: (("├ ", "│ "), ("└ ", "  ")), True: (("+ ", "| "), ("` ", "  "))}
@@ -46,6 +44,7 @@ def command(robot: str, mimic: bool | None, root_joint: str | None, format_: str
 
 def _print(robot: Robot) -> None:
     from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
+    from urdfkin.model.described import COLUMNS, cells_of  # noqa: PLC0415
     from urdfkin.report.listing import fits, make_table, print_named  # noqa: PLC0415
 
     tree, out = robot.tree, console()
@@ -56,8 +55,8 @@ def _print(robot: Robot) -> None:
     hung = [
         guide + link for guide, link in zip(guides(tree, out.options.ascii_only), tree.links, strict=True)
     ]
-    details = [_details(robot, i) for i in range(len(tree.joints))]
-    columns = _COLUMNS if any(joint.mimic for joint in tree.joints) else _COLUMNS[:-1]
+    details = [cells_of(tree, i) for i in range(len(tree.joints))]
+    columns = COLUMNS if any(joint.mimic for joint in tree.joints) else COLUMNS[:-1]
     empty = ("",) * len(columns)
     rows = [(hung[0], "", *empty)]
     for joint, link, cells in zip(tree.joints, hung[1:], details, strict=True):
@@ -85,43 +84,6 @@ def guides(tree: KinematicTree, ascii_only: bool = False) -> Iterator[str]:
         own, behind = ("", "") if children[joint.parent] == 1 else more if left[joint.parent] else last
         yield below[joint.parent] + own
         below.append(below[joint.parent] + behind)
-
-
-def _details(robot: Robot, i: int) -> tuple[str, ...]:
-    tree = robot.tree
-    joint = tree.joints[i]
-    if not joint.kind.nv:
-        return (joint.kind.value, *[""] * (len(_COLUMNS) - 1))
-    q, v = _place("q", tree.q_index[i], joint.kind.nq), _place("v", tree.v_index[i], joint.kind.nv)
-    limit = joint.limit
-    limits = ("", "", "") if limit is None else map(_bound, (limit.lower, limit.upper, limit.velocity))
-    return (joint.kind.value, _axis(joint), q, v, *limits, _follows(joint))
-
-
-def _place(letter: str, at: int, count: int) -> str:
-    return f"{letter}[{at}]" if count == 1 else f"{letter}[{at}:{at + count}]"
-
-
-def _axis(joint: Joint) -> str:
-    """`z`, `-x`, or the three numbers where it is none of the frame's own axes."""
-    if not joint.kind.has_axis:
-        return ""
-    numbers = joint.axis.tolist()
-    if sorted(map(abs, numbers)) == [0.0, 0.0, 1.0]:
-        k = next(k for k, x in enumerate(numbers) if x)
-        return f"{'-' if numbers[k] < 0.0 else ''}{'xyz'[k]}"
-    return " ".join(f"{x:.4g}" for x in numbers)
-
-
-def _follows(joint: Joint) -> str:
-    if joint.mimic is None:
-        return ""
-    leader, factor, offset = joint.mimic.leader, joint.mimic.multiplier, joint.mimic.offset
-    return (f"{factor:g} * " if factor != 1.0 else "") + leader + (f" {offset:+g}" if offset else "")
-
-
-def _bound(value: float) -> str:
-    return "" if math.isinf(value) else f"{value:.6g}"
 
 
 def _order(robot: Robot) -> str:
