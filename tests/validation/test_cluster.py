@@ -11,11 +11,14 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import psutil
 import pytest
 from distributed import Client
+from distributed.comm.core import CommClosedError
 
 from tests.validation.test_store import numbers
 from urdfkin.errors import InputError
@@ -206,3 +209,15 @@ def test_a_lost_scheduler_loses_nothing_that_the_store_holds(undisturbed: str, t
     assert "the scheduler is lost" in str(report.robots[-1].reason)
     assert "give the same command to go on" in str(report.robots[-1].reason)
     assert numbers(validate(ROBOTS, samples=SAMPLES, store=tmp_path / "s")) == undisturbed
+
+
+def test_a_scheduler_that_goes_while_a_result_is_on_its_way_is_lost() -> None:
+    class Gone:
+        status = "finished"
+
+        def result(self) -> None:
+            raise CommClosedError("reset by peer")
+
+    there: Any = Cluster(SimpleNamespace(status="running", scheduler=None))  # type: ignore[arg-type]
+    with pytest.raises(ClusterError, match="the scheduler is lost"):
+        there._found(Gone(), None)
