@@ -42,6 +42,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
 from urdfkin.system.asking import ask
 from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.joint_order import order_words
 from urdfkin.urdf.origin import Origin
 from urdfkin.verify.bounds import nearest_singularity
 from urdfkin.verify.call import Call
@@ -132,7 +133,8 @@ class Robot(Shown):
         return [name for name in super().__dir__() if name not in _INSIDE]
 
     def _sheet(self) -> Sheet:
-        return described(self.tree, self.base_frame, self.tip_frame)
+        order = order_words(self.urdf, self.joint_names)
+        return described(self.tree, self.base_frame, self.tip_frame, order)
 
     def view(self, q: Given = "ready", *, height: int = 480) -> Any:
         """The robot in three dimensions, with a slider for each joint, in a notebook's cell.

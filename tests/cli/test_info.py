@@ -7,7 +7,7 @@ import pytest
 
 import urdfkin as library
 from tests.cli.running import urdfkin
-from urdfkin.cli.info import guides
+from urdfkin.model.described import guides
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, Mimic, build_tree
 from urdfkin.urdf.writer import to_urdf
 
@@ -76,7 +76,7 @@ def test_a_file_with_another_order_is_told_with_the_first_joint_that_differs() -
     urdf = to_urdf(forked())
     assert urdfkin("info", urdf).text.splitlines()[-1].endswith("the file has the same")
     swapped = urdf.replace('joint name="a"', 'joint name="z"')  # its place in the file stays, ours moves
-    assert urdfkin("info", swapped).text.splitlines()[-1].endswith("differs: z is number 1 there, b here")
+    assert "differs: z is number 1 there, b here; " in urdfkin("info", swapped).text.splitlines()[-1]
     # A root joint stands in no file.
     assert urdfkin("info", urdf, "--root-joint", "planar").text.splitlines()[-1].endswith("has the same")
 
@@ -89,3 +89,20 @@ def test_a_joint_of_several_numbers_shows_where_all_of_them_are() -> None:
 
 def test_the_last_links_are_named_as_tips() -> None:
     assert "; tips: D, F, B" in urdfkin("info", to_urdf(forked())).text
+
+
+@pytest.mark.parametrize("name", ["panda", "a1"])
+def test_print_shows_a_robot_as_info_does(name: str) -> None:
+    shown = [line.split() for line in str(library.load(name, verify=False)).splitlines()]
+    told = [line.split() for line in urdfkin("info", name).text.splitlines()]
+    assert [line for line in told if "─" not in line[0]] == [line for line in shown if "--" not in line[0]]
+
+
+def test_a_tree_keeps_its_lines_in_every_form() -> None:
+    robot = library.load(to_urdf(forked()), verify=False)
+    assert "\n│ ├ D " in str(robot)
+    assert "\n│   F " in str(robot)
+    assert '<td style="text-align:left;white-space:pre;padding:0 .5em">│   F</td>' in robot._repr_html_()
+    assert "\n| │&nbsp;&nbsp;&nbsp;F | f |" in robot._repr_markdown_()
+    assert "\n|~~~F & f &" in robot._repr_latex_()
+    assert not set("├│└") & set(robot._repr_latex_())

@@ -12,12 +12,23 @@ class Question(Enum):
     `urdfkin explain mimic-joints` says more
     """
 
+    REFERENCE_FRAMES = "reference-frames"
+    TWO_ACCELERATIONS = "two-accelerations"
+    JOINT_ORDER = "joint-order"
     CONTINUOUS_JOINTS = "continuous-joints"
     MIMIC_JOINTS = "mimic-joints"
-    REFERENCE_FRAMES = "reference-frames"
+    PACKAGES_AND_MESHES = "packages-and-meshes"
+    URDF_TO_DH = "urdf-to-dh"
     WHICH_DH_CONVENTION = "which-dh-convention"
+    DH_AND_URDF_DISAGREE = "dh-and-urdf-disagree"
+    UNKNOWN_FRAMES = "unknown-frames"
+    ROW_ORDER = "row-order"
+    FIXED_JOINTS = "fixed-joints"
     WRONG_PINOCCHIO = "the-wrong-pinocchio"
+    AXES = "axes-that-are-not-unit-vectors"
     XACRO = "xacro-without-ros"
+    GRAVITY = "gravity-in-an-acceleration"
+    FLOATING_BASES = "floating-bases"
 
     def __str__(self) -> str:
         return f"`urdfkin explain {self.value}` says more"

@@ -6,12 +6,15 @@ may hold anything: each form makes them harmless in its own way.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from html import escape
 
 from urdfkin.errors.printable import latex_text, markdown_text, printable
 
+#: What a tree is drawn with before its parts, and in ASCII.
+LINES = "├│└ "
+ASCII = str.maketrans("├│└", "+|`")
 #: What is less than this share of a table's largest number is rounding, and shown as 0.
 _NOISE = 1e-15
 
@@ -23,16 +26,26 @@ class Table:
     Attributes:
         heads: What the columns are called.
         rows: A cell for each; numbers are shown at six digits.
-        left: How many of the first columns hold words.
+        left: How many of the first columns hold words, or which; blanks before these are kept.
     """
 
     heads: Sequence[str]
     rows: Sequence[Sequence[str | float]]
-    left: int = 1
+    left: int | Collection[int] = 1
+
+    def _left(self, i: int) -> bool:
+        return i < self.left if isinstance(self.left, int) else i in self.left
 
     def _cells(self) -> list[list[str]]:
         largest = max((abs(x) for row in self.rows for x in row if not isinstance(x, str)), default=0.0)
         return [[x if isinstance(x, str) else _number(x, _NOISE * largest) for x in row] for row in self.rows]
+
+    def _drawn(self) -> list[list[tuple[str, str]]]:
+        """Each cell, the heads' too, as the lines of a tree before it and its words."""
+        return [
+            [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(LINES),)]
+            for row in (self.heads, *self._cells())
+        ]
 
     def text(self) -> str:
         """Columns side by side."""
@@ -40,7 +53,7 @@ class Table:
         widths = [max(map(len, column)) for column in zip(*body, strict=True)]
         lines = [
             "  ".join(
-                cell.ljust(width) if i < self.left else cell.rjust(width)
+                cell.ljust(width) if self._left(i) else cell.rjust(width)
                 for i, (cell, width) in enumerate(zip(row, widths, strict=True))
             ).rstrip()
             for row in body
@@ -49,15 +62,18 @@ class Table:
 
     def markdown(self) -> str:
         """A table of Markdown."""
-        marks = [":---" if i < self.left else "---:" for i in range(len(self.heads))]
-        rows = [[markdown_text(cell) for cell in row] for row in (self.heads, *self._cells())]
+        marks = [":---" if self._left(i) else "---:" for i in range(len(self.heads))]
+        rows = [
+            [lines.replace(" ", "&nbsp;") + markdown_text(words) for lines, words in row]
+            for row in self._drawn()
+        ]
         return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], marks, *rows[1:]))
 
     def html(self) -> str:
         """A table of HTML, which is styled by where it stands."""
 
         def row(cells: Sequence[str], tag: str) -> str:
-            sides = ("left" if i < self.left else "right" for i in range(len(cells)))
+            sides = ("left;white-space:pre" if self._left(i) else "right" for i in range(len(cells)))
             cells = [
                 f'<{tag} style="text-align:{side};padding:0 .5em">{_html(c)}</{tag}>'
                 for c, side in zip(cells, sides, strict=True)
@@ -69,8 +85,12 @@ class Table:
 
     def latex(self) -> str:
         """A tabular with booktabs."""
-        sides = "l" * self.left + "r" * (len(self.heads) - self.left)
-        rows = [" & ".join(map(latex_text, row)) + r" \\" for row in (self.heads, *self._cells())]
+        sides = "".join("l" if self._left(i) else "r" for i in range(len(self.heads)))
+        rows = [
+            " & ".join(lines.translate(ASCII).replace(" ", "~") + latex_text(words) for lines, words in row)
+            + r" \\"
+            for row in self._drawn()
+        ]
         lines = [
             rf"\begin{{tabular}}{{{sides}}}",
             r"\toprule",
