@@ -76,8 +76,9 @@ def test_compare_tells_it_and_what_its_exit_code_means(
         assert urdfkin("validate", "arm.urdf", "--samples", "1", "--json", f"{name}.json").code == 0
     done = urdfkin("compare", "old.json", "new.json")
     assert done.code == 0
-    assert "arm.urdf: joint turn, axis: [0.0 0.0 1.0] -> [0.0 0.0 -1.0]" in done.text
-    assert "arm.urdf: joint end, placement: " in done.text
+    assert "arm.urdf: joint turn, axis: z -> -z, turned by 3.142 rad" in done.text
+    assert 'arm.urdf: joint end, origin: xyz="1.0 0.0 0.0"' in done.text
+    assert ' -> xyz="1.1 0.0 0.0" rpy="0.0 0.0 0.0": 100 mm away, turned by 0 rad' in done.text
     assert "where it was -> up to 2." in done.text
     assert done.text.splitlines()[-1].startswith("no regression, ")
     assert "exit 0: changes alone do not fail, a regression would (1)" in done.text

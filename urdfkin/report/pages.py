@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from urdfkin.dh.units import Units as DisplayUnits
+from urdfkin.model.described import axis_words
 from urdfkin.report.document import Chain, Check, Joint, Judgement, Limit, Model, Robot, Row, Units
 from urdfkin.report.words import (
     SIDES,
@@ -84,7 +85,7 @@ def joint_rows(model: Model) -> list[dict[str, Any]]:
             "parent": joint["parent"],
             "child": joint["child"],
             "q": _coordinate(joint),
-            "axis": _axis(joint),
+            "axis": axis_words(joint["axis"]) if joint["axis"] else "",
             **_limits(joint["limit"], joint["kind"]),
         }
         for joint in model["joints"]
@@ -101,17 +102,6 @@ def _coordinate(joint: Joint) -> str:
         return place
     offset = f" {mimic['offset']:+g}" if mimic["offset"] else ""
     return f"{mimic['multiplier']:g} {place}{offset}"
-
-
-def _axis(joint: Joint) -> str:
-    """The axis by its letter where it is one, else its numbers."""
-    axis = joint["axis"]
-    if axis is None:
-        return ""
-    for letter, k in zip("xyz", range(3), strict=True):
-        if abs(axis[k]) == 1.0:
-            return ("-" if axis[k] < 0 else "+") + letter
-    return ", ".join(f"{x:.4g}" for x in axis)
 
 
 def _limits(limit: Limit | None, kind: str) -> dict[str, str]:

@@ -15,6 +15,7 @@ from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic
 from urdfkin.report.document import Joint as JointData
 from urdfkin.report.document import Model
+from urdfkin.sameness.result import angle, length
 
 #: Configurations, the one at zero first.
 _SAMPLES = 200
@@ -39,7 +40,8 @@ class TipMotion:
     radians: float
 
     def __str__(self) -> str:
-        return f"up to {self.metres:.3g} m and {self.radians:.3g} rad away, on {_SAMPLES} configurations"
+        off = f"{length(self.metres)} and {angle(self.radians)}"
+        return f"up to {off} away, on {_SAMPLES} configurations"
 
 
 def tip_motion(old: Model | None, new: Model | None) -> TipMotion | None:
