@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from urdfkin.errors import SourceError
 from urdfkin.urdf.sources import MOST, read_source
 
 MOST_HERE = 1000
@@ -46,3 +47,17 @@ def test_a_robot_of_the_catalogue_is_read_no_further_either() -> None:
 def test_a_device_that_never_ends_is_read_up_to_what_is_allowed() -> None:
     assert len(read_source(Path("/dev/zero"), MOST_HERE).data) == MOST_HERE + 1
     assert MOST == 100_000_000
+
+
+def test_an_address_in_a_package_leads_to_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "arm_description"
+    (package / "urdf").mkdir(parents=True)
+    (package / "urdf" / "arm.urdf").write_text("<robot/>")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    read = read_source("package://arm_description/urdf/arm.urdf")
+    assert (read.data, read.source) == (b"<robot/>", str(package / "urdf" / "arm.urdf"))
+
+
+def test_a_package_that_is_nowhere_is_called_as_it_was_written() -> None:
+    with pytest.raises(SourceError, match=r"^package://nowhere/arm.urdf: the package 'nowhere' is"):
+        read_source("package://nowhere/arm.urdf")

@@ -16,6 +16,7 @@ from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.numbers import Whole
 from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.numerals import whole
+from urdfkin.errors.questions import Question
 from urdfkin.system.files import read_standard_input, read_text
 
 if TYPE_CHECKING:
@@ -99,9 +100,22 @@ path_options = together(
     frame_name("--base", "A link or joint. Default: the robot's base frame."),
     frame_name("--tip", "A link or joint. Default: the robot's tip."),
 )
+
+
+class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # generic from click 8.2 on
+    """A reference frame by its name; for another word, the answer to what they mean."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The name as it is written here."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter as error:
+            self.fail(f"{error.message.rstrip('.')}; {Question.REFERENCE_FRAMES}", param, ctx)
+
+
 reference_option = click.option(
     "--reference",
-    type=click.Choice(REFERENCES, case_sensitive=False),
+    type=_ReferenceName(REFERENCES, case_sensitive=False),
     default="local_world_aligned",
     show_default=True,
     help="Pinocchio's reference frames.",

@@ -170,7 +170,7 @@ def command(
     has them unless --snap makes angles round; the table then says by how much the tip moves at most.
     ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
     .tsv, .md, .tex, .txt), which is written as it stands, in the convention asked for; options that choose
-    rows have it derived anew, from the robot that it describes.
+    rows have it derived anew, from the robot that it describes. `urdfkin explain urdf-to-dh` says more.
 
     Exit 0: verified, or the compared table agrees. 1: a disagreement. 2: bad input. 3: not checked, or a
     strict table that loses more to rounding than the robot itself.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from urdfkin.cli.completing import complete_topic
-from urdfkin.cli.questions import answers
+from urdfkin.cli.questions import answer, answers
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.lint.explain import explain
@@ -19,8 +19,8 @@ def command(topic: str | None) -> None:
     """Explain a code: why it matters, a bad and a good example, and what other programs do with it.
 
     CODE is a finding's code or its short name. EQUATION is a number of the chapter: what it says, which
-    function computes it, and what checks it. QUESTION is one that people ask. Without any, all codes and
-    questions are listed.
+    function computes it, and what checks it. QUESTION is one that people ask, or a word of it. Without any,
+    all codes and questions are listed.
 
     \b
     Example:
@@ -30,21 +30,23 @@ def command(topic: str | None) -> None:
       urdfkin explain reference-frames
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
     if topic is None:
-        for rule in (*RULES.values(), *OF_MJCF.values()):
-            click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")
+        for one in (*RULES.values(), *OF_MJCF.values()):
+            click.echo(f"{one.id}  {one.severity.value:7}  {one.slug:26}  {page(one.id).title}")
         click.echo(f"questions: {', '.join(answers())}")
     elif (equation := explain_equation(topic)) is not None:
         click.echo(equation)
-    elif (answer := answers().get(topic.strip().lower())) is not None:
-        click.echo(answer)
+    elif (rule := _rule(topic)) is not None:
+        click.echo(explain(rule))
+    elif (found := answer(topic)) is not None:
+        click.echo(found)
     else:
-        click.echo(explain(_rule(topic)))
+        rules = (*RULES.values(), *OF_MJCF.values())
+        known = [name for one in rules for name in (one.id, one.slug)]
+        raise UnknownNameError("code, equation or question", topic, [*known, *answers()])
 
 
-def _rule(topic: str) -> Rule:
+def _rule(topic: str) -> Rule | None:
     try:
         return find_rule(topic)
     except UnknownNameError:
-        rules = (*RULES.values(), *OF_MJCF.values())
-        known = [name for rule in rules for name in (rule.id, rule.slug)]
-        raise UnknownNameError("code, equation or question", topic, [*known, *answers()]) from None
+        return None

@@ -78,7 +78,7 @@ def command(
     sensor at rest reads 9.81 upwards; and the angular velocity, rad/s. For one configuration --q with its
     rates --v and their rates --a, for batches of them, or along a --trajectory. A base that moves is said by
     --base-velocity and the like, stands in the .npz file, or is --root-joint floating, whose pose is then
-    among the coordinates.
+    among the coordinates. `urdfkin explain gravity-in-an-acceleration` says more.
     """
     from urdfkin.motion.columns import numbers  # noqa: PLC0415  keeps --help fast
 

@@ -16,6 +16,13 @@ def answers() -> dict[str, str]:
     return {anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in sections}
 
 
+def answer(topic: str) -> str | None:
+    """The section of an anchor, or of words that one anchor alone has."""
+    known, words = answers(), set(topic.lower().replace("-", " ").split())
+    found = [name for name in known if words and words <= set(name.split("-"))]
+    return known.get("-".join(topic.lower().split())) or (known[found[0]] if len(found) == 1 else None)
+
+
 def anchor(heading: str) -> str:
     """What a heading is called in an address."""
     return re.sub(r"[^a-z0-9 -]", "", heading.lower()).replace(" ", "-")

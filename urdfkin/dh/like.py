@@ -20,6 +20,7 @@ from urdfkin.dh.derive import Choices, derive
 from urdfkin.dh.row import Convention
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
+from urdfkin.errors.questions import Question
 from urdfkin.model.chain import FrameChain
 
 #: Of the reach, or radians: cells that differ by more are another robot's; zeros that do are other zeros.
@@ -64,6 +65,7 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
             found=f"cells that differ by {best[0]:.0%} of the reach, or so many radians",
             remedy="hold it against the URDF with --compare, which says what differs",
+            question=Question.DH_AND_URDF_DISAGREE,
         )
     return flip
 

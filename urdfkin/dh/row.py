@@ -30,7 +30,8 @@ def convention_of(name: str) -> Convention:
         raise InputError(
             "unknown convention",
             found=repr(name),
-            remedy=f"say 'standard' or 'modified'; {Question.WHICH_DH_CONVENTION}",
+            remedy="say 'standard' or 'modified'",
+            question=Question.WHICH_DH_CONVENTION,
         ) from None
 
 

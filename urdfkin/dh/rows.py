@@ -111,8 +111,8 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
     if "convention" not in data:
         raise InputError(
             "the table does not say its convention",
-            remedy="write convention = 'standard' or 'modified', in a sheet a line `convention: standard`;"
-            f" {Question.WHICH_DH_CONVENTION}",
+            remedy="write convention = 'standard' or 'modified', in a sheet a line `convention: standard`",
+            question=Question.WHICH_DH_CONVENTION,
         )
     for key in data:
         if key not in _TABLE_KEYS and key not in NOTES:

@@ -24,26 +24,36 @@ class UrdfkinError(Exception):
         where: File, line, frame, sample: whatever locates it; None when there is no place.
         found: The offending value, as the user wrote it.
         remedy: What to do.
+        question: What people ask who see this; the message ends with the command that answers it.
         is_disagreement: Whether it is urdfkin and Pinocchio that disagree, not the input that is wrong.
     """
 
     is_disagreement = False
 
     def __init__(
-        self, what: str, *, where: str | None = None, found: str | None = None, remedy: str | None = None
+        self,
+        what: str,
+        *,
+        where: str | None = None,
+        found: str | None = None,
+        remedy: str | None = None,
+        question: Question | None = None,
     ) -> None:
         super().__init__(what)
         self.what = what
         self.where = where
         self.found = found
         self.remedy = remedy
+        self.question = question
 
     def __str__(self) -> str:
         place = f"{self.where}: " if self.where else ""
         found = f": found {self.found}" if self.found else ""
         remedy = f"; {self.remedy}" if self.remedy else ""
+        apart = " " if remedy.endswith("?") else "; "
+        question = f"{apart}{self.question}" if self.question else ""
         # Names and files are in it: none of them may add a line or act on a terminal.
-        return printable(f"{place}{self.what}{found}{remedy}")
+        return printable(f"{place}{self.what}{found}{remedy}{question}")
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
         # Errors cross process borders in `validate --jobs`; the default would lose the keyword fields.
@@ -94,9 +104,7 @@ class UnknownNameError(UrdfkinError, LookupError):
             remedy = f"there are {len(names)}: {', '.join(names[:6])}{', ...' if len(names) > 6 else ''}"
         else:
             remedy = "there are none"
-        if question is not None:
-            remedy = f"{remedy}; {question}"
-        super().__init__(f"unknown {kind} {name!r}", where=where, remedy=remedy)
+        super().__init__(f"unknown {kind} {name!r}", where=where, remedy=remedy, question=question)
         self.name = name
         self.nearest = tuple(close)
 

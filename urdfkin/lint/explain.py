@@ -29,6 +29,8 @@ def explain(rule: Rule, width: int = 88) -> str:
                 "Because of this, urdfkin computes the robot and reports every result as not verified.", width
             )
         )
+    if said.question is not None:
+        paragraphs.append(f"{said.question}.")
     return "\n\n".join(paragraphs)
 
 

@@ -1,8 +1,8 @@
 """Every rule by its code, and its page, read from the TOML file beside the rule's module when asked for.
 
-A topic is a module of `lint.rules` and the file of its name. At the top of the file stand `cure` and `others`
-for pages without their own, and `parts`: what `{name}` means in an example, a text or [text, times] (in the
-text `{i}` counts). Line ends in prose mean nothing.
+A topic is a module of `lint.rules` and the file of its name. At the top of the file stand `cure`, `others`
+and `question` for pages without their own, and `parts`: what `{name}` means in an example, a text or [text,
+times] (in the text `{i}` counts). Line ends in prose mean nothing.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from importlib import resources
 from typing import Any
 
 from urdfkin.errors import UnknownNameError
+from urdfkin.errors.questions import Question
 from urdfkin.lint import rules
 from urdfkin.lint.rule import Rule
 from urdfkin.lint.rules import (
@@ -71,6 +72,7 @@ class Page:
             with a joint or a comment, the links `base` and `tip` are there already.
         cure: The same example, put right.
         others: What Pinocchio (urdfdom) and yourdfpy do with the example.
+        question: What people ask about it, if they do.
     """
 
     title: str
@@ -78,6 +80,7 @@ class Page:
     example: str
     cure: str
     others: str
+    question: Question | None = None
 
 
 def page(code: str) -> Page:
@@ -98,7 +101,8 @@ def topic_pages(topic: str) -> dict[str, Page]:
 def _page(entry: dict[str, Any]) -> Page:
     prose = {key: " ".join(entry[key].split()) for key in ("title", "why", "others")}
     parts = entry.get("parts", {})
-    return Page(**prose, **{key: _written_out(entry[key], parts) for key in ("example", "cure")})
+    texts = {key: _written_out(entry[key], parts) for key in ("example", "cure")}
+    return Page(**prose, **texts, question=Question(entry["question"]) if "question" in entry else None)
 
 
 def _written_out(text: str, parts: dict[str, Any]) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.errors import InputError
+from urdfkin.errors.questions import Question
 from urdfkin.kinematics.rotation.nearest import nearest_rotation
 from urdfkin.model.tree import FloatArray, frozen
 
@@ -41,6 +42,7 @@ class BaseMotion:
                 raise InputError(
                     f"the base's {name} is an array (..., {', '.join(map(str, shape))}) of finite numbers",
                     found=f"shape {array.shape}" if array.shape[-len(shape) :] != shape else "nan or inf",
+                    question=None if name == "placement" else Question.ROW_ORDER,
                 )
             object.__setattr__(self, name, array)
         try:

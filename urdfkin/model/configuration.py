@@ -16,7 +16,7 @@ from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.errors.questions import Question
 from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, unit_quaternions
-from urdfkin.model.given import Given, Places
+from urdfkin.model.given import Given, Instead, Places
 from urdfkin.model.ranges import coordinate_ranges
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, frozen
 
@@ -77,36 +77,44 @@ def places(tree: KinematicTree, what: str) -> Places:
     )
 
 
-def _without_coordinate(tree: KinematicTree) -> dict[str, str]:
+def _without_coordinate(tree: KinematicTree) -> dict[str, Instead]:
     """Joints that have no number of their own, and what to do instead of giving one."""
     return {
-        joint.name: f"it follows {joint.mimic.leader}: give that, or load with mimic=False (--no-mimic)"
+        joint.name: Instead(
+            f"it follows {joint.mimic.leader}: give that, or load with mimic=False (--no-mimic)",
+            Question.MIMIC_JOINTS,
+        )
         if joint.mimic
-        else "it is fixed: leave it out"
+        else Instead("it is fixed: leave it out", Question.FIXED_JOINTS)
         for joint in tree.joints
         if not joint.nv
     }
 
 
-def _other_lengths(tree: KinematicTree, what: str) -> dict[int, str]:
+def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Instead]:
     """Pinocchio's lengths where they differ from ours, and what to do about them."""
     follow = any(joint.mimic for joint in tree.joints)
-    free = "mimic joints follow their leaders: leave them out, or load with mimic=False (--no-mimic)"
+    free = Instead(
+        "mimic joints follow their leaders: leave them out, or load with mimic=False (--no-mimic)",
+        Question.MIMIC_JOINTS,
+    )
     of_followers = sum(joint.kind.nv for joint in tree.joints if joint.mimic)
-    found: dict[int, str] = {}
+    found: dict[int, Instead] = {}
     if what == "q":
         for mimic in (False, True):
             length = _pinocchio_length(tree, mimic=mimic)
             asks = f", mimic={mimic}" if follow else ""
-            found[length] = (
-                f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) gives urdfkin's;"
-                f" {Question.CONTINUOUS_JOINTS}"
+            found[length] = Instead(
+                f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) gives urdfkin's",
+                Question.CONTINUOUS_JOINTS,
             )
         if follow:
             both = found.get(tree.nq + of_followers)
-            found[tree.nq + of_followers] = f"{both}; or {free}" if both else free
+            remedy = f"{both.remedy}; or {free.remedy}" if both else free.remedy
+            found[tree.nq + of_followers] = free._replace(remedy=remedy)
     elif follow:
-        found[tree.nv + of_followers] = f"Pinocchio's {what} has that length: {free}"
+        remedy = f"Pinocchio's {what} has that length: {free.remedy}"
+        found[tree.nv + of_followers] = free._replace(remedy=remedy)
     found.pop(len(_names(tree, what)), None)
     return found
 
@@ -179,10 +187,12 @@ def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
     array, width = floats(value, what), tree.nq if what == "q" else tree.nv
     if array.shape[-1:] != (width,):
         names = ", ".join(_names(tree, what)) or "none, nothing moves"
+        instead = _other_lengths(tree, what).get(array.shape[-1]) if array.ndim else None
         raise InputError(
             f"{what} needs {width} numbers for {tree.name}: {names}",
             found=f"shape {array.shape}",
-            remedy=_other_lengths(tree, what).get(array.shape[-1]) if array.ndim else None,
+            remedy=instead and instead.remedy,
+            question=instead.question if instead else Question.JOINT_ORDER,
         )
     return array
 
@@ -311,6 +321,7 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
             remedy=f"mimic={not mimic} is for one of buildModelFromUrdf(..., mimic={not mimic})"
             if other
             else None,
+            question=Question.MIMIC_JOINTS if other else Question.CONTINUOUS_JOINTS,
         )
     own, followers, at = np.zeros((*q.shape[:-1], tree.nq)), [], 0
     for i, joint in enumerate(tree.joints):
@@ -338,7 +349,7 @@ def _angle_back(joint: Joint, values: FloatArray) -> FloatArray:
             "(cos, sin) must have norm 1",
             where=f"joint {joint.name}",
             found=f"{norm.max():.9g}",
-            remedy=str(Question.CONTINUOUS_JOINTS),
+            question=Question.CONTINUOUS_JOINTS,
         )
     return np.concatenate((values[..., :-2], np.arctan2(sine, cosine)[..., None]), axis=-1)
 
@@ -355,5 +366,6 @@ def _check_follows(joint: Joint, leader: FloatArray, values: FloatArray) -> None
             f"a follower must be {rule.multiplier:g} * {rule.leader} + {rule.offset:g}",
             where=f"joint {joint.name}",
             found=f"it is off by {np.abs(off).max():.3g}",
-            remedy=f"load with mimic=False to move it freely; {Question.MIMIC_JOINTS}",
+            remedy="load with mimic=False to move it freely",
+            question=Question.MIMIC_JOINTS,
         )

@@ -14,8 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from urdfkin.errors import InputError
+from urdfkin.errors.questions import Question
 from urdfkin.model.configuration import numbers
-from urdfkin.model.given import Given, Places
+from urdfkin.model.given import Given, Instead, Places
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, frozen
 
 
@@ -65,7 +66,11 @@ class Coupling:
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
         # A leader that is not on the path may be of any kind.
         own = tuple(map(units.get, self.names))
-        follow = {joint: f"it follows {mimic.leader}: give that" for joint, mimic, _ in rules if mimic}
+        follow = {
+            joint: Instead(f"it follows {mimic.leader}: give that", Question.MIMIC_JOINTS)
+            for joint, mimic, _ in rules
+            if mimic
+        }
         neutral = {"neutral": np.zeros(len(self.names))}
         return Places(what, self.names, own, poses=lambda: neutral, otherwise=lambda: follow)
 

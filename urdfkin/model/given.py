@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,7 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.demands import shown
 from urdfkin.errors.measured import measured
 from urdfkin.errors.numerals import decimal, remedy
+from urdfkin.errors.questions import Question
 from urdfkin.kinematics.inputs import FloatArray, floats
 
 #: What q, v and a may be given as; text counts as an ArrayLike.
@@ -28,6 +30,13 @@ _LISTED = 8
 #: A unit belongs to the number before it, blanks or not.
 _UNIT_APART = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
 _AROUND_SIGNS = re.compile(r" ?([=*/]) ?")
+
+
+class Instead(NamedTuple):
+    """What to do instead of what was given, and the question whose answer says why."""
+
+    remedy: str
+    question: Question
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +58,8 @@ class Places:
     units: tuple[str | None, ...]
     spans: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     poses: Callable[[], Mapping[str, FloatArray]] = dict
-    otherwise: Callable[[], Mapping[str, str]] = dict
-    lengths: Callable[[], Mapping[int, str]] = dict
+    otherwise: Callable[[], Mapping[str, Instead]] = dict
+    lengths: Callable[[], Mapping[int, Instead]] = dict
 
     def read(self, value: str | Mapping[str, ArrayLike], where: str | None = None) -> FloatArray:
         """(..., numbers) that a text or a mapping says.
@@ -100,7 +109,8 @@ keeps: 'neutral, elbow=...'
 
     def _in_order(self, cells: Sequence[str], where: str) -> FloatArray:
         if len(cells) != len(self.names):
-            raise wrong_count(self.names, len(cells), where, self.lengths().get(len(cells)))
+            instead = self.lengths().get(len(cells))
+            raise wrong_count(self.names, len(cells), where, **instead._asdict() if instead else {})
         rows = zip(cells, self.names, self.units, strict=True)
         return np.array([self._number(text, f"{where}, {name}", unit) for text, name, unit in rows], float)
 
@@ -135,13 +145,14 @@ keeps: 'neutral, elbow=...'
         if not isinstance(name, str):
             raise InputError(f"a {kind} is called by its name", where=where, found=shown(name))
         if (instead := self.otherwise().get(name)) is not None:
-            raise InputError(f"{name!r} is no {kind}", where=where, remedy=instead)
+            raise InputError(f"{name!r} is no {kind}", where=where, **instead._asdict())
         if name not in self.spans:
             raise UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
         at, size = self.spans[name]
         x = floats(value, f"{where}, {name}")
         if x.shape[-1:] != (size,):
-            raise wrong_count(self.names[at : at + size], (x.shape or (1,))[-1], f"{where}, {name}")
+            names, count = self.names[at : at + size], (x.shape or (1,))[-1]
+            raise wrong_count(names, count, f"{where}, {name}", question=Question.FLOATING_BASES)
         return {at + k: x[..., k] for k in range(size)}
 
     def _missing(self, missing: Sequence[str], values: Mapping[str, object], where: str) -> InputError:
@@ -180,14 +191,21 @@ keeps: 'neutral, elbow=...'
         return value
 
 
-def wrong_count(names: Sequence[str], count: int, where: str, instead: str | None = None) -> InputError:
+def wrong_count(
+    names: Sequence[str],
+    count: int,
+    where: str,
+    remedy: str | None = None,
+    question: Question = Question.JOINT_ORDER,
+) -> InputError:
     """The error for another count of numbers than there are names."""
     without = f", none for {listed(names[count:])}" if count < len(names) else ""
     return InputError(
         f"{len(names)} numbers are expected ({listed(names) or 'none: nothing moves'})",
         where=where,
         found=f"{count}{without}",
-        remedy=instead,
+        remedy=remedy,
+        question=question,
     )
 
 

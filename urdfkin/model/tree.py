@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.demands import shown
+from urdfkin.errors.questions import Question
 from urdfkin.kinematics.inputs import FloatArray, floats
 from urdfkin.model.frame_names import FrameName, JointFrame, LinkFrame
 
@@ -301,7 +302,9 @@ class KinematicTree:
         if link is None and joint is None:
             meant = self._with_prefix(name)
             if meant is None:
-                raise UnknownNameError("frame", name, self.frame_names, where=self.name)
+                raise UnknownNameError(
+                    "frame", name, self.frame_names, where=self.name, question=Question.UNKNOWN_FRAMES
+                )
             return self._meant(meant)
         if link is not None and joint is not None and link != joint + 1:
             frames = self.link_frames, self.joint_frames

@@ -1,4 +1,4 @@
-"""Where a robot comes from: a path, a catalogue name, URDF text, bytes, an open file, or `-` for stdin."""
+"""Where a robot comes from: a path, `package://...`, a catalogue name, text, bytes, an open file, or `-`."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from typing import IO, TypeGuard
 from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.errors.demands import shown
 from urdfkin.errors.nearest import nearest
+from urdfkin.errors.questions import Question
 from urdfkin.system.files import at_home, exists, read_bytes, read_standard_input
 from urdfkin.urdf.catalogue import Entry, catalogue
+from urdfkin.urdf.packages import find_package, split_uri
 
 #: What `load` and `check` take.
 Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
@@ -59,6 +61,8 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     """
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
         raise InputError("xacro_args are a mapping from names to values", found=shown(xacro_args))
+    if isinstance(source, str) and (address := split_uri(source)) is not None:
+        source = _in_package(*address)
     if is_xacro(source):
         return _expanded(at_home(source), xacro_args or {})
     if xacro_args:
@@ -117,6 +121,19 @@ def _read_word(word: str, most: int) -> Text:
     if os.sep in word or path.suffix or exists(path):
         return _read_file(path, most)
     raise UnknownNameError("robot", word, catalogue(), where="neither a file nor in the catalogue")
+
+
+def _in_package(name: str, path: str) -> Path:
+    """The file of a `package://` address, which the current folder is searched for, too."""
+    folder = find_package(name, Path(path).absolute())
+    if folder is None:
+        raise SourceError(
+            f"the package {name!r} is not found",
+            where=f"package://{name}/{path}",
+            remedy="put its folder into ROS_PACKAGE_PATH, or name the file by its path",
+            question=Question.PACKAGES_AND_MESHES,
+        )
+    return folder / path
 
 
 def _encoded(content: str | bytes, label: str, source: str) -> Text:

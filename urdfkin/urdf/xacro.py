@@ -58,8 +58,8 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         raise XacroError(
             "a .xacro file needs the package xacrodoc",
             where=str(path),
-            remedy='install it with "urdfkin[xacro]", or expand the file with: xacro FILE > robot.urdf;'
-            f" {Question.XACRO}",
+            remedy='install it with "urdfkin[xacro]", or expand the file with: xacro FILE > robot.urdf',
+            question=Question.XACRO,
         )
     command = own_python("from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8"))
     output, status = _ask(command, _request(path.absolute(), arguments, patience), patience)
@@ -78,6 +78,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         remedy="give arguments with --xacro-arg NAME:=VALUE; packages are found by ROS_PACKAGE_PATH,"
         " AMENT_PREFIX_PATH and, if they hold a package.xml, beside the folders above the file; docs/xacro.md"
         " says what a file may do",
+        question=Question.XACRO,
     )
 
 

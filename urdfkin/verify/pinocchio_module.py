@@ -73,8 +73,8 @@ def _impostor(found: Any) -> InstallationError:
         "the module `pinocchio` is not Pinocchio, the library that checks results",
         where=str(file),
         found=what,
-        remedy=f"Pinocchio's package is called pin: {cure}; pip install {_WANTED}; "
-        f"{Question.WRONG_PINOCCHIO}",
+        remedy=f"Pinocchio's package is called pin: {cure}; pip install {_WANTED}",
+        question=Question.WRONG_PINOCCHIO,
     )
 
 

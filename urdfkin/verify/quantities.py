@@ -23,6 +23,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from urdfkin.errors import UnknownNameError
+from urdfkin.errors.questions import Question
 from urdfkin.system.later import later
 
 if TYPE_CHECKING:
@@ -289,7 +290,8 @@ ACCELERATION = Quantity(
     summary="classical acceleration of a frame",
     page="The second derivative of the origin's position in m/s^2 and the angular acceleration in rad/s^2,"
     " for rates --v and their rates --a. Gravity is not in it. With --explain, what each joint contributes:"
-    " transverse, centripetal, Coriolis and sliding parts (eq. 7.125, joint by joint).",
+    " transverse, centripetal, Coriolis and sliding parts (eq. 7.125, joint by joint)."
+    f" {Question.TWO_ACCELERATIONS}, {Question.GRAVITY}.",
     example="urdfkin acceleration panda --q random --v random --a random --explain",
 )
 ANALYTICAL_JACOBIAN = replace(

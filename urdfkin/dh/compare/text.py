@@ -14,6 +14,7 @@ from urdfkin.dh.export.terminal import aligned
 from urdfkin.dh.row import DHRow
 from urdfkin.dh.units import Units
 from urdfkin.errors.printable import printable
+from urdfkin.errors.questions import Question
 
 
 def comparison_text(found: Comparison, units: Units) -> str:
@@ -35,6 +36,8 @@ def comparison_text(found: Comparison, units: Units) -> str:
         rounded = np.round(T / fine) * fine
         if np.abs(rounded - np.eye(4)).max() > fine:
             lines += ["", f"{what} (metres):", *("  " + line for line in pose_lines(rounded, 6))]
+    if not found.agrees:
+        lines += ["", str(Question.DH_AND_URDF_DISAGREE)]
     return "\n".join(map(printable, lines)) + "\n"
 
 
