@@ -19,11 +19,10 @@ def command() -> None:
     Commands and programs compile each kernel when they first need it, some seconds each. XDG_CACHE_HOME says
     where they are kept; kernels of another processor are compiled again. Exit 2: they cannot be kept.
     """
-    from urdfkin.compiled.ahead import load_kernels  # noqa: PLC0415  keeps --help fast
-    from urdfkin.compiled.compiling import cache_folder  # noqa: PLC0415
+    from urdfkin.compiled.compiling import cache_folder  # noqa: PLC0415  keeps --help fast
     from urdfkin.compiled.single import one_configuration  # noqa: PLC0415
     from urdfkin.compiled.telling import listening  # noqa: PLC0415
-    from urdfkin.verify.worst import load_kernel  # noqa: PLC0415
+    from urdfkin.verify.ahead import load_kernels  # noqa: PLC0415
 
     folder = cache_folder()
     if folder is None:
@@ -37,7 +36,6 @@ def command() -> None:
 
     with listening(tell):
         load_kernels()
-        load_kernel()
         _ = one_configuration.compiled
     kept = set(folder.glob("*.kernel"))
     if new := kept - before:

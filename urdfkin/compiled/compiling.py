@@ -66,6 +66,7 @@ compiled = jitted(**_PART)
 # Inputs may be read-only; a writable array converts without a copy. One signature, compiled once.
 NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
+PLACES = types.Array(types.int64, 1, "C", readonly=True)
 SCRATCH = types.Array(types.float64, 1, "C")
 
 #: One kernel after the other, as Numba compiles them anyway. A fork waits for the one that is being compiled:

@@ -25,12 +25,14 @@ _dumps: Any = dumps
 class KeptKernel(_Null):  # type: ignore[misc]
     """Where Numba looks for one function before it compiles it, and leaves it afterwards.
 
-    The folder stands for the sources; a file's name for the function, its arguments and the processor.
+    The folder stands for the sources that all kernels share; a file's name for the function and the file that
+    it is in, which may lie elsewhere, its arguments and the processor.
     `missed` is called where there is nothing of use.
     """
 
     def __init__(self, function: Callable[..., int], folder: Path, missed: Callable[[], None]) -> None:
         self._folder, self._name, self._missed = folder, function_name(function), missed
+        self._source = Path(function.__code__.co_filename).read_bytes()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was kept for these arguments; None where there is nothing of use."""
@@ -50,7 +52,7 @@ class KeptKernel(_Null):  # type: ignore[misc]
             keep(self._place(sig, cres.library.codegen), _dumps(cres._reduce()))
 
     def _place(self, signature: Any, codegen: Any) -> Path:
-        key = repr((signature, codegen.magic_tuple()))
+        key = repr((signature, codegen.magic_tuple(), self._source))
         return self._folder / f"{self._name}.{hashlib.sha256(key.encode()).hexdigest()[:16]}.kernel"
 
 

@@ -131,8 +131,8 @@ class Plan:
                 value.setflags(write=False)
 
     @cached_property
-    def programs(self) -> dict[object, Any]:
-        """What was made of the plan; `program.program_of` keeps it here."""
+    def made(self) -> dict[object, Any]:
+        """What was made of the plan once: programs, the weights of bounds; by whoever made it."""
         return {}
 
     @cached_property

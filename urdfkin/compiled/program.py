@@ -107,9 +107,9 @@ def program_of(plan: Plan, *, turned: bool, columns: bool = False, pairs: bool =
         pairs: Whether their columns are wanted one by one, followers' too, to be paired with each other.
     """
     key = turned, columns, pairs
-    made: Program | None = plan.programs.get(key)
+    made: Program | None = plan.made.get(key)
     if made is None:
-        made = plan.programs[key] = _Writer(plan, *key).program()
+        made = plan.made[key] = _Writer(plan, *key).program()
     return made
 
 

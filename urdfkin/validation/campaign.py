@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from urdfkin.compiled.ahead import load_kernels
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.demands import shown, switch, whole_number, word
 from urdfkin.validation import memory
@@ -28,9 +27,9 @@ from urdfkin.validation.results import ValidationReport
 from urdfkin.validation.store import Store, opened
 from urdfkin.validation.subject import Given, Subject, subjects
 from urdfkin.validation.workers import Processes
+from urdfkin.verify.ahead import load_kernels
 from urdfkin.verify.pinocchio_module import pinocchio
 from urdfkin.verify.witnesses import PINOCCHIO, WitnessName, witness_of
-from urdfkin.verify.worst import load_kernel
 
 
 class StoreWarning(UserWarning):
@@ -127,7 +126,6 @@ def validate(
             missing = [robot for i, robot in enumerate(found) if any(True for _ in gathering.missing(i))]
             if missing and (isolate or any(map(_is_robot, missing))):
                 load_kernels()  # once, here: no worker has to compile, no robot's seconds hold it
-                load_kernel()
                 begin = time.perf_counter()
             _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
         except KeyboardInterrupt:

@@ -265,11 +265,19 @@ def nearest_singularity(plan: Plan) -> float:
 
 def column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
     """(frames, nv) each: the sum of the mimic multipliers that turn, or slide, along each column."""
+    made: tuple[FloatArray, FloatArray] | None = plan.made.get("column weights")
+    if made is None:
+        made = plan.made["column weights"] = _column_weights(plan)
+    return made
+
+
+def _column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
     weights = np.zeros((2, len(plan.frames), plan.nv))
     for f, (_, place) in enumerate(plan.frames):
         for c in np.flatnonzero(plan.leaders[f] >= 0):
             kind = 0 if plan.columns[c, Column.TURNS] else 1
             weights[kind, place, plan.columns[c, Column.V]] += abs(plan.multipliers[c])
+    weights.setflags(write=False)
     return weights[0], weights[1]
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from urdfkin.errors import OracleError
 from urdfkin.model.tree import FloatArray, Mimic
+from urdfkin.verify.coupling import Places, coupled
 
 #: urdfkin's coordinates for a joint to which Pinocchio gives so many (nq, nv).
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
@@ -77,7 +78,7 @@ class Layout:
         self._same_v = model.nv == self.nv and bool((self._factor == 1.0).all())
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
-    def _rates(self) -> tuple[np.ndarray[Any, np.dtype[np.int64]], FloatArray]:
+    def _rates(self) -> tuple[Places, FloatArray]:
         """For each of Pinocchio's rates: which of v it is, and the factor (G); 0 where it is the base's."""
         index, factor = np.zeros(self._model.nv, dtype=np.int64), np.zeros(self._model.nv)
         for place in self._places:
@@ -117,7 +118,4 @@ class Layout:
         """J_full G: columns of followers are added to their leaders'; a base's are left out."""
         if self._same_v:
             return full
-        coupled = np.zeros((*full.shape[:-1], self.nv))
-        for column in self.rate_columns:
-            coupled[..., self._index[column]] += full[..., column] * self._factor[column]
-        return coupled
+        return coupled(full, np.array(self.rate_columns, dtype=np.int64), self._index, self._factor, self.nv)
