@@ -191,12 +191,12 @@ def test_workers_killed_at_random_times_change_no_number(
     for seed in range(20):
         rng = np.random.default_rng(seed)
 
-        def kill(standing: Standing, rng: np.random.Generator = rng) -> None:
+        def kill(_: Standing, rng: np.random.Generator = rng) -> None:
             nonlocal killed
-            # Later on a robot may be alone with its second process, whose death is its result.
-            if standing.chunks_done < 8 and rng.uniform() < 0.4:
+            # One process is a robot's second, alone with it, whose death is its result.
+            if len(crew := children(os.getpid())) == 2 and rng.uniform() < 0.4:
                 time.sleep(rng.uniform(0.0, 0.02))
-                os.kill(int(rng.choice(children(os.getpid()))), signal.SIGKILL)
+                os.kill(int(rng.choice(crew)), signal.SIGKILL)
                 killed += 1
 
         assert numbers(validate(robots, samples=100, jobs=2, progress=kill)) == expected

@@ -1,19 +1,18 @@
 """Chunks on processes of this machine. A process that dies costs its robot and nothing else.
 
-One thread hands out chunks and takes answers; a worker has one chunk at a time, so that it is known over
-which robot it died. That robot is tried once more, alone and after all others; in isolation, where it was
-alone from the start, a death is its result at once.
+One thread hands out chunks and takes answers; a worker has a robot of its own while there are any, and one
+chunk at a time, so that it is known over which robot it died. That robot is tried once more, alone and after
+all others; in isolation, where it was alone from the start, a death is its result at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import chain
 from multiprocessing.connection import Connection, wait
 from typing import cast
 
 from urdfkin.validation.answer import Answer, Failure
 from urdfkin.validation.child import Child
+from urdfkin.validation.dealing import Deal, Row
 from urdfkin.validation.engine import DIED, DIED_TWICE, Enter, Task, Work, died, lost
 
 
@@ -46,16 +45,13 @@ class _Crew:
         work: What to do.
         jobs: How many workers.
         enter: Takes the answers.
-        alone: None: any worker may have any chunk. Else a worker has one robot; what is said of its death.
+        alone: None: workers help each other. Else a worker has one robot; what is said of its death.
     """
 
     def __init__(self, work: Work, jobs: int, enter: Enter, *, alone: str | None = None) -> None:
         self._jobs, self._enter, self._alone = jobs, enter, alone
-        # A worker takes a whole robot, or one task.
-        rows = map(iter, work) if alone else (iter([task]) for tasks in work for task in tasks)
-        self._waiting: Iterator[Iterator[Task]] = rows
+        self._deal = Deal(work, shared=alone is None)
         self._workers: list[_Worker] = []
-        self._failed = set[int]()
         #: What was not answered of each robot over which a worker died.
         self.doubted: dict[int, list[Task]] = {}
 
@@ -78,38 +74,26 @@ class _Crew:
             worker = next((worker for worker in self._workers if worker.task is None), None)
             if worker is None and len(self._workers) >= self._jobs:
                 return
-            if (row := self._next_row()) is None:
+            if (found := self._deal.first()) is None:
                 return
-            task, rest = row
+            task, row = found
             try:
                 worker = worker or self._start()
             except Exception as error:
                 if self._workers:  # there is no room for another: those that are there go on
-                    self._waiting = chain([chain([task], rest)], self._waiting)
+                    self._deal.put_back(task, row)
                     return
                 self._answered(task, lost("no process could be started for it", error))
                 continue
-            self._give(worker, task, rest)
-
-    def _next_row(self) -> tuple[Task, Iterator[Task]] | None:
-        """What is in doubt is tried again later; what has failed is over."""
-        for rest in self._waiting:
-            task = next(rest, None)
-            if task is None or task.robot in self._failed:
-                continue
-            if task.robot in self.doubted:
-                self.doubted[task.robot].append(task)
-            else:
-                return task, rest
-        return None
+            self._give(worker, task, row)
 
     def _start(self) -> _Worker:
         worker = _Worker()
         self._workers.append(worker)
         return worker
 
-    def _give(self, worker: _Worker, task: Task, rest: Iterator[Task]) -> None:
-        worker.task, worker.rest = task, rest
+    def _give(self, worker: _Worker, task: Task, row: Row) -> None:
+        worker.task, worker.row = task, row
         try:
             worker.connection.send(task.chunk)
         except OSError:
@@ -125,32 +109,32 @@ class _Crew:
             found = lost("its answer cannot be read", error)
         self._answered(task, found)
         worker.task = None
-        follower = None if task.robot in self._failed else next(worker.rest, None)
-        if follower is not None:
-            self._give(worker, follower, worker.rest)
+        if (follower := self._deal.next(worker.row)) is not None:
+            self._give(worker, follower, worker.row)
         elif self._alone:
             self._workers.remove(worker)
             worker.end()
 
     def _answered(self, task: Task, found: Answer) -> None:
         if isinstance(found, Failure):
-            self._failed.add(task.robot)
+            self._deal.end(task.robot)
             self.doubted.pop(task.robot, None)
         self._enter(task, found)
 
     def _died(self, worker: _Worker, task: Task) -> None:
+        """What is in doubt is tried again later."""
         self._workers.remove(worker)
         cause = worker.cause()
         if self._alone is None:
-            self.doubted.setdefault(task.robot, []).append(task)
+            self.doubted.setdefault(task.robot, []).extend([task, *self._deal.withdraw(task.robot)])
         else:
             self._answered(task, died(task.chunk.subject, self._alone, cause))
 
 
 class _Worker(Child):
-    """A process, the task that it is at work on, and those it has next."""
+    """A process, the task that it is at work on, and the robot that this is of."""
 
     def __init__(self) -> None:
         super().__init__()
         self.task: Task | None = None
-        self.rest: Iterator[Task] = iter(())
+        self.row = Row(())
