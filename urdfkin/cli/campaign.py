@@ -47,6 +47,7 @@ def status(context: click.Context, folder: Path) -> None:
     say(f"{folder}: {of}, began {manifest.started}")
     say(f"robots: {over:,} of {len(counts):,} are done, {len(failed):,} of them failed")
     say(f"chunks: {there:,} are there, {missing:,} are missing")
+    _say_judged(store, [robot for robot, (_, has_failed) in counts.items() if not has_failed])
     for robot in failed[:_NAMED]:
         say(f"  failed: {manifest.robots[robot][0].words}{_why(store, robot)}")
     if len(failed) > _NAMED:
@@ -63,6 +64,17 @@ def status(context: click.Context, folder: Path) -> None:
     if failed:
         say("the same with --retry failed computes what failed again")
     context.exit(3 if missing or failed else 0)
+
+
+def _say_judged(store: Store, robots: list[int]) -> None:
+    """How far the judge has come, where it was asked for."""
+    if not store.has_judge:
+        return
+    from urdfkin.report.words import counted  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.judging import Judged  # noqa: PLC0415
+
+    if (judged := Judged.of(store)) is not None:
+        say(f"judged: {sum(map(judged.has, robots)):,} of {counted(len(robots), 'robot')}")
 
 
 def _why(store: Store, robot: int) -> str:

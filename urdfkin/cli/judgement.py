@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.cli.door import say
+from urdfkin.errors import InputError, UrdfkinError
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.validation.judgement import Judgement
+    from urdfkin.validation.judging import Asked, Judged, NotJudged
     from urdfkin.validation.results import ValidationReport
 
 
 def judge_all(
     report: ValidationReport,
     given: Sequence[Robot | str],
-    samples: int,
-    seed: int,
+    asked: Asked,
     *,
-    moving_base: bool,
-    **how: Any,
+    store: Path | None = None,
+    retry: bool = False,
+    how: Mapping[str, Any],
 ) -> ValidationReport:
     """The report with a judgement of every robot that was compared.
 
@@ -31,38 +34,68 @@ def judge_all(
     Args:
         report: What `validate` found about the robots given, in their order.
         given: Robots, or what names them.
-        samples: Configurations for each.
-        seed: What they are drawn from.
-        moving_base: Whether the root links move, at random.
-        **how: `mimic`, `root_joint` and `xacro_args`, as in `load`.
+        asked: What the judge is asked for.
+        store: The folder that keeps what `validate` found, and the judge.
+        retry: Whether what could not be judged before is tried again.
+        how: `mimic`, `root_joint` and `xacro_args`, as in `load`.
     """
-    found: list[Judgement | None] = []
+    from urdfkin.validation.judging import NotJudged  # noqa: PLC0415  keeps --help fast
+
+    judgements: list[Judgement | None] = []
     try:
-        for robot, source in zip(report.robots, given, strict=True):
-            if robot.tallies:
-                found.append(_judged(source, samples, seed, moving_base, how))
+        with _kept(store, asked) as kept:
+            for i, (robot, source) in enumerate(zip(report.robots, given, strict=True)):
+                if not robot.tallies:
+                    continue
+                found = None if kept is None else kept.found(i)
+                if found is None or (retry and isinstance(found, NotJudged)):
+                    found, is_lasting = _judged(source, asked, None if kept is None else kept.stamp(i), how)
+                    if kept is not None and is_lasting:
+                        kept.keep(i, found)
+                if isinstance(found, NotJudged):
+                    say(f"urdfkin: {robot.source}: not judged: {found.reason}", err=True)
+                judgements.append(None if isinstance(found, NotJudged) else found)
     except KeyboardInterrupt:
         report = replace(report, interrupted=True)
-    return replace(report, judgements=tuple(found))
+    return replace(report, judgements=tuple(judgements))
+
+
+@contextmanager
+def _kept(folder: Path | None, asked: Asked) -> Iterator[Judged | None]:
+    """The judgements in a store, for this process alone."""
+    if folder is None:
+        yield None
+        return
+    from urdfkin.validation.judging import Judged  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.store import Store, opened  # noqa: PLC0415
+
+    def tell(message: str) -> None:
+        say(f"urdfkin: warning: {message}", err=True)
+
+    with opened(folder, Store.reading(folder, tell).manifest, tell) as store:
+        judged = Judged(store, asked)
+        judged.begin()
+        yield judged
 
 
 def _judged(
-    source: Robot | str, samples: int, seed: int, moving_base: bool, how: dict[str, Any]
-) -> Judgement | None:
+    source: Robot | str, asked: Asked, stamp: str | None, how: Mapping[str, Any]
+) -> tuple[Judgement | NotJudged, bool]:
+    """What the judge says, and whether it would say so again."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
-    from urdfkin.lint import UrdfWarning  # noqa: PLC0415  keeps --help fast
-    from urdfkin.loading import load  # noqa: PLC0415
     from urdfkin.validation.judgement import judge  # noqa: PLC0415
+    from urdfkin.validation.judging import NotJudged  # noqa: PLC0415
+    from urdfkin.validation.subject import subject  # noqa: PLC0415
     from urdfkin.verify.sampling import draw_base  # noqa: PLC0415
 
+    is_same = True
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UrdfWarning)  # said already
-            loaded = load(source, **how) if isinstance(source, str) else source
-        base = draw_base(samples, np.random.default_rng([seed, 1])) if moving_base else None
-        return judge(loaded, samples=samples, seed=seed, base=base)
+        robot = subject(source, **how)
+        if is_same := stamp in (None, robot.stamp):
+            rng = np.random.default_rng([asked.seed, 1])
+            base = draw_base(asked.samples, rng) if asked.moving_base else None
+            return judge(robot.read(), samples=asked.samples, seed=asked.seed, base=base), True
+        raise InputError("the file has changed since it was compared", remedy="begin again when it stays")
     except Exception as error:
-        name = source if isinstance(source, str) else source.source
-        say(f"urdfkin: {name}: not judged: {type(error).__name__}: {error}", err=True)
-        return None
+        return NotJudged(f"{type(error).__name__}: {error}"), is_same and isinstance(error, UrdfkinError)

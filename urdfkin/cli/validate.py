@@ -116,6 +116,7 @@ def command(
     from urdfkin.report.terminal import print_report  # noqa: PLC0415
     from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415
     from urdfkin.validation.campaign import validate  # noqa: PLC0415
+    from urdfkin.validation.judging import Asked  # noqa: PLC0415
 
     check_writable(json_, html, junit, markdown)
     how: dict[str, Any] = {"mimic": mimic, "root_joint": root_joint, "xacro_args": xacro_args()}
@@ -137,8 +138,9 @@ def command(
             progress=tell,
             **how,
         )
-        if judged:
-            report = judge_all(report, given, judge_samples, seed, moving_base=judge_moving_base, **how)
+        if judged and not report.interrupted:
+            asked = Asked(judge_samples, seed, judge_moving_base)
+            report = judge_all(report, given, asked, store=store, retry=retry is not None, how=how)
     if shard:
         _say_shard(report, shard, store)
         context.exit(stop.exit_code(report.exit_code))

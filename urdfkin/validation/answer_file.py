@@ -32,9 +32,7 @@ class DamagedError(Exception):
 
 def written(key: str, found: Answer) -> bytes:
     """An answer's file."""
-    body = _failure(found) if isinstance(found, Failure) else _result(found)
-    data = zlib.compress(json.dumps({"key": key} | body, separators=(",", ":")).encode(), 1)
-    return _MAGIC + hashlib.sha256(data).digest() + data
+    return packed(key, _failure(found) if isinstance(found, Failure) else _result(found))
 
 
 def read(key: str, content: bytes) -> Answer:
@@ -43,19 +41,37 @@ def read(key: str, content: bytes) -> Answer:
     Raises:
         DamagedError: they are not what was written for it.
     """
+    body = unpacked(key, content)
+    try:
+        return _read_failure(body["failure"]) if "failure" in body else _read_result(body["result"])
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise DamagedError(f"not a chunk of urdfkin's ({type(error).__name__})") from error
+
+
+def packed(key: str, body: dict[str, Any]) -> bytes:
+    """Data as a file's bytes, under its key and a seal."""
+    data = zlib.compress(json.dumps({"key": key} | body, separators=(",", ":")).encode(), 1)
+    return _MAGIC + hashlib.sha256(data).digest() + data
+
+
+def unpacked(key: str, content: bytes) -> dict[str, Any]:
+    """The data in a file's bytes.
+
+    Raises:
+        DamagedError: they are not what was written under the key.
+    """
     seal, data = content[len(_MAGIC) :][:_DIGEST], content[len(_MAGIC) + _DIGEST :]
     if not content.startswith(_MAGIC):
         raise DamagedError("not a chunk of urdfkin's")
     if hashlib.sha256(data).digest() != seal:
         raise DamagedError("its content is not what was written")
     try:
-        unpacked = zlib.decompressobj()
-        body = json.loads(unpacked.decompress(data, _MOST))
+        body: dict[str, Any] = json.loads(zlib.decompressobj().decompress(data, _MOST))
         if body["key"] != key:
             raise DamagedError("it is another chunk's")
-        return _read_failure(body["failure"]) if "failure" in body else _read_result(body["result"])
-    except (ValueError, KeyError, TypeError, AttributeError, zlib.error, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, zlib.error, RecursionError) as error:
         raise DamagedError(f"not a chunk of urdfkin's ({type(error).__name__})") from error
+    return body
 
 
 def _failure(found: Failure) -> dict[str, Any]:

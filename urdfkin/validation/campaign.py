@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.demands import shown, switch, whole_number, word
@@ -23,13 +23,16 @@ from urdfkin.validation.engine import Engine, Here, OnExecutor, Task
 from urdfkin.validation.gathering import Gathering, Progress
 from urdfkin.validation.manifest import Manifest
 from urdfkin.validation.outcome import Verdict
-from urdfkin.validation.results import ValidationReport
+from urdfkin.validation.results import RobotReport, ValidationReport
 from urdfkin.validation.store import Store, opened
 from urdfkin.validation.subject import Given, Subject, subjects
 from urdfkin.validation.workers import Processes
 from urdfkin.verify.ahead import load_kernels
 from urdfkin.verify.pinocchio_module import pinocchio
 from urdfkin.verify.witnesses import PINOCCHIO, WitnessName, witness_of
+
+if TYPE_CHECKING:
+    from urdfkin.validation.judgement import Judgement
 
 
 class StoreWarning(UserWarning):
@@ -180,6 +183,7 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
     gathering = Gathering(found, manifest.cut, shares(len(found), manifest.cut))
     _Campaign(found, manifest.cut, manifest.seed, None, gathering).use(store)
     reports, standing = tuple(gathering.reports()), gathering.standing()
+    judgements, all_judged = _judgements(store, reports)
     return ValidationReport(
         robots=reports,
         asked=len(reports),
@@ -187,9 +191,22 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
         seed=manifest.seed,
         started=manifest.started,
         seconds=sum(robot.seconds for robot in reports),
-        interrupted=standing.chunks_done < standing.chunks,
+        interrupted=standing.chunks_done < standing.chunks or not all_judged,
         made_by=manifest.versions,
+        judgements=judgements,
     )
+
+
+def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Judgement | None, ...], bool]:
+    """What the judge said of each robot that was compared, if it was asked; and whether it is through."""
+    if not store.has_judge:
+        return (), True
+    from urdfkin.validation.judging import Judged, NotJudged  # noqa: PLC0415  fifty digits take a library
+
+    if (judged := Judged.of(store)) is None:
+        return (), True
+    found = [judged.found(i) for i, report in enumerate(reports) if report.tallies]
+    return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
 
 
 @dataclass

@@ -2,6 +2,7 @@
 
     DIR/manifest.json           what the campaign is
     DIR/chunks/4f/4f1a....chunk   what a chunk found; .failed: why its robot could not be checked
+    DIR/judge.json              what the judge was asked for; chunks/*/*.judged: what it found
     DIR/lock                    held by who is at work
 
 It knows no engine: whoever computed a chunk, its answer lies under the chunk's key. A file that is no answer
@@ -20,7 +21,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, TypeVar
 
 from urdfkin.errors import InputError, SourceError
 from urdfkin.system.files import read_bytes
@@ -30,10 +31,14 @@ from urdfkin.validation.manifest import Manifest
 
 _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
+#: What the judge was asked for; `urdfkin.validation.judging`.
+JUDGE = "judge.json"
 _DONE, _FAILED = ".chunk", ".failed"
 
 #: How often a lock is asked for, a tenth of a second apart.
 _TRIES = 10
+
+_T = TypeVar("_T")
 
 #: Told of each file that cannot be trusted.
 Tell = Callable[[str], None]
@@ -68,15 +73,18 @@ class Store:
     def answer(self, robot: int, index: int) -> Answer | None:
         """What is known of a chunk; a damaged file is put aside, or left where nothing can be written."""
         key = self.manifest.key(robot, index)
-        for kind in (_DONE, _FAILED):
-            place = self._place(key, kind)
-            try:
-                return read(key, place.read_bytes())
-            except FileNotFoundError:
-                continue
-            except (DamagedError, OSError) as error:
-                self._put_aside(place, error)
-        return None
+        return self.kept(key, _DONE, read) or self.kept(key, _FAILED, read)
+
+    def kept(self, key: str, kind: str, read: Callable[[str, bytes], _T]) -> _T | None:
+        """What lies under a key; what cannot be read as that is put aside."""
+        place = self._place(key, kind)
+        try:
+            return read(key, place.read_bytes())
+        except FileNotFoundError:
+            return None
+        except (DamagedError, OSError) as error:
+            self._put_aside(place, error)
+            return None
 
     def keep(self, robot: int, index: int, found: Answer) -> None:
         """Write an answer: on the disc, whole, when this returns.
@@ -85,7 +93,20 @@ class Store:
             SourceError: it cannot be written.
         """
         key = self.manifest.key(robot, index)
-        self._write(self._place(key, _FAILED if isinstance(found, Failure) else _DONE), written(key, found))
+        self.keep_part(key, _FAILED if isinstance(found, Failure) else _DONE, written(key, found))
+
+    def has(self, key: str, kind: str) -> bool:
+        """Whether something lies under a key."""
+        return self._place(key, kind).exists()
+
+    @property
+    def has_judge(self) -> bool:
+        """Whether the judge was asked."""
+        return (self.folder / JUDGE).exists()
+
+    def keep_part(self, key: str, kind: str, data: bytes) -> None:
+        """Write what `kept` reads, likewise."""
+        self._write(self._place(key, kind), data)
 
     def forget_failures(self) -> None:
         """Have the robots that could not be checked computed again."""
@@ -136,7 +157,15 @@ class Store:
 
     def write_manifest(self) -> None:
         """Write what the campaign is."""
-        self._write(self.folder / _MANIFEST, self.manifest.as_json())
+        self.write(_MANIFEST, self.manifest.as_json())
+
+    def write(self, name: str, data: bytes) -> None:
+        """Write a file beside the manifest.
+
+        Raises:
+            SourceError: it cannot be written.
+        """
+        self._write(self.folder / name, data)
 
     def _place(self, key: str, kind: str) -> Path:
         return self.folder / _CHUNKS / key[:2] / (key + kind)
