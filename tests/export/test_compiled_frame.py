@@ -66,6 +66,17 @@ def test_it_takes_any_batch_and_writes_where_it_is_told(arm: Robot) -> None:
     assert fast.jacobian(np.empty((0, 2))).shape == (0, 6, 2)
 
 
+def test_results_that_go_past_the_caches_are_those_of_small_batches_wherever_they_begin(arm: Robot) -> None:
+    fast, n = arm.compiled(arm.tip_frame), 30_000  # 2.9 MB
+    q = arm.sample(n, seed=3)
+    expected = np.concatenate([fast.jacobian(q[i : i + 1000]) for i in range(0, n, 1000)])
+    for first in range(8):
+        room = np.full(12 * n + 16, np.pi)
+        fast.jacobian(q, out=room[first : first + 12 * n].reshape(n, 6, 2))
+        assert room[first : first + 12 * n].tobytes() == expected.tobytes()
+        assert (np.delete(room, slice(first, first + 12 * n)) == np.pi).all()
+
+
 def test_angles_of_any_size_are_those_of_the_library_for_one_lane_alone(arm: Robot) -> None:
     fast, q = arm.compiled(arm.tip_frame), np.tile([0.3, -0.4], (11, 1))
     before = fast.placement(q)
@@ -80,6 +91,12 @@ def test_what_is_no_configuration_is_refused_as_everywhere(arm: Robot) -> None:
     for bad in ([np.nan, 0.0], np.full((20, 2), np.inf)):
         with pytest.raises(InputError, match="finite"):
             fast.jacobian(np.array(bad))
+    inputs = np.zeros((3, 20, 2))
+    for place in np.ndindex(inputs.shape):
+        inputs[place] = (np.nan, np.inf, -np.inf)[sum(place) % 3]
+        with pytest.raises(InputError, match="finite"):
+            fast.acceleration(*inputs)
+        inputs[place] = 0.0
     with pytest.raises(InputError, match="needs 2 numbers"):
         fast.jacobian(np.zeros(3))
     with pytest.raises(InputError, match="out must be"):

@@ -111,10 +111,9 @@ def _function(code: Code, function: Function) -> str:
         sines="\n".join(f"    {line}" for line in _sines(writer, layout)),
         reads="\n".join(f"    {line}" for line in _reads(layout, widths)),
         lane_sines="\n".join(f"    {line}" for line in _lane_sines(writer, layout)),
-        # So many rows more are eight numbers more.
-        spare=max(-(-8 // width) if width else 0 for width in (*widths.values(), count)),
+        spare=spare(code, function),
         passed=", ".join(widths),
-        advance=", ".join(f"{x} += LANES * {width}" for x, width in widths.items()),
+        advance=advance(code, function),
         advance_m="\n".join(f"        {x} += m * {width};" for x, width in widths.items()),
         copies=", ".join(f"own_{x}[LANES * {width} + 8] = {{R(0.0)}}" for x, width in widths.items()),
         copy="\n".join(
@@ -124,6 +123,17 @@ def _function(code: Code, function: Function) -> str:
         ),
         own=", ".join(f"own_{x}" for x in widths),
     )
+
+
+def spare(code: Code, function: Function) -> int:
+    """How many rows more are eight numbers more, in whatever is read or written."""
+    widths = (*code.widths(function).values(), len(function.results))
+    return max(-(-8 // width) if width else 0 for width in widths)
+
+
+def advance(code: Code, function: Function) -> str:
+    """On to the next LANES configurations."""
+    return ", ".join(f"{x} += LANES * {width}" for x, width in code.widths(function).items())
 
 
 class Layout:
@@ -185,9 +195,9 @@ def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
     for k, node in enumerate(layout.angles):
         angle = layout.place(node) if node in layout.inputs else layout.room + layout.made.index(node)
         calls.append(", ".join(f"in + {place} * LANES" for place in (angle, at + k, at + count + k)))
-    yield "real most[LANES] = {R(0.0)};"
-    yield from (f"sine_cosine({call}, most);" for call in calls)
-    yield "if (any_far(most)) {"
+    yield "real squares[LANES] = {R(0.0)};"
+    yield from (f"sine_cosine({call}, squares);" for call in calls)
+    yield "if (any_far(squares)) {"
     yield from (f"    library_sines({call});" for call in calls)
     yield "}"
 

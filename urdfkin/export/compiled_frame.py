@@ -14,9 +14,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from urdfkin.compiled.batch import in_blocks
+from urdfkin.compiled.evaluate import is_staged
 from urdfkin.compiled.plan import Plan
 from urdfkin.compiled.prepared import Fast
-from urdfkin.compiled.task import Task
+from urdfkin.compiled.registers import LANES
+from urdfkin.compiled.task import Task, lines
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.export.code import bare
 from urdfkin.export.library import NoCompilerError, library
@@ -194,6 +196,9 @@ class CompiledFrame:
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
             task = np.zeros(len(Task), dtype=np.int64)
             task[Task.N], task[Task.OUT] = len(part), part.ctypes.data
+            # Of rows that are shorter than a register, the last is written with what lies beyond its end.
+            stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(found) else None
+            task[Task.STAGE] = 0 if stage is None else stage.ctypes.data
             for place, x in zip(_PLACES, parts, strict=False):
                 task[place] = x.ctypes.data
             return int(made(task.ctypes.data))

@@ -17,7 +17,7 @@ from itertools import count
 from pathlib import Path
 
 from urdfkin.compiled.task import Task
-from urdfkin.export.c import Layout, framed, unit
+from urdfkin.export.c import Layout, advance, framed, spare, unit
 from urdfkin.export.code import Code
 from urdfkin.system.keeping import kept_folder
 from urdfkin.system.sealed import keep, kept
@@ -61,8 +61,8 @@ def _entrance(code: Code) -> str:
     )
     lines = {
         "inputs": "    const double *{x} = (const double *)(uintptr_t)places[{place}];",
-        "look": "        bad |= not_finite(m * {width}, {x});",
-        "advance": "        {x} += m * {width};",
+        "look": "        look({width}, {x}, bad);",
+        "look_left": "    for (size_t i = 0; i < n * {width}; ++i) bad[0] += 0.0 * {x}[i];",
     }
     parts = {
         part: "\n".join(
@@ -81,6 +81,9 @@ def _entrance(code: Code) -> str:
         room=layout.room + len(layout.made),
         spread="\n".join([*(f"    (void){x};" for x in widths), *spread]),
         count=len(function.results),
+        STAGE=int(Task.STAGE),
+        spare=spare(code, function),
+        advance=advance(code, function),
         **parts,
     )
 

@@ -31,22 +31,32 @@ typedef real eight __attribute__((vector_size(8 * sizeof(real))));
 typedef real anywhere __attribute__((vector_size(8 * sizeof(real)), aligned(sizeof(real)), may_alias));
 INLINE void get(eight *x, const real *from) { *x = *(const anywhere *)from; }
 INLINE void put(real *to, const eight *x) { *(anywhere *)to = *x; }
+/* Single numbers, pairs and fours change places across the diagonal. */
+INLINE void exchange_1(eight *x, eight *y)
+{
+    const eight one = *x, other = *y;
+    *x = __builtin_shufflevector(one, other, 0, 8, 2, 10, 4, 12, 6, 14);
+    *y = __builtin_shufflevector(one, other, 1, 9, 3, 11, 5, 13, 7, 15);
+}
+INLINE void exchange_2(eight *x, eight *y)
+{
+    const eight one = *x, other = *y;
+    *x = __builtin_shufflevector(one, other, 0, 1, 8, 9, 4, 5, 12, 13);
+    *y = __builtin_shufflevector(one, other, 2, 3, 10, 11, 6, 7, 14, 15);
+}
+INLINE void exchange_4(eight *x, eight *y)
+{
+    const eight one = *x, other = *y;
+    *x = __builtin_shufflevector(one, other, 0, 1, 2, 3, 8, 9, 10, 11);
+    *y = __builtin_shufflevector(one, other, 4, 5, 6, 7, 12, 13, 14, 15);
+}
+/* Loops that compilers unroll, so that x lies in registers. */
 INLINE void transpose(eight *x)
 {
-    eight y[8];
-    for (int i = 0; i < 8; i += 2) {
-        y[i] = __builtin_shufflevector(x[i], x[i + 1], 0, 8, 2, 10, 4, 12, 6, 14);
-        y[i + 1] = __builtin_shufflevector(x[i], x[i + 1], 1, 9, 3, 11, 5, 13, 7, 15);
-    }
-    for (int i = 0; i < 8; i += i % 4 == 1 ? 3 : 1) {
-        x[i] = __builtin_shufflevector(y[i], y[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
-        x[i + 2] = __builtin_shufflevector(y[i], y[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
-    }
-    for (int i = 0; i < 4; ++i) {
-        y[i] = __builtin_shufflevector(x[i], x[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-        y[i + 4] = __builtin_shufflevector(x[i], x[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-    }
-    for (int i = 0; i < 8; ++i) x[i] = y[i];
+    for (int i = 0; i < 8; i += 2) exchange_1(x + i, x + i + 1);
+    for (int i = 0; i < 8; i += 4)
+        for (int k = i; k < i + 2; ++k) exchange_2(x + k, x + k + 2);
+    for (int i = 0; i < 4; ++i) exchange_4(x + i, x + i + 4);
 }
 #else
 typedef struct { real lane[8]; } eight;

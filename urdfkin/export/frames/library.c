@@ -1,12 +1,28 @@
 #include <stdint.h>
+#ifdef __AVX512F__
+#include <immintrin.h>
+#endif
 
-/* For urdfkin itself: where q, v, a and the results lie, and how many there are, stand in a row of whole
-   numbers. 0, or 1 where an input is not finite. A part is looked at and computed while it is in a cache. */
-static int not_finite(size_t n, const double *x)
+/* For urdfkin itself: where q, v, a and the results lie, how many there are, and where a block's results come
+   together on their way past the caches (0: they go at once), stand in a row of whole numbers. 0, or 1 where an
+   input is not finite. */
+
+/* Of so many numbers in each lane: 0 x is 0, or no number. It brings near what is computed with next. */
+INLINE void look(size_t blocks, const double *x, double *bad)
 {
-    int64_t bad = 0;
-    for (size_t i = 0; i < n; ++i) bad |= !(fabs(x[i]) <= DBL_MAX);
-    return bad != 0;
+    for (size_t i = 0; i < blocks * LANES; i += LANES)
+        for (int k = 0; k < LANES; ++k) bad[k] += R(0.0) * x[i + k];
+}
+
+/* Past the caches: a line that is written whole is not read before. */
+INLINE void stream(const double *x, size_t count, double *out)
+{
+    size_t i = 0;
+#ifdef __AVX512F__
+    for (; i < count && (uintptr_t)(out + i) % 64; ++i) out[i] = x[i];
+    for (; i + 8 <= count; i += 8) _mm512_stream_pd(out + i, _mm512_loadu_pd(x + i));
+#endif
+    for (; i < count; ++i) out[i] = x[i];
 }
 
 /* One configuration in every lane: the same machine code as a batch's, and so the same bits. */
@@ -22,19 +38,23 @@ static void one(@given@, double *out)
 int64_t task(const int64_t *places)
 {
     size_t n = (size_t)places[@N@];
-    double *out = (double *)(uintptr_t)places[@OUT@];
+    double *out = (double *)(uintptr_t)places[@OUT@], *stage = (double *)(uintptr_t)places[@STAGE@];
 @inputs@
-    int bad = 0;
-    while (n) {
-        const size_t m = n < 2048 ? n : 2048;
+    double bad[LANES] = {0.0};
+    for (; n > LANES + @spare@; n -= LANES, @advance@, out += LANES * @count@) {
 @look@
-        if (m == 1)
-            one(@passed@, out);
-        else
-            @title@_@name@_batch(m, @passed@, out);
-        n -= m;
-        out += m * @count@;
-@advance@
+        lanes_@name@(@passed@, stage ? stage : out);
+        if (stage) stream(stage, LANES * @count@, out);
     }
-    return bad;
+@look_left@
+    if (n == 1)
+        one(@passed@, out);
+    else
+        @title@_@name@_batch(n, @passed@, out);
+#ifdef __AVX512F__
+    _mm_sfence();
+#endif
+    int64_t found = 0;
+    for (int k = 0; k < LANES; ++k) found |= bad[k] != 0.0;
+    return found;
 }

@@ -1,11 +1,11 @@
 
 /* Sine and cosine of an angle in each lane: Cody and Waite's reduction to [-pi/4, pi/4], the polynomials of
    fdlibm (Sun Microsystems, k_sin.c and k_cos.c), then the quarter turns. No branch, so that a compiler can do
-   it for all lanes at once; a lane whose angle is FAR takes the library's functions, for which `most` keeps the
-   largest angle of each. */
+   it for all lanes at once; a lane whose angle is FAR takes the library's functions. None is where the sum of
+   the squares is small. */
 #define IS_SINGLE (sizeof(real) == sizeof(float))
 #define FAR (IS_SINGLE ? R(8192.0) : R(823549.0))
-INLINE void sine_cosine(const real *x, real *sine, real *cosine, real *most)
+INLINE void sine_cosine(const real *x, real *sine, real *cosine, real *squares)
 {
     /* Added to a number, it leaves no room for a fraction. pi/2 in three parts, of which n times the first two
        is exact. */
@@ -19,7 +19,7 @@ INLINE void sine_cosine(const real *x, real *sine, real *cosine, real *most)
         const real s = r + r * z * (R(-1.66666666666666324348e-01) + z * (R(8.33333333332248946124e-03)
             + z * (R(-1.98412698298579493134e-04) + z * (R(2.75573137070700676789e-06)
             + z * (R(-2.50507602534068634195e-08) + z * R(1.58969099521155010221e-10))))));
-        const real c = R(1.0) - (R(0.5) * z - z * z * (R(4.16666666666666019037e-02)
+        const real c = R(1.0) + z * (R(-0.5) + z * (R(4.16666666666666019037e-02)
             + z * (R(-1.38888888888741095749e-03) + z * (R(2.48015872894767294178e-05)
             + z * (R(-2.75573143513906633035e-07) + z * (R(2.08757232129817482790e-09)
             + z * R(-1.13596475577881948265e-11)))))));
@@ -28,15 +28,14 @@ INLINE void sine_cosine(const real *x, real *sine, real *cosine, real *most)
         const real turn_c = R(1.0) - size, turn_s = m * (R(2.0) - size);
         sine[k] = s * turn_c + c * turn_s;
         cosine[k] = c * turn_c - s * turn_s;
-        const real far = fabs(x[k]);
-        most[k] = far > most[k] ? far : most[k];
+        squares[k] += x[k] * x[k];
     }
 }
 
-INLINE int any_far(const real *most)
+INLINE int any_far(const real *squares)
 {
     long far = 0;
-    for (int k = 0; k < LANES; ++k) far |= most[k] >= FAR;
+    for (int k = 0; k < LANES; ++k) far |= !(squares[k] < FAR * FAR);
     return far != 0;
 }
 
