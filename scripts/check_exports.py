@@ -1,8 +1,9 @@
 """Export the catalogue's leaves to C and NumPy, compile the C without a warning, and run the test vectors.
 
-    python scripts/check_exports.py                  # every leaf of every robot; an hour or more
-    python scripts/check_exports.py --tips           # the leaf of each robot that most joints lie before
-    python scripts/check_exports.py --sizes          # how large the code is, and how long it takes to write
+    python scripts/check_exports.py --keep leaves.jsonl         # every leaf; goes on where it was ended
+    python scripts/check_exports.py --keep leaves.jsonl --tell  # what was found, nothing computed
+    python scripts/check_exports.py --tips       # the leaf of each robot that most joints lie before
+    python scripts/check_exports.py --sizes      # how large the code is, and how long it takes to write
 
 Each function is held against Pinocchio as it is written, and against fifty digits as it runs: by GCC and by
 Clang, where they are installed, one configuration and in batches, and by NumPy. Exit 1 if any number is
@@ -12,6 +13,7 @@ outside the derived bound or any compiler warns.
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import shutil
 import subprocess
@@ -70,21 +72,53 @@ def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
                 yield name, robot, frame
 
 
-def check(tips: bool) -> int:
-    """Every leaf, or every tip."""
-    count, wrong, worst = 0, 0, 0.0
+def found_of(robot: Robot, frame: str) -> dict[str, Any]:
+    """A leaf's line: its largest errors as shares of the bound, and whether all is as it should be."""
+    wanted = QUANTITIES if robot.nv else ("placement",)
+    with tempfile.TemporaryDirectory() as folder:
+        written = code(robot, frame, wanted)
+        found = dict(shares(written, Path(folder)))
+    good = all(share <= 1.0 for share in found.values()) and written.proof.certificate.verified
+    return {"good": good, **found}
+
+
+def check(tips: bool, keep: Path | None) -> int:
+    """Every leaf, or every tip, but those whose lines are kept."""
+    kept = {(line["robot"], line["frame"]) for line in lines_of(keep)}
+    here: list[dict[str, Any]] = []
     for name, robot, frame in subjects(tips):
-        wanted = QUANTITIES if robot.nv else ("placement",)
-        with tempfile.TemporaryDirectory() as folder:
-            written = code(robot, frame, wanted)
-            found = dict(shares(written, Path(folder)))
-        good = all(share <= 1.0 for share in found.values()) and written.proof.certificate.verified
-        count, wrong = count + 1, wrong + (not good)
-        worst = max(worst, *found.values())
-        line = ", ".join(f"{way} {share:.2g}" for way, share in found.items())
-        print(f"{'good' if good else 'WRONG'} {name} {frame}: {line}", flush=True)
-    print(f"{count} leaves, {wrong} outside the bound or unverified; worst error {worst:.2g} of the bound")
-    return int(wrong > 0)
+        if (name, frame) in kept:
+            continue
+        here.append({"robot": name, "frame": frame, **found_of(robot, frame)})
+        line = json.dumps(here[-1])
+        print(line, flush=True)
+        if keep:
+            with keep.open("a", encoding="utf-8") as file:
+                file.write(f"{line}\n")
+    return tell(lines_of(keep) if keep else here)
+
+
+def lines_of(keep: Path | None) -> list[dict[str, Any]]:
+    """What was found before."""
+    if keep is None or not keep.exists():
+        return []
+    return [json.loads(line) for line in keep.read_text(encoding="utf-8").splitlines()]
+
+
+def tell(lines: Sequence[dict[str, Any]]) -> int:
+    """The sum of what was found; 1 where something is wrong."""
+    wrong = [line for line in lines if not line["good"]]
+    for line in wrong:
+        print("WRONG", line)
+    ways = sorted({way for line in lines for way, share in line.items() if isinstance(share, float)})
+    worst = ", ".join(f"{way} {max(line.get(way, 0.0) for line in lines):.2g}" for way in ways)
+    of = sum(1 for name in examples() for _ in urdfkin.load(name).tree.leaves())
+    robots = len({line["robot"] for line in lines})
+    print(
+        f"{len(lines)} of {of} leaves, of {robots} robots; {len(wrong)} outside the bound or unverified;"
+        f" worst error as a share of the bound: {worst}"
+    )
+    return bool(wrong)
 
 
 def sizes() -> int:
@@ -116,11 +150,15 @@ def sizes() -> int:
 def main(words: Sequence[str] | None = None) -> int:
     """Exit 1 where something is wrong."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("--keep", type=Path, help="a file of results, a line each, to go on with")
+    parser.add_argument("--tell", action="store_true", help="only add up what is kept")
     parser.add_argument("--tips", action="store_true", help="one leaf a robot")
     parser.add_argument("--sizes", action="store_true", help="sizes and times of three robots")
     arguments = parser.parse_args(words)
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-    return sizes() if arguments.sizes else check(arguments.tips)
+    if arguments.tell:
+        return tell(lines_of(arguments.keep))
+    return sizes() if arguments.sizes else check(arguments.tips, arguments.keep)
 
 
 if __name__ == "__main__":

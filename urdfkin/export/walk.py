@@ -187,8 +187,8 @@ class Walk:
 def _structure(x: Sequence[float]) -> Vector:
     """A constant vector without what is less than the rounding of its largest number.
 
-    The cosine of the double nearest to pi/2 is 6e-17: a product for nothing wherever it stands. It is one
-    rounding of a constant more, and the products that it saves are not rounded.
+    The cosine of the double nearest to pi/2 is 6e-17: a product for nothing wherever it stands. What leaving
+    it out costs is counted in `urdfkin.kinematics.roundings`.
     """
     least = EPS / 2.0 * max(map(abs, x))
     first, second, third = (c if abs(c) > least else 0.0 for c in x)
