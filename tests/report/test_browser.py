@@ -221,6 +221,26 @@ def test_it_reads_well_in_both_themes_at_both_widths(
         assert browser.errors() == []
 
 
+@pytest.mark.parametrize("width", [1280, 980, 760])
+def test_no_column_is_cut_and_no_card_stands_alone(
+    width: int, pages: dict[str, Path], tmp_path: Path
+) -> None:
+    with opened(tmp_path, width=width, height=1000) as browser:
+        browser.open(pages["arms"])
+        browser.js("document.querySelector('details.robot').open = true")
+        browser.settle()
+        for table in ("#overview", ".checks") if width > 900 else ("#overview",):
+            wide, room = browser.js(
+                "const table = document.querySelector(arguments[0]);"
+                "return [table.scrollWidth, table.parentElement.clientWidth]",
+                table,
+            )
+            assert wide <= room, table
+        tops = browser.js("return [...document.querySelectorAll('.tiles div')].map(card => card.offsetTop)")
+        assert len(tops) == 7
+        assert min(tops.count(top) for top in tops) >= 3
+
+
 # -- a page of thousands: details in files beside it ---------------------------------------------------
 
 
