@@ -142,11 +142,34 @@ def test_what_is_said_to_be_pinocchios_and_ours_is_the_same() -> None:
             np.testing.assert_allclose(b, a, atol=1e-13, err_msg=ours)
 
 
+def own_robot() -> dict[str, object]:
+    """What the Robotics Toolbox's table calls so."""
+    robot = urdfkin.load("elbow")
+    q, v = np.linspace(-0.6, 0.9, robot.nq), np.linspace(1, -1, robot.nv)
+    return {"np": np, "urdfkin": urdfkin, "robot": robot, "path": str(robot.path), "q": q, "v": v}
+
+
+@pytest.mark.filterwarnings("ignore")  # the other library's
+def test_what_is_said_to_be_the_robotics_toolboxs_and_ours_is_the_same() -> None:
+    rtb = pytest.importorskip("roboticstoolbox")
+    ours = own_robot()
+    theirs = ours | {"rtb": rtb, "robot": rtb.Robot.URDF(ours["path"])}
+    for row in table_rows("Robotics Toolbox"):
+        if row[0] == "robot.teach(q)":  # opens a window
+            assert callable(rtb.Robot.teach)
+            continue
+        a = eval(row[0], theirs)
+        if isinstance(a, np.ndarray | float):
+            np.testing.assert_allclose(eval(row[1], ours), a, atol=1e-14, err_msg=row[0])
+
+
 @pytest.mark.parametrize("heading", ["Robotics Toolbox", "MATLAB"])
 def test_what_is_said_to_be_ours_runs(heading: str) -> None:
     (setup, *_) = (text for kind, text in blocks("coming-from.md") if kind == "python")
     names: dict[str, object] = {}
     exec(setup, names)
+    if heading == "Robotics Toolbox":
+        names |= own_robot()
     group = cli.make_context("urdfkin", ["--help"], resilient_parsing=True)
     told = [row[-1] for row in table_rows(heading)]
     assert len(told) >= 8
