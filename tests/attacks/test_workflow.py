@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 ROOT = Path(__file__).parents[2]
 yaml = pytest.importorskip("yaml")
@@ -57,3 +58,42 @@ def test_the_command_that_makes_the_key_makes_one(tmp_path: Path) -> None:
 def test_no_page_names_a_tag_that_may_not_exist() -> None:
     for page in ("docs/ci.md", ".pre-commit-hooks.yaml", "README.md"):
         assert not re.search(r"rev: v?\d", (ROOT / page).read_text("utf-8")), page
+
+
+#: GitHub's schema, and what is written for it.
+WRITTEN = {
+    "action.yml": "github-actions",
+    ".github/workflows/site.yml": "github-workflows",
+    "docs/examples/robots.yml": "github-workflows",
+}
+
+
+def schema_says(schema: str, file: Path) -> tuple[int, str]:
+    checker = pytest.importorskip("check_jsonschema")
+    done = CliRunner().invoke(checker.main, ["--builtin-schema", f"vendor.{schema}", str(file)])
+    return done.exit_code, done.output
+
+
+@pytest.mark.parametrize("file", WRITTEN)
+def test_what_github_reads_keeps_to_its_schema(file: str, tmp_path: Path) -> None:
+    code, said = schema_says(WRITTEN[file], ROOT / file)
+    assert code == 0, said
+    broken = tmp_path / "broken.yml"
+    broken.write_text(re.sub(r"(?m)^( *)(jobs|runs):", r"\1\2x:", (ROOT / file).read_text("utf-8")))
+    assert schema_says(WRITTEN[file], broken)[0] == 1
+
+
+def test_every_workflow_is_held_against_the_schema() -> None:
+    files = {str(path.relative_to(ROOT)) for path in (ROOT / ".github/workflows").iterdir()}
+    assert files <= WRITTEN.keys()
+
+
+def test_the_site_is_built_as_make_builds_it_and_published_from_where_that_puts_it() -> None:
+    jobs = yaml.safe_load((ROOT / ".github/workflows/site.yml").read_text("utf-8"))["jobs"]
+    commands = [step["run"] for step in jobs["build"]["steps"] if "run" in step]
+    assert commands == ['python -m pip install --quiet --editable ".[docs]"', "make site"]
+    (upload,) = (step for step in jobs["build"]["steps"] if "upload-pages" in step.get("uses", ""))
+    assert f"site_dir: {upload['with']['path']}\n" in (ROOT / "mkdocs.yml").read_text("utf-8")
+    assert "permissions" not in jobs["build"]  # a pull request's code runs there
+    assert jobs["publish"]["needs"] == "build"
+    assert "pull_request" in jobs["publish"]["if"]
