@@ -1,0 +1,71 @@
+"""The lessons as notebooks in Jupyter's kernel: they print what they show, and objects show themselves."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scripts.docs_site import notebook
+from tests.pages import DOCS, pages
+
+if not os.environ.get("CI"):  # there it must be
+    pytest.importorskip("nbclient", reason="the extra `test` is not installed")
+    pytest.importorskip("ipykernel")
+
+LESSONS = [page for page in pages() if page.startswith("lessons/")]
+#: What the last line of a cell shows, with words that are in it.
+SHOWN = {
+    "import urdfkin; robot = urdfkin.load('panda'); J = robot.jacobian('ready', 'panda_hand')": (),
+    "robot": ("panda_joint4", "-3.0718"),
+    "robot.dh()": ("standard Denavit-Hartenberg parameters", "panda_joint4"),
+    "robot.certificate()": ("panda: verified by Pinocchio", "jacobian"),
+}
+
+Cell = dict[str, Any]
+
+
+def cells_of(page: str) -> list[Cell]:
+    cells: list[Cell] = notebook((DOCS / page).read_text("utf-8"))["cells"]
+    return cells
+
+
+def code(source: str) -> Cell:
+    return {"cell_type": "code", "metadata": {}, "source": source, "execution_count": None, "outputs": []}
+
+
+def executed(cells: list[Cell], home: Path) -> list[Cell]:
+    """The cells as a kernel leaves them, which keeps its things in a folder of its own."""
+    nbformat, client = (import_module(name) for name in ("nbformat", "nbclient"))  # without types
+    book = nbformat.reads(json.dumps(notebook("") | {"cells": cells}), as_version=4)
+    client.NotebookClient(book, timeout=300, resources={"metadata": {"path": str(home)}}).execute()
+    done: list[Cell] = book["cells"]
+    return done
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # the client's
+def test_the_lessons_run_in_a_kernel_and_objects_show_themselves_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("IPYTHONDIR", "JUPYTER_RUNTIME_DIR", "JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR"):
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(DOCS.parent))
+    told = [cell for page in LESSONS for cell in [code("%reset -f"), *cells_of(page)]]
+    done = executed([*told, *map(code, SHOWN)], tmp_path)
+    assert len(LESSONS) >= 4
+    for before, after in zip(told, done, strict=False):
+        shown = "".join(output["text"] for output in before.get("outputs", ()))
+        printed = "".join(output.get("text", "") for output in after.get("outputs", ()))
+        assert printed == shown or not shown, after["source"]
+    for (line, words), cell in zip(SHOWN.items(), done[-len(SHOWN) :], strict=True):
+        for output in cell["outputs"]:
+            assert set(output["data"]) >= {"text/plain", "text/html", "text/markdown", "text/latex"}
+            html = re.sub(r"<[^>]*>", " ", output["data"]["text/html"])
+            assert all(word in html for word in words), line
+        assert len(cell["outputs"]) == bool(words)
