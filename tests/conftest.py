@@ -1,7 +1,7 @@
 """What holds for every test: how properties are searched, and that processes run the code under test.
 
-Hundreds of tests start a process, and each would compile the whole package again where Python was told to keep
-no bytecode: half of what such a test takes. It is kept, here and there, in `__pycache__` as usual.
+Hundreds of tests start a process, and each would compile the whole package again where Python was told to
+keep no bytecode: half of what such a test takes. It is kept in `__pycache__`, as usual.
 
 Properties are tried on the same examples in every run, so that a verdict depends on the commit alone.
 `pytest --hypothesis-profile=search` tries new ones.

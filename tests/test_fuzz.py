@@ -160,15 +160,15 @@ def test_a_worker_that_dies_or_hangs_is_an_outcome_and_is_replaced(then: str, wo
 
 @pytest.mark.slow
 def test_a_short_run_of_mutants_finds_nothing(tmp_path: Path) -> None:
-    counts = fuzz.fuzz(fuzz.shares(["mutants"], 60, 0), seed=20, jobs=1, timeout=60.0, keep=tmp_path)
+    counts = fuzz.fuzz(fuzz.shares(["mutants"], 40, 0), seed=20, jobs=1, timeout=60.0, keep=tmp_path)
     assert set(counts) <= set(GOOD), sorted(tmp_path.iterdir())
-    assert sum(counts.values()) == 60
-    assert counts["verified"] > 15
+    assert sum(counts.values()) == 40
+    assert counts["verified"] > 10
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", robots.FAMILIES)
 def test_a_short_run_of_whole_robots_finds_nothing(family: str) -> None:
-    words = Counter(judge_case(robots.robot(20, family, number)).word for number in range(8))
+    words = Counter(judge_case(robots.robot(20, family, number)).word for number in range(5))
     assert set(words) <= set(GOOD), words
     assert words["verified"] > 2

@@ -96,7 +96,7 @@ def test_compiling_runs_nothing_there(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder.parent / "cache"))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    run(folder, command, "validate", str(ROBOTS / "one_link.urdf"), "--samples", "0")
+    run(folder, command, "placement", str(ROBOTS / "one_link.urdf"))
     assert list((folder.parent / "cache").rglob("*.kernel"))
 
 
@@ -108,7 +108,7 @@ def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
 
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend("")  # as in `python -c`
-    assert ahead._compile_elsewhere(()).wait() == 0
+    assert ahead._compile_elsewhere(("placements",)).wait() == 0
     assert planted_code_ran(folder) == []
 
 

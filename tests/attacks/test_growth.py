@@ -50,7 +50,9 @@ def grows_like_its_size(work: Callable[[int], object], size: int) -> None:
 
     with at_most(ENOUGH):
         small = min(seconds(size) for _ in range(2))
-        large = min(seconds(4 * size) for _ in range(2))
+        large = seconds(4 * size)
+        if large >= TIMES * small + MORE:  # once more: it may have been the machine
+            large = min(large, seconds(4 * size))
     assert large < TIMES * small + MORE, (small, large)
 
 
@@ -74,7 +76,7 @@ def test_a_document_four_times_as_long_takes_about_four_times_the_memory(kind: s
             tracemalloc.stop()
 
     with at_most(ENOUGH):
-        assert megabytes(100_000) < 6.0 * megabytes(25_000) + 1.0
+        assert megabytes(50_000) < 6.0 * megabytes(12_500) + 0.5
 
 
 @pytest.mark.slow

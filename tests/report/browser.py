@@ -40,11 +40,23 @@ def require_chromium() -> tuple[str, str]:
     return found
 
 
+#: Nothing is drawn in space: without a graphics card that takes most of the time.
+_NOTHING_DRAWN = """for (const what of ["Arrays", "Elements", "RangeElements"])
+  for (const many of ["", "Instanced"])
+    WebGL2RenderingContext.prototype["draw" + what + many] = () => {};"""
+
+
 @contextmanager
 def opened(
-    profile: Path, *, width: int = 1280, height: int = 1000, dark: bool = False, flags: tuple[str, ...] = ()
+    profile: Path,
+    *,
+    width: int = 1280,
+    height: int = 1000,
+    dark: bool = False,
+    draws: bool = True,
+    flags: tuple[str, ...] = (),
 ) -> Iterator[Browser]:
-    """A browser with an empty profile; `flags` are Chromium's own."""
+    """An empty profile; `flags` are Chromium's own; without `draws` nothing is drawn in space."""
     binary, driver = require_chromium()
     options = webdriver.ChromeOptions()
     options.binary_location = binary
@@ -54,13 +66,11 @@ def opened(
     chrome = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
     chrome.set_script_timeout(120)  # a busy machine is no error
     try:
-        chrome.execute_cdp_cmd(
-            "Emulation.setDeviceMetricsOverride",
-            {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600},
-        )
-        theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
-        chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": theme})
-        yield Browser(chrome)
+        if not draws:
+            chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": _NOTHING_DRAWN})
+        browser = Browser(chrome)
+        browser.become(width, height, dark=dark)
+        yield browser
     finally:
         chrome.quit()
 
@@ -70,6 +80,13 @@ class Browser:
 
     def __init__(self, chrome: webdriver.Chrome) -> None:
         self.chrome = chrome
+
+    def become(self, width: int = 1280, height: int = 1000, *, dark: bool = False) -> None:
+        """A desk's or a telephone's screen, in a light or a dark theme."""
+        screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
+        self.chrome.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+        theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+        self.chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": theme})
 
     def open(self, path: Path) -> None:
         """Load a file, then put the probes into it."""

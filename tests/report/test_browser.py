@@ -36,6 +36,13 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 
 @pytest.fixture
+def screen(desk: Browser) -> Iterator[Browser]:
+    """The same browser, which a test makes another screen of."""
+    yield desk
+    desk.become()
+
+
+@pytest.fixture
 def browser(desk: Browser, pages: dict[str, Path]) -> Browser:
     """The page of the two arms, the first unfolded, its view drawn."""
     desk.requests()
@@ -99,17 +106,17 @@ def test_paper_folds_neither_worst_cases_nor_findings(browser: Browser) -> None:
 
 
 def test_a_phone_shows_verdict_and_share_of_the_bound_beside_the_name(
-    tmp_path: Path, pages: dict[str, Path]
+    screen: Browser, pages: dict[str, Path]
 ) -> None:
-    with opened(tmp_path, width=390, height=844) as phone:
-        phone.open(pages["failing"])
-        edges = phone.js(
-            "return [...document.querySelectorAll('#overview tbody tr')]"
-            ".map((row) => [1, 2].map((k) => row.cells[k].getBoundingClientRect().right))"
-        )
-        assert edges
-        assert all(edge <= 390 for row in edges for edge in row)
-        phone.screenshot("report-390")
+    screen.become(390, 844)
+    screen.open(pages["failing"])
+    edges = screen.js(
+        "return [...document.querySelectorAll('#overview tbody tr')]"
+        ".map((row) => [1, 2].map((k) => row.cells[k].getBoundingClientRect().right))"
+    )
+    assert edges
+    assert all(edge <= 390 for row in edges for edge in row)
+    screen.screenshot("report-390")
 
 
 def test_the_keyboard_turns_the_view(browser: Browser) -> None:
@@ -201,24 +208,25 @@ def test_a_hostile_name_does_nothing(desk: Browser, pages: dict[str, Path]) -> N
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 390], ids=["desk", "phone"])
 def test_it_reads_well_in_both_themes_at_both_widths(
-    dark: bool, width: int, pages: dict[str, Path], tmp_path: Path
+    dark: bool, width: int, pages: dict[str, Path], screen: Browser
 ) -> None:
     """Contrast of all text, nothing wider than the screen, and pictures to look at."""
     name = f"report-{'dark' if dark else 'light'}-{'desk' if width > 600 else 'phone'}"
-    with opened(tmp_path, width=width, height=1000, dark=dark) as browser:
-        browser.open(pages["failing"])
-        browser.screenshot(f"{name}-top")
-        browser.probe("unfoldAll")
-        browser.settle()
-        texts, poor = browser.probe("poorContrast")
-        assert texts > 500
-        assert poor == []
-        assert browser.js("return document.documentElement.scrollWidth") <= width
-        for part in (".view", ".pair", ".dh", ".cases"):
-            browser.js("document.querySelector(arguments[0]).scrollIntoView()", part)
-            browser.settle()
-            browser.screenshot(f"{name}-{part[1:]}")
-        assert browser.errors() == []
+    screen.errors()
+    screen.become(width, dark=dark)
+    screen.open(pages["failing"])
+    screen.screenshot(f"{name}-top")
+    screen.probe("unfoldAll")
+    screen.settle()
+    texts, poor = screen.probe("poorContrast")
+    assert texts > 500
+    assert poor == []
+    assert screen.js("return document.documentElement.scrollWidth") <= width
+    for part in (".view", ".pair", ".dh", ".cases"):
+        screen.js("document.querySelector(arguments[0]).scrollIntoView()", part)
+        screen.settle()
+        screen.screenshot(f"{name}-{part[1:]}")
+    assert screen.errors() == []
 
 
 @pytest.mark.parametrize("width", [1280, 980, 760])

@@ -241,7 +241,7 @@ def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(tmp_path
     require_chromium()
     server = new_server(port=free_port())
     try:
-        # Without its shapes: a browser that draws them by software would spend its time there.
+        # Without its shapes, and nothing is drawn: by software a browser would spend its time there.
         bare = re.sub(r"<visual>.*?</visual>", "", urdfkin.load("panda").urdf, flags=re.DOTALL)
         viewer = Viewer(server, urdfkin.load(bare))
         n = len(viewer.sliders.rows)
@@ -250,7 +250,7 @@ def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(tmp_path
             shown = _sliders(browser, n)
             return len(shown) == n and bool(np.allclose(shown, viewer.q, rtol=0.0, atol=1e-12))
 
-        with opened(tmp_path, width=width, height=844) as browser:
+        with opened(tmp_path, width=width, height=844, draws=False) as browser:
             browser.chrome.get(server.address)
             assert _until(equal)
             viewer.set_q(viewer.robot.sample(1, 3)[0])
