@@ -15,9 +15,10 @@ from __future__ import annotations
 import argparse
 import ast
 import json
+import multiprocessing
 import os
 import random
-import subprocess
+import runpy
 import sys
 import tempfile
 import time
@@ -105,34 +106,46 @@ def judge_named(slip: Named, *, timeout: float) -> Outcome:
     return Outcome(mutant, word, by, round(time.perf_counter() - begin, 1))
 
 
+#: Forks a process for each run of tests that has the libraries of others in it already, and nothing of ours:
+#: to import them takes longer than most tests.
+_READY = multiprocessing.get_context("forkserver")
+_READY.set_forkserver_preload(["numba", "pinocchio", "pytest"])
+
+
 def _run(slip: dict[str, str], tests: list[str], timeout: float) -> tuple[str, str]:
-    paths = [str(ROOT / "scripts" / "mutating" / "hook"), str(ROOT), os.environ.get("PYTHONPATH", "")]
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider"]
-    with tempfile.TemporaryFile("w+") as said:
-        try:
-            done = subprocess.run(
-                [*command, "--tb=no", *tests],
-                cwd=ROOT,
-                env={
-                    **os.environ,
-                    **slip,
-                    "PYTHONPATH": os.pathsep.join(filter(None, paths)),
-                    "PYTHONDONTWRITEBYTECODE": "1",
-                },
-                stdin=subprocess.DEVNULL,
-                stdout=said,
-                stderr=subprocess.STDOUT,
-                timeout=timeout,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
+    with tempfile.NamedTemporaryFile("r") as said:
+        process = _READY.Process(target=_ask, args=(slip, tests, said.name))
+        process.start()
+        process.join(timeout)
+        if process.exitcode is None:
+            process.kill()
+            process.join()
             return "too slow", ""
-        said.seek(0)
         lines = said.read().splitlines()
-    if done.returncode in (0, _NO_TESTS):
+    if process.exitcode in (0, _NO_TESTS):
         return "survived", ""
     failed = (line for line in lines if line.startswith(("FAILED", "ERROR")))
     return "noticed", next(failed, lines[-1] if lines else "")[:300]
+
+
+def _ask(slip: dict[str, str], tests: list[str], said: str) -> None:
+    """In that process: make the slip, for what it starts too, and run the tests. Exit: as pytest."""
+    import pytest  # noqa: PLC0415  of the children alone
+
+    hook = ROOT / "scripts" / "mutating" / "hook"
+    paths = [str(hook), str(ROOT), os.environ.get("PYTHONPATH", "")]
+    os.chdir(ROOT)
+    os.environ |= slip | {
+        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    sys.dont_write_bytecode = True
+    with open(said, "w") as to, open(os.devnull) as nothing:  # noqa: PTH123  as descriptors
+        os.dup2(nothing.fileno(), 0)
+        os.dup2(to.fileno(), 1)
+        os.dup2(to.fileno(), 2)
+    runpy.run_path(str(hook / "sitecustomize.py"))
+    sys.exit(pytest.main(["-x", "-q", "--no-header", "-p", "no:cacheprovider", "--tb=no", *tests]))
 
 
 def main() -> int:

@@ -7,4 +7,5 @@ ruff format --check .
 ruff check .
 mypy
 python scripts/changelog_gate.py
+urdfkin warm  # once, by both processors, and not by every worker for itself
 exec pytest -n 2 --dist worksteal "$@"

@@ -72,8 +72,9 @@ def test_the_site_opens_from_a_disc_asks_no_network_and_can_be_searched(site: Pa
 
 @pytest.mark.slow
 @pytest.mark.browser
-def test_no_page_is_wider_than_a_phone(site: Path, tmp_path: Path) -> None:
-    with opened(tmp_path, width=390, height=844) as phone:
+def test_no_page_is_wider_than_a_phone(site: Path, desk: Browser) -> None:
+    desk.become(390, 844)
+    try:
         for page in (
             "index",
             "questions",
@@ -83,9 +84,11 @@ def test_no_page_is_wider_than_a_phone(site: Path, tmp_path: Path) -> None:
             "cli",
             "api",
         ):
-            phone.open(site / f"{page}.html")
-            phone.settle()
-            assert phone.js("return document.documentElement.scrollWidth") <= 390, page
+            desk.open(site / f"{page}.html")
+            desk.settle()
+            assert desk.js("return document.documentElement.scrollWidth") <= 390, page
+    finally:
+        desk.become()
 
 
 @pytest.fixture(scope="module")

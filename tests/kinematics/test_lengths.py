@@ -53,7 +53,7 @@ def both(result: Any) -> tuple[Any, ...]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EQUATIONS)
 @given(data=st.data())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_result_of_an_equation_is_longer_than_it_is_on_lengths(name: str, data: st.DataObject) -> None:
     given: dict[str, Any] = {
         x: data.draw(rotations if x == "R" else numbers if x in numbers_of(name) else vectors)
@@ -73,7 +73,7 @@ def test_no_result_of_an_equation_is_longer_than_it_is_on_lengths(name: str, dat
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EQUATIONS)
 @given(data=st.data())
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_what_is_longer_makes_nothing_shorter(name: str, data: st.DataObject) -> None:
     pairs = {x: sorted((data.draw(sizes), data.draw(sizes))) for x in parameters(name)}
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
@@ -95,7 +95,7 @@ def test_a_product_is_no_less_than_the_smallest_normal_number_unless_a_factor_is
 
 @pytest.mark.slow
 @given(trees(max_joints=6), st.integers(0, 2**32), st.sampled_from([1.0, 1e-3, 1e3, 1e-170]))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_no_motion_of_any_link_of_any_tree_exceeds_its_size(
     tree: KinematicTree, seed: int, speed: float
 ) -> None:

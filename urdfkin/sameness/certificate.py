@@ -140,7 +140,9 @@ def _against(document: Mapping[str, Any], judge: Judge) -> Iterator[str]:
             proven = upper_bounds(found, variables, frame, grid)
             if holds := _within(proven[0], metres, rounding[0]) and _within(proven[1], radians, rounding[1]):
                 break
-        if not holds and _within(proven[1], radians, rounding[1]):
+        # A claim below what is attained is not searched for: no search could prove it.
+        possible = metres >= claim["lower"] - rounding[0]
+        if not holds and possible and _within(proven[1], radians, rounding[1]):
             proven = tightened(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
             holds = _within(proven[0], metres, rounding[0])
         if not holds:

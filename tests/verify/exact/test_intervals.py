@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.high_precision import mp as independent
@@ -15,7 +15,6 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.exact.intervals import ends, intervals, of_digits
 from urdfkin.verify.exact.vectors import Matrix
 
-unhurried = settings(deadline=None)
 BITS = (53, 169)
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -46,13 +45,11 @@ def test_a_decimal_lies_in_its_interval_however_large_its_exponent(word: str, bi
     assert high - low <= abs(Fraction(word)) / 2 ** (bits - 3)
 
 
-@unhurried
 @given(finite)
 def test_a_double_is_an_interval_of_itself(x: float) -> None:
     assert true_ends(intervals(53).mpf(x)) == (Fraction(x), Fraction(x))
 
 
-@unhurried
 @pytest.mark.parametrize("bits", BITS)
 @given(x=st.floats(1e-300, 1e300))
 def test_the_squares_of_a_roots_ends_lie_on_either_side(bits: int, x: float) -> None:
@@ -66,7 +63,6 @@ def test_the_root_of_a_square_is_exact() -> None:
 
 
 @pytest.mark.slow
-@unhurried
 @pytest.mark.parametrize("bits", BITS)
 @given(angle=st.one_of(finite, st.floats(-7.0, 7.0), st.integers(-9, 9).map(lambda k: k * math.pi / 2)))
 def test_cosine_and_sine_of_every_double_lie_in_their_intervals(bits: int, angle: float) -> None:
@@ -99,7 +95,6 @@ def orthogonal_factor(M: FloatArray) -> Any:
 
 
 @pytest.mark.slow
-@unhurried
 @pytest.mark.parametrize("digits", [15, 50])
 @given(R=rotations, off=st.integers(0, 2**32 - 1).map(np.random.default_rng))
 def test_the_nearest_rotation_lies_in_its_intervals(digits: int, R: FloatArray, off: Any) -> None:
@@ -129,7 +124,6 @@ def test_a_rotation_is_its_own_nearest_without_width() -> None:
 numerators = st.integers(-(2**200), 2**200)
 
 
-@unhurried
 @given(numerators, st.integers(-1400, 1100))
 def test_doubles_around_an_interval_lie_outside_it_and_next_to_it(man: int, exponent: int) -> None:
     context = intervals(400)
