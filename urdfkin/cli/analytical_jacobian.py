@@ -58,8 +58,6 @@ REPRESENTATIONS = ("quaternion", *(triple.upper() for triple in _TRIPLES), *_TRI
 def command(
     context: click.Context,
     robot: str,
-    mimic: bool | None,
-    root_joint: str | None,
     frame: str | None,
     representation: str,
     nearest: float | None,
@@ -80,7 +78,7 @@ def command(
 
     format_ = form_of(context, output, ENDINGS, "csv")
     check_writable(output)
-    loaded = load_robot(robot, mimic, root_joint, verify=verify, oracle=oracle)
+    loaded = load_robot(robot, verify=verify, oracle=oracle)
     x = with_base(read_inputs(loaded, frame, seed, q), base_placement)
     nearest = NEAREST if nearest is None else nearest
     with compiling():

@@ -43,18 +43,28 @@ def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
     return decorate
 
 
+_HOW = "urdfkin.how_to_load"
+
+
+def _remember(context: click.Context, parameter: click.Parameter, value: object) -> None:
+    """Keep an option for `how_to_load`, so that no command has to hand it on."""
+    context.meta.setdefault(_HOW, {})[parameter.name] = value
+
+
 def _remember_xacro_args(context: click.Context, _: click.Parameter, words: Sequence[str]) -> None:
-    """Keep xacro arguments for `xacro_args`, so that no command has to hand them on."""
     arguments = {}
     for word in words:
         name, colon, value = word.partition(":=")
         if not colon or not name:
             raise click.BadParameter(f"{word!r} is not NAME:=VALUE")
         arguments[name] = value
-    context.meta[_XACRO] = arguments
+    context.meta.setdefault(_HOW, {})["xacro_args"] = arguments
 
 
-_XACRO = "urdfkin.xacro_args"
+def how_to_load() -> dict[str, Any]:
+    """What the running command takes of `load`'s `mimic`, `root_joint` and `xacro_args`, as it was given."""
+    return dict(click.get_current_context().meta.get(_HOW, {}))
+
 
 xacro_option = click.option(
     "--xacro-arg",
@@ -66,23 +76,22 @@ xacro_option = click.option(
 )
 
 
-def xacro_args() -> dict[str, str]:
-    """What the running command was given as --xacro-arg."""
-    given: dict[str, str] = click.get_current_context().meta.get(_XACRO, {})
-    return given
+def mimic_option(help_: str) -> Callable[[_F], _F]:
+    """Whether followers follow, for `how_to_load`."""
+    return click.option(
+        "--mimic/--no-mimic", default=None, expose_value=False, callback=_remember, help=help_
+    )
+
+
+def root_joint_option(help_: str) -> Callable[[_F], _F]:
+    """What the root link hangs from, for `how_to_load`."""
+    joints = click.Choice(["floating", "planar"])
+    return click.option("--root-joint", type=joints, expose_value=False, callback=_remember, help=help_)
 
 
 robot_options = together(
-    click.option(
-        "--mimic/--no-mimic",
-        default=None,
-        help="Whether mimic joints follow their leaders (the URDF's meaning, the default).",
-    ),
-    click.option(
-        "--root-joint",
-        type=click.Choice(["floating", "planar"]),
-        help="Hang the root link from a moving joint.",
-    ),
+    mimic_option("Whether mimic joints follow their leaders (the URDF's meaning, the default)."),
+    root_joint_option("Hang the root link from a moving joint."),
     xacro_option,
 )
 robot_argument = together(
@@ -161,21 +170,13 @@ class Inputs:
         return replace(self, said={**self.said, **more})
 
 
-def load_robot(
-    source: str,
-    mimic: bool | None,
-    root_joint: str | None,
-    *,
-    verify: bool = True,
-    oracle: WitnessName = "pinocchio",
-) -> Robot:
-    """The robot of a command; its warnings go to stderr, one line each."""
+def load_robot(source: str, *, verify: bool = True, oracle: WitnessName = "pinocchio", **how: Any) -> Robot:
+    """The robot of a command, loaded as its options say or `how` does; warnings go to stderr, a line each."""
     from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        how: dict[str, Any] = {"mimic": mimic, "root_joint": root_joint, "xacro_args": xacro_args()}
-        robot = load(source, **how, verify=verify, oracle=oracle)
+        robot = load(source, **how_to_load() | how, verify=verify, oracle=oracle)
     for warning in caught:
         say(str(warning.message), err=True)
     return robot

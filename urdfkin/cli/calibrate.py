@@ -62,8 +62,6 @@ _FILE = click.Path(path_type=Path)
 def command(
     context: click.Context,
     robot: str,
-    mimic: bool | None,
-    root_joint: str | None,
     poses: Path | None,
     like: str | None,
     ur: Path | None,
@@ -94,7 +92,7 @@ def command(
     if len(given) > 1:
         raise InputError("one model at a time", found=", ".join(f"--{name}" for name in given))
     _refuse_idle(context, given)
-    loaded = load_robot(robot, mimic, root_joint)
+    loaded = load_robot(robot)
     with compiling():
         found = None if ur is not None else _calibrated(context, loaded)
         written = _of_the_factory(loaded, ur, order) if ur is not None else found.written if found else None
@@ -149,7 +147,9 @@ def _calibrated(context: click.Context, robot: Robot) -> Calibration:
     asked = context.params
     tip, base = asked["tip"], asked["base"]
     if asked["like"] is not None:
-        return calibrate_like(robot, load_robot(asked["like"], None, None), tip=tip, base=base)
+        return calibrate_like(
+            robot, load_robot(asked["like"], mimic=None, root_joint=None), tip=tip, base=base
+        )
     table = read_table_or_screws(asked["robot"]) if is_table_file(asked["robot"]) else None
     source = table if isinstance(table, DHTable) else robot
     path = robot.chain(tip, base)

@@ -46,8 +46,6 @@ _ENDINGS = {".json": ("json",), ".csv": ("csv",)}
 def command(
     context: click.Context,
     robot: str,
-    mimic: bool | None,
-    root_joint: str | None,
     base: str | None,
     tip: str | None,
     q: str,
@@ -68,7 +66,7 @@ def command(
     from urdfkin.verify.pinocchio import version  # noqa: PLC0415
 
     format_ = form_of(context, output, _ENDINGS, "csv")
-    loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    loaded = load_robot(robot, verify=verify)
     path = loaded.chain(tip, base)
     at = read_inputs(loaded, path.tip, seed, q).q
     if len(at) != 1:

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from urdfkin.cli.arguments import together, xacro_args, xacro_option
+from urdfkin.cli.arguments import how_to_load, mimic_option, root_joint_option, together, xacro_option
 from urdfkin.cli.checked import STYLES, Outcome, print_outcome, say_fixed, show_difference
 from urdfkin.cli.completing import complete_code, complete_file
 from urdfkin.cli.door import say
@@ -107,10 +107,8 @@ limit_options = together(
 @click.option("--statistics", is_flag=True, help="Print how many there are of each code.")
 @choice_options
 @click.option("--each", is_flag=True, help="Print each place instead of folding many of a kind into one.")
-@click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow.  [default: they do]")
-@click.option(
-    "--root-joint", type=click.Choice(["floating", "planar"]), help="Check the names this joint needs, too."
-)
+@mimic_option("Whether mimic joints follow.  [default: they do]")
+@root_joint_option("Check the names this joint needs, too.")
 @xacro_option
 @settings_options
 @limit_options
@@ -156,11 +154,12 @@ def _run(settings: Settings, options: dict[str, Any]) -> Run:
     writing = options["write_baseline"] is not None
     known = None if writing or options["baseline"] is None else read_baseline(options["baseline"])
     since = options["changed_since"]
+    how = how_to_load()
     look = partial(
         examine,
         limits=Limits(**{limit.name: options[f"max_{limit.name}"] for limit in fields(Limits)}),
-        mimic=options["mimic"],
-        root_joint=options["root_joint"],
+        mimic=how["mimic"],
+        root_joint=how["root_joint"],
     )
     return Run(
         look=look,
@@ -220,7 +219,7 @@ class Run:
                     self.outcome.unreadable.append(error)
 
     def _check(self, file: str) -> None:
-        text = read_source(file, self.look.keywords["limits"].bytes, xacro_args())
+        text = read_source(file, self.look.keywords["limits"].bytes, how_to_load()["xacro_args"])
         before = None
         if self.version is not None:
             before = known_before(text, self.version, self.look)

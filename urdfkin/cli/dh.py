@@ -158,8 +158,6 @@ def command(
     context: click.Context,
     /,
     robot: str,
-    mimic: bool | None,
-    root_joint: str | None,
     verify: bool,
     output: Path | None,
     **options: Any,
@@ -182,7 +180,7 @@ def command(
     options["format_"] = form_of(context, output, ENDINGS, "terminal")
     _refuse_idle(context, is_table, options)
     check_writable(output)
-    loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    loaded = load_robot(robot, verify=verify)
     written = robot if is_table and not any(typed(context, name) for name in _DERIVED) else None
     if (written or options["like"]) and not typed(context, "convention"):
         options["convention"] = None

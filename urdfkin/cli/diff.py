@@ -43,7 +43,7 @@ def command(
     from urdfkin.sameness.changes import diff  # noqa: PLC0415
 
     check_writable(markdown)
-    old, new = load_robot(a, None, None), load_robot(b, None, None)
+    old, new = load_robot(a), load_robot(b)
     with compiling():
         found = diff(old, new, effects=effects)
     if markdown is not None:

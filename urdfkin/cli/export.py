@@ -49,8 +49,6 @@ def command(
     context: click.Context,
     /,
     robot: str | None,
-    mimic: bool | None,
-    root_joint: str | None,
     frame: str | None,
     quantities: tuple[str, ...],
     reference: str,
@@ -81,7 +79,7 @@ def command(
     from urdfkin.export.code import code_of  # noqa: PLC0415  keeps --help fast
 
     assert robot is not None
-    loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    loaded = load_robot(robot, verify=verify)
     wanted = [word.strip() for words in quantities for word in words.split(",")] or list(QUANTITIES)
     code = code_of(
         loaded.verifier, loaded.plan, frame or loaded.tip_frame, wanted, reference, name=name, verify=verify

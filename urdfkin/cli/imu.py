@@ -55,8 +55,6 @@ _TRAJECTORY = f"{TRAJECTORY_HELP[:-1]}, base_placement, base_velocity, base_acce
 def command(
     context: click.Context,
     robot: str,
-    mimic: bool | None,
-    root_joint: str | None,
     frame: str | None,
     gravity: str,
     trajectory: Path | None,
@@ -83,7 +81,7 @@ def command(
     from urdfkin.motion.columns import numbers  # noqa: PLC0415  keeps --help fast
 
     format_ = form_of(context, output, ENDINGS, "csv")
-    loaded = load_robot(robot, mimic, root_joint, verify=verify, oracle=oracle)
+    loaded = load_robot(robot, verify=verify, oracle=oracle)
     if trajectory is None:
         x = read_inputs(loaded, frame, seed, q, v, a)
         x = with_base(x, base_placement, base_velocity, base_acceleration)

@@ -22,14 +22,14 @@ EXAMPLE = "urdfkin info panda"
 @click.command(epilog=f"Example: {EXAMPLE}")
 @robot_argument
 @click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
-def command(robot: str, mimic: bool | None, root_joint: str | None, format_: str) -> None:
+def command(robot: str, format_: str) -> None:
     """A robot's tree: links, joints, axes, limits, places in q and v, and who follows whom.
 
     Joints stand in the order of q, v and of a Jacobian's columns, which is Pinocchio's; where the file has
     another, a line says so. Limits are in rad and rad/s, of prismatic joints in m and m/s. A link that is not
     indented hangs from the one above it; where several hang from one link, lines lead to them.
     """
-    loaded = load_robot(robot, mimic, root_joint)
+    loaded = load_robot(robot)
     if format_ == "json":
         from urdfkin.validation.description import describe  # noqa: PLC0415  keeps --help fast
 

@@ -58,8 +58,6 @@ _SHOWN = 5
 def command(
     context: click.Context,
     robot: str,
-    mimic: bool | None,
-    root_joint: str | None,
     frame: str | None,
     rows: str,
     q: str,
@@ -76,7 +74,7 @@ def command(
     singular value cannot be told from 0.
     """
     format_ = form_of(context, output, _ENDINGS, "csv")
-    loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    loaded = load_robot(robot, verify=verify)
     x = read_inputs(loaded, frame, seed, q)
     with compiling():
         found = loaded.singular_values(x.q, x.frame, rows)

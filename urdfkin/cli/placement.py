@@ -75,8 +75,6 @@ _FORMS = {
 def command(
     context: click.Context,
     robot: str,
-    mimic: bool | None,
-    root_joint: str | None,
     frame: str | None,
     relative_to: str | None,
     written: str,
@@ -99,7 +97,7 @@ def command(
     check_writable(output)
     if relative_to is not None:
         refuse_idle(context, ("base_placement",), "with --relative-to, which moves with the base")
-    loaded = load_robot(robot, mimic, root_joint, verify=verify, oracle=oracle)
+    loaded = load_robot(robot, verify=verify, oracle=oracle)
     x = with_base(read_inputs(loaded, frame, seed, q), base_placement)
     with compiling():
         if relative_to is None:

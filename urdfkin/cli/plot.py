@@ -73,8 +73,6 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
 def command(
     context: click.Context,
     robot: str,
-    mimic: bool | None,
-    root_joint: str | None,
     frame: str | None,
     reference: str,
     trajectory: Path | None,
@@ -100,7 +98,7 @@ def command(
     from urdfkin.view.plot.sheet import foot, sheet  # noqa: PLC0415
 
     check_writable(output)
-    loaded = load_robot(robot, mimic, root_joint)
+    loaded = load_robot(robot)
     if trajectory is not None:
         motion = read_trajectory(loaded, trajectory)
         for note in (*motion.notes, *loaded.limit_violations(motion.q)):

@@ -46,8 +46,6 @@ def command_of(quantity: Quantity) -> click.Command:
         context: click.Context,
         /,
         robot: str,
-        mimic: bool | None,
-        root_joint: str | None,
         frame: str | None,
         seed: int,
         verify: bool,
@@ -65,7 +63,7 @@ def command_of(quantity: Quantity) -> click.Command:
     ) -> None:
         format_ = form_of(context, output, ENDINGS, "csv")
         check_writable(output)
-        loaded = load_robot(robot, mimic, root_joint, verify=verify, oracle=oracle)
+        loaded = load_robot(robot, verify=verify, oracle=oracle)
         x = read_inputs(loaded, frame, seed, q, v, a)
         x = with_base(x, base_placement, base_velocity, base_acceleration)
         if explain:

@@ -90,7 +90,7 @@ def command(
     if a is None or b is None:
         raise click.UsageError("name two models: urdfkin same A B")
     check_writable(certificate, markdown, html)
-    robots = load_robot(a, None, None), load_robot(b, None, None)
+    robots = load_robot(a), load_robot(b)
     with compiling():
         if recheck is not None:
             from urdfkin.sameness.certificate import recheck as held  # noqa: PLC0415

@@ -26,8 +26,6 @@ FORMS = ("terminal", "latex", "toml", "json", "numpy", "matlab")
 def command(
     context: click.Context,
     robot: str,
-    mimic: bool | None,
-    root_joint: str | None,
     base: str | None,
     tip: str | None,
     format_: str,
@@ -48,7 +46,7 @@ def command(
     from urdfkin.verify.pinocchio import version  # noqa: PLC0415
     from urdfkin.verify.screws import check_screws  # noqa: PLC0415
 
-    loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    loaded = load_robot(robot, verify=verify)
     screws = loaded.screws(tip, base, verify=False)
     said = check_screws(loaded.verifier, screws) if verify else None
     line = f"Pinocchio {version()}: {said}" if said else f"NOT VERIFIED by Pinocchio {version()}"

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 def command(
     context: click.Context,
     robot: str,
-    mimic: bool | None,
-    root_joint: str | None,
     base: str | None,
     tip: str | None,
     opw: float | None,
@@ -53,7 +51,7 @@ def command(
     from urdfkin.verify.pinocchio import version  # noqa: PLC0415
     from urdfkin.verify.screws import check_screws  # noqa: PLC0415
 
-    loaded = load_robot(robot, mimic, root_joint, verify=verify)
+    loaded = load_robot(robot, verify=verify)
     if opw is not None:
         context.exit(_opw(loaded, loaded.chain(tip, base), opw / 1e3, verify=verify))
     screws = loaded.screws(tip, base, verify=False)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 import click
 
-from urdfkin.cli.arguments import xacro_args, xacro_option
+from urdfkin.cli.arguments import how_to_load, mimic_option, root_joint_option, xacro_option
 from urdfkin.cli.completing import complete_robot
 from urdfkin.cli.door import say
 from urdfkin.cli.idle import refuse_idle
@@ -43,8 +43,8 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
     help="The same seed gives the same numbers.",
 )
 @click.option("--jobs", type=Whole(1), default=1, show_default=True, help="Local processes.")
-@click.option("--mimic/--no-mimic", default=None, help="Whether mimic joints follow (the default).")
-@click.option("--root-joint", type=click.Choice(["floating", "planar"]), help="Hang the root from a joint.")
+@mimic_option("Whether mimic joints follow (the default).")
+@root_joint_option("Hang the root from a joint.")
 @click.option(
     "--oracle",
     type=click.Choice(["pinocchio", "mujoco"]),
@@ -74,8 +74,6 @@ def command(
     samples: int,
     seed: int,
     jobs: int,
-    mimic: bool | None,
-    root_joint: str | None,
     judged: bool,
     judge_samples: int,
     judge_moving_base: bool,
@@ -119,8 +117,8 @@ def command(
     from urdfkin.validation.judging import Asked  # noqa: PLC0415
 
     check_writable(json_, html, junit, markdown)
-    how: dict[str, Any] = {"mimic": mimic, "root_joint": root_joint, "xacro_args": xacro_args()}
-    if xacro_args() and not any(map(is_xacro, robots)):
+    how = how_to_load()
+    if how["xacro_args"] and not any(map(is_xacro, robots)):
         refuse_idle(context, ("xacro_arg",), "without a .xacro file")
     given = [_once(robot, how) if judged else robot for robot in robots or examples()]
     with stoppable() as stop, compiling(), _cluster(scheduler) as on, progress(as_json=json_progress) as tell:

@@ -30,8 +30,6 @@ EXAMPLE = "urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04"
 @click.option("--port", type=Whole(1, 65535), default=8080, show_default=True)
 def command(
     robot: str,
-    mimic: bool | None,
-    root_joint: str | None,
     q: str,
     seed: int,
     host: str,
@@ -50,7 +48,7 @@ def command(
     from urdfkin.view.server import new_server  # noqa: PLC0415  keeps --help fast
     from urdfkin.view.viewer import Viewer  # noqa: PLC0415
 
-    loaded = load_robot(robot, mimic, root_joint)
+    loaded = load_robot(robot)
     begin = None if q == "neutral" else read_inputs(loaded, None, seed, q).q
     if begin is not None and len(begin) != 1:
         raise InputError("the viewer begins at one configuration", where="--q", found=str(len(begin)))
