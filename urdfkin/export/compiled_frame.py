@@ -33,6 +33,8 @@ from urdfkin.verify.verifier import Verifier
 
 #: Configurations that Pinocchio is asked about, besides the neutral one and the ends of the limits.
 CHECKED = 100
+#: Of eight configurations they lie on the stack, half a megabyte at most.
+_MOST_RESULTS = 8192
 _PLACES = Task.Q, Task.V, Task.A
 _compiling = lock_over_forks()
 
@@ -79,6 +81,7 @@ class CompiledFrame:
         self._velocity: Fast = partial(self._first, "velocity")
         self._jacobian: Fast = partial(self._first, "jacobian")
         self._jacobian_rate: Fast = partial(self._first, "jacobian rate")
+        self._hessian: Fast = partial(self._first, "hessian")
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
@@ -112,6 +115,12 @@ class CompiledFrame:
         if threads is None and (one := self._jacobian_rate(q, v, out)) is not None:
             return one
         return self._computed("jacobian rate", (q, v), out, threads)
+
+    def hessian(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
+        """(..., 6, nv, nv): how each rate changes each column, eq. 7.126 before it is summed."""
+        if threads is None and (one := self._hessian(q, out)) is not None:
+            return one
+        return self._computed("hessian", (q,), out, threads)
 
     def acceleration(
         self,
@@ -157,7 +166,7 @@ class CompiledFrame:
     def _made(self, row: Quantity) -> Any:
         verifier = self._robot.verifier
         code = bare(verifier.tree, self._plan, self.frame, [row], self.reference, "robot")
-        if not code.functions[0].results:
+        if not 0 < len(code.functions[0].results) <= _MOST_RESULTS:
             return None
         try:
             made = library(code).task

@@ -8,6 +8,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+import numpy as np
+
 from urdfkin.errors.printable import latex_text
 from urdfkin.export.code import Code, Writer
 from urdfkin.export.expression import Node
@@ -29,6 +31,7 @@ _RESULTS = {
     "velocity": "v",
     "jacobian": "J",
     "jacobian_rate": r"\dot{J}",
+    "hessian": "H",
     "acceleration": "a",
 }
 
@@ -63,16 +66,10 @@ def _function(code: Code, function: Function) -> Iterator[str]:
         place, _, numbers = head.partition(": ")
         yield rf"{latex_text(place)}{f' ({numbers})' if numbers else ''}:"
         yield from _aligned((word, value) for word, value in lines)
-    width = (*function.shape, 1)[1]
     letter = _RESULTS[function.name]
     yield from _aligned(
-        (
-            f"{letter}_{{{k // width + 1},{k % width + 1}}}"
-            if len(function.shape) > 1
-            else f"{letter}_{{{k + 1}}}",
-            value,
-        )
-        for k, value in enumerate(writer.results())
+        (f"{letter}_{{{','.join(str(i + 1) for i in place)}}}", value)
+        for place, value in zip(np.ndindex(function.shape), writer.results(), strict=True)
     )
 
 

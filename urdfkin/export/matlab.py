@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from urdfkin.export.code import Code, Writer
 from urdfkin.export.function import Function
 
@@ -46,18 +48,18 @@ def write(code: Code, to: str = "matlab") -> str:
 
 def _function(code: Code, function: Function) -> Iterator[str]:
     writer = Writer(code, function)
-    rows, columns = (*function.shape, 1)[:2]
+    shape = function.shape if len(function.shape) > 1 else (*function.shape, 1)
     yield f"function out = {function.name}({', '.join(function.inputs)})"
     numbers = ", ".join(function.quantity.equations)
-    yield f"% {rows} x {columns}, eq. {numbers}; {function.operations} operations."
+    yield f"% {' x '.join(map(str, shape))}, eq. {numbers}; {function.operations} operations."
     for node in writer.given:
         yield f"{writer.words[node]} = {node.op}({node.of[0] + 1});"
     for head, lines in writer.statements():
         yield f"% {head}"
         yield from (f"{word} = {value};" for word, value in lines)
-    yield f"out = zeros({rows}, {columns});"
-    for k, value in enumerate(writer.results()):
-        yield f"out({k // columns + 1}, {k % columns + 1}) = {value};"
+    yield f"out = zeros({', '.join(map(str, shape))});"
+    for place, value in zip(np.ndindex(shape), writer.results(), strict=True):
+        yield f"out({', '.join(str(i + 1) for i in place)}) = {value};"
     yield "end"
 
 
@@ -79,7 +81,8 @@ def _check(code: Code) -> str:
             f"within = {_matrix(allowed)}",
             "found = zeros(size(right));",
             f"for k = 1:{len(found)}",
-            f"    found(k, :) = reshape({name}({inputs}).', 1, []);",
+            f"    x = {name}({inputs});",
+            "    found(k, :) = reshape(permute(x, ndims(x):-1:1), 1, []);",
             "end",
             f"told('{name}', found, right, within);",
         ]

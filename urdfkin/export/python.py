@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from urdfkin.export.code import Code, Writer
 from urdfkin.export.function import Function
 
@@ -43,30 +45,28 @@ def _in_array(create: str, index: str) -> Callable[[list[str], tuple[int, ...]],
 
     def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
         yield f"out = {create.format(', '.join(map(str, shape)))}"
-        width = shape[1] if len(shape) > 1 else 1
-        for k, value in enumerate(values):
-            place = f"{k // width}, {k % width}" if len(shape) > 1 else str(k)
-            yield f"out[{index}{place}] = {value}"
+        for place, value in zip(np.ndindex(shape), values, strict=True):
+            yield f"out[{index}{', '.join(map(str, place))}] = {value}"
         yield "return out"
 
     return result
 
 
 def _nested(
-    opening: str, closing: str, row: str = "[{}]"
+    opening: str, closing: str, row: str = "[{}]", deeper: str = ""
 ) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
-    """Row by row, inside one call."""
+    """Row by row, inside one call; a Hessian's rows lie below each other unless `deeper` shapes them."""
 
     def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
         yield f"return {opening}"
         if len(shape) == 1:
             yield from (f"    {value}," for value in values)
-        for line in _rows(values, shape[1]) if len(shape) > 1 else ():
+        for line in _rows(values, shape[-1]) if len(shape) > 1 else ():
             first, last = row.split("{}")
             yield f"    {first}"
             yield from (f"        {value}," for value in line)
             yield f"    {last},"
-        yield closing
+        yield closing + (deeper.format(shape) if len(shape) > 2 else "")
 
     return result
 
@@ -99,13 +99,13 @@ DIALECTS = {
         about="One configuration, arrays q ({nq},), v and a ({nv},), of any precision; for jit, vmap, grad.",
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import cos, sin, sqrt",
         entering=lambda inputs: [f"{x} = jnp.asarray({x})" for x in inputs],
-        result=_nested("jnp.array([", "], dtype=q.dtype)"),
+        result=_nested("jnp.array([", "], dtype=q.dtype)", deeper=".reshape({})"),
         values="found = jax.vmap(jax.jit(function))(*map(jnp.array, inputs))\n"
         "    return found.reshape(len(inputs[0]), -1).tolist()",
         before='jax.config.update("jax_enable_x64", True)',
     ),
     "casadi": Dialect(
-        about="Columns SX, MX or DM: q ({nq}), v and a ({nv}).",
+        about="Columns SX, MX or DM: q ({nq}), v and a ({nv}); a Hessian is ({nv} times 6, {nv}).",
         imports="import casadi\nfrom casadi import cos, sin, sqrt",
         result=_nested("casadi.vertcat(", ")", "casadi.horzcat({})"),
         values=_ONE_BY_ONE.format(
@@ -113,7 +113,8 @@ DIALECTS = {
         ),
     ),
     "sympy": Dialect(
-        about="Lists of symbols or numbers: q ({nq}), v and a ({nv}); a result is a Matrix.",
+        about="Lists of symbols or numbers: q ({nq}), v and a ({nv}); a result is a Matrix, a Hessian"
+        " ({nv} times 6, {nv}).",
         imports="from sympy import Matrix, cos, sin, sqrt",
         result=_nested("Matrix([", "])"),
         values=_ONE_BY_ONE.format("[float(x) for x in function(*one)]"),

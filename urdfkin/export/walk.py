@@ -235,6 +235,46 @@ def jacobian_rate(plan: Plan, kind: Kind, inputs: Any, reference: Reference) -> 
     return _columns(plan, kind, inputs, reference, rates=True)
 
 
+def hessian(plan: Plan, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+    """Column by column of each row of 7.85, how each rate changes it: 7.126 before it is summed."""
+    path, eq = Walk(plan, kind, inputs, own=False).path(), kind.chapter
+    end, to = path.end, ZERO if reference is Reference.WORLD else path.end.p
+    columns = [
+        (column, multiplier, _column(eq, path, column, to))
+        for column, multiplier in zip(plan.columns.tolist(), plan.multipliers.tolist(), strict=True)
+    ]
+    out: list[Number] = [0.0] * (6 * plan.nv**2)
+    for of, multiplier, six in columns:
+        for by, rate, by_six in columns:
+            before = by[Column.STEP] <= of[Column.STEP]
+            change = _change(eq, six, by_six, reference, before=before)
+            if reference is Reference.LOCAL:
+                change = tuple(eq.rotate(eq.transposed(end.R), x) for x in change)
+            for row, x in enumerate((*change[0], *change[1])):
+                place = (row * plan.nv + of[Column.V]) * plan.nv + by[Column.V]
+                out[place] = out[place] + multiplier * rate * x
+    return out
+
+
+def _change(eq: Any, six: Any, by: Any, reference: Reference, *, before: bool) -> Any:
+    """How a column changes with a rate that comes before it, or with it, or behind it."""
+    if reference is Reference.WORLD:
+        return eq.motion_product(*by, *six) if before else (ZERO, ZERO)
+    if reference is Reference.LOCAL:
+        return (ZERO, ZERO) if before else eq.motion_product(*six, *by)
+    return eq.turned_along(by[1], *six) if before else (eq.end_moved(six[1], by[0]), ZERO)
+
+
+def _column(eq: Any, path: Path, column: Sequence[int], to: Vector) -> tuple[Vector, Vector]:
+    """[linear; angular] of a rate, in the world's axes, of the body's point that is at `to`."""
+    s = path.states[column[Column.STEP]]
+    z = eq.transposed(s.R)[column[Column.AXIS]]
+    if not column[Column.TURNS]:
+        return z, ZERO
+    six: tuple[Vector, Vector] = eq.turning_column(z, eq.minus(to, s.p))
+    return six
+
+
 def _path(plan: Plan, kind: Kind, inputs: Any, reference: Reference) -> Path:
     # From the world's origin a motion is seen through p, which is followed in the world's axes.
     return Walk(plan, kind, inputs, own=reference is not Reference.WORLD).path()
@@ -253,12 +293,10 @@ def _columns(plan: Plan, kind: Kind, inputs: Any, reference: Reference, *, rates
     out: list[list[Number]] = [[0.0] * plan.nv for _ in range(6)]
     to, to_rate = (ZERO, ZERO) if reference is Reference.WORLD else (end.p, end.vel)
     for column, multiplier in zip(plan.columns.tolist(), plan.multipliers.tolist(), strict=True):
-        s = path.states[column[Column.STEP]]
-        z = eq.transposed(s.R)[column[Column.AXIS]]
-        linear, angular = z, ZERO
-        if column[Column.TURNS]:
-            linear, angular = eq.turning_column(z, eq.minus(to, s.p))
+        linear, angular = _column(eq, path, column, to)
         if rates:
+            s = path.states[column[Column.STEP]]
+            z = eq.transposed(s.R)[column[Column.AXIS]]
             rate, turning = eq.axis_rate(s.w, z), ZERO
             if column[Column.TURNS]:
                 d, d_rate = eq.minus(to, s.p), eq.minus(to_rate, s.vel)
@@ -281,5 +319,6 @@ QUANTITIES: dict[str, Callable[[Plan, Kind, Any, Reference], list[Number]]] = {
     "velocity": velocity,
     "jacobian": jacobian,
     "jacobian rate": jacobian_rate,
+    "hessian": hessian,
     "acceleration": acceleration,
 }
