@@ -203,6 +203,21 @@ def test_an_error_is_what_a_number_can_be_off_by_at_most() -> None:
     assert not velocity.contains(off).any()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["tree_1", "one_joint"])
+def test_a_hessian_is_enclosed_where_it_is_asked_for(name: str) -> None:
+    robot = robot_of(name)
+    x, link = sample(robot), robot.tree.frame_link(robot.tip_frame)
+    motion = at_fifty_digits(robot, x, None)
+    assert robot.enclose(*x, robot.tip_frame).hessian is None
+    for reference in Reference:
+        one = robot.enclose(*x, robot.tip_frame, reference, hessian=True).hessian
+        assert one is not None
+        assert holds(one, QUANTITIES["hessian"].truth(motion, link, reference))
+        assert ((one.width <= 2.0 * np.spacing(np.abs(one.upper))) | (one.width < 1e-25)).mean() > 0.8
+        assert one.error(robot.hessian(x[0], robot.tip_frame, reference)).max() < 1e-14
+
+
 def test_a_robot_that_pinocchio_refuses_is_enclosed_all_the_same() -> None:
     robot = robot_of("panda")
     robot.verifier.unverifiable = "it was told to"

@@ -29,6 +29,7 @@ from urdfkin.verify.exact.recursion import move, on_base
 from urdfkin.verify.exact.vectors import exact
 from urdfkin.verify.quantities import (
     ACCELERATION,
+    HESSIAN,
     JACOBIAN,
     JACOBIAN_RATE,
     PLACEMENT,
@@ -114,6 +115,7 @@ class Enclosures:
         acceleration: (6,), classical.
         jacobian: (6, nv).
         jacobian_rate: (6, nv).
+        hessian: (6, nv, nv), where it was asked for.
     """
 
     frame: str
@@ -124,9 +126,11 @@ class Enclosures:
     acceleration: Enclosure
     jacobian: Enclosure
     jacobian_rate: Enclosure
+    hessian: Enclosure | None = None
 
     def __str__(self) -> str:
-        quantities = self.placement, self.velocity, self.acceleration, self.jacobian, self.jacobian_rate
+        quantities = [self.placement, self.velocity, self.acceleration, self.jacobian, self.jacobian_rate]
+        quantities += [] if self.hessian is None else [self.hessian]
         head = f"{self.frame} in {self.reference.name.lower()}, proven with {self.digits} digits"
         return "\n  ".join((head, *map(str, quantities)))
 
@@ -142,6 +146,8 @@ def enclose(
     reference: Reference | str,
     base: BaseMotion | None,
     digits: int | None,
+    *,
+    hessian: bool = False,
 ) -> Enclosures:
     """What `Robot.enclose` says."""
     if digits is not None:
@@ -186,4 +192,5 @@ def enclose(
         enclosed(ACCELERATION),
         enclosed(JACOBIAN),
         enclosed(JACOBIAN_RATE),
+        enclosed(HESSIAN) if hessian else None,
     )
