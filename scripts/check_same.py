@@ -59,11 +59,15 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
 
 def _farthest(found: Sameness) -> Interval | None:
     """The frame that may be farthest, of those that are not another tool; None where nothing bounds it."""
-    tools = {line.split()[1] for line in found.after if line.startswith("frame ")}
-    frames = [frame for frame in found.frames if frame.frame_b not in tools and frame.q_a]
+    frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]
     worst = max(frames, key=lambda frame: (frame.upper, frame.lower), default=None)
     stands = np.array_equal(found.base, np.eye(4))
     return worst if worst is not None and math.isfinite(worst.upper) and stands else None
+
+
+def _tools(found: Sameness) -> set[str]:
+    """Frames of B that are said to be set elsewhere on their bodies."""
+    return {line.split()[1] for line in found.after if line.startswith("frame ")}
 
 
 def _enclosed(found: Sameness, a: Robot, b: Robot, worst: Interval) -> dict[str, Any]:
@@ -81,8 +85,9 @@ def _enclosed(found: Sameness, a: Robot, b: Robot, worst: Interval) -> dict[str,
 def _places_agree(found: Sameness, a: Robot, b: Robot) -> bool:
     """Whether all links of both stand alike at random configurations, and at B's for them."""
     q, base = a.sample(5, 1), f"link:{found.base_links[1]}"
-    T_a = a.placement(q, [f"link:{ours}" for ours, _ in found.links])
-    T_b = b.placement(found.to_b(q), [base, *(f"link:{theirs}" for _, theirs in found.links)])
+    links = [pair for pair in found.links if pair[1] not in _tools(found)]
+    T_a = a.placement(q, [f"link:{ours}" for ours, _ in links])
+    T_b = b.placement(found.to_b(q), [base, *(f"link:{theirs}" for _, theirs in links)])
     home = found.base @ b.placement(b.neutral(), base)
     return bool(np.abs(T_a - home @ np.linalg.inv(T_b[:, :1]) @ T_b[:, 1:]).max(initial=0.0) <= ROUNDING)
 

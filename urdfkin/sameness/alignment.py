@@ -13,22 +13,25 @@ nothing does, but for turns that screws on one line share.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from typing import TypeVar
 
 import numpy as np
 
 from urdfkin.model.chain import inverse
 from urdfkin.model.tree import FloatArray
 from urdfkin.sameness.conversion import Conversion, onto_plane, undoing
-from urdfkin.sameness.guesses import HALF_TURNS, axis_frames, zeros
+from urdfkin.sameness.guesses import behind, laid, zeros
 from urdfkin.sameness.mechanism import Edge, Mechanism, Screw, tolerance_of
 from urdfkin.sameness.pairing import Pairing, family
 from urdfkin.sameness.rigid import along, apart, between, turn_about
 
 #: Of joints whose order does not matter, so many orders are tried: all of five slides.
 MOST_ORDERS = 120
+#: What the next axis leaves open, so many joints ahead decide; so many steps ahead are taken in all.
+AHEAD, MOST_AHEAD = 6, 600
 IDENTITY = np.eye(4)
 IDENTITY.setflags(write=False)
 
@@ -187,6 +190,11 @@ class Gauge:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
+#: What a joint is free in: an offset, or a pose.
+_Free = TypeVar("_Free", float, FloatArray)
+#: How many of some places agree, and the largest disagreement (m).
+Score = tuple[int, float]
+
 #: B as it is written: root on root, each coordinate the same number.
 AS_WRITTEN = Gauge()
 
@@ -204,7 +212,7 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
         for taken in gauge.orders:
             b = b.in_order(taken)
         return _laid(a, b, given, gauge)
-    best = _laid(a, b, given, None)
+    best = _laid(a, b, given, None, MOST_AHEAD)
     for orders in b.orders_of_runs(tolerance_of(a, b)):
         if best.complete:
             break
@@ -218,9 +226,11 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
     return best
 
 
-def _laid(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | None) -> Alignment:
-    """The best of all bodies to begin at."""
-    walk = _Walk(a, b, Pairing(a, b, given), gauge)
+def _laid(
+    a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | None, ahead: int = 0
+) -> Alignment:
+    """The best of all bodies to begin at, with so many steps ahead."""
+    walk = _Walk(a, b, Pairing(a, b, given), gauge, ahead)
     best: Alignment | None = None
     for base, X in walk.beginnings():
         found = walk.run(base, X)
@@ -233,8 +243,8 @@ def _laid(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
 
 
 class _Walk:
-    def __init__(self, a: Mechanism, b: Mechanism, pairing: Pairing, gauge: Gauge | None) -> None:
-        self.a, self.b, self.pairing, self.gauge = a, b, pairing, gauge
+    def __init__(self, a: Mechanism, b: Mechanism, pairing: Pairing, gauge: Gauge | None, ahead: int) -> None:
+        self.a, self.b, self.pairing, self.gauge, self.ahead = a, b, pairing, gauge, ahead
         self.tolerance = tolerance_of(a, b)
         self.size = max(a.size, b.size, 1e-9)
 
@@ -276,12 +286,14 @@ class _Walk:
         yield from ((0, body) for body, links in enumerate(self.b.bodies) if links)
 
     def _by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Where the first two axes of B that are not parallel come to lie on A's."""
-        ours = next(axis_frames(self.a, base[0]), None)
-        if ours is not None:
-            for theirs in axis_frames(self.b, base[1]):
-                for flip in HALF_TURNS:
-                    yield ours @ flip @ inverse(theirs)
+        """Where B's first axes come to lie on A's, as well as they do."""
+        scored = list[tuple[float, _Place, Score]]()
+        for X in laid(self.a, self.b, base):
+            place = _Place(base, (None, None), -1, IDENTITY, X)
+            scored.append((0.0, place, self._score(place)))
+        for _, place, score in scored:
+            if not _better(_best_of(scored)[2], score):
+                yield place.XC
 
     # -- the walk ------------------------------------------------------------------------------------
 
@@ -295,7 +307,13 @@ class _Walk:
             found.only_a += _all_beyond(self.a, place.bodies[0], only_a)
             found.only_b += _all_beyond(self.b, place.bodies[1], only_b)
             for e, f in pairs:
-                stack.append(self._step(place, e, f, found))
+                step, there, _ = self._step(place, e, f, len(found.steps), AHEAD)
+                stack.append(there)
+                found.steps.append(step)
+                if step.differs:
+                    found.worst = max(found.worst, step.tilt * self.size + step.shift)
+                elif not step.unlike:
+                    found.matched += 1
         return found
 
     def _frames(self, place: _Place, found: Alignment) -> None:
@@ -342,25 +360,18 @@ class _Walk:
                         break
         return pairs
 
-    def _step(self, place: _Place, e: Edge, f: Edge, found: Alignment) -> _Place:
-        """Add the step that a pair of joints makes; where it leads."""
+    def _step(self, place: _Place, e: Edge, f: Edge, index: int, depth: int) -> tuple[Step, _Place, Score]:
+        """The step that a pair of joints makes, where it leads, and how well it fits what is behind it."""
         kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
         came = e, f
         backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
         bodies = e.beyond(place.bodies[0]), f.beyond(place.bodies[1])
-        there = _Place(bodies, came, len(found.steps), place.G, place.XC)
+        there = _Place(bodies, came, index, place.G, place.XC)
         if kinds[0] != kinds[1]:
-            step = self._unlike(place, came, kinds, backwards)
-        elif kinds[0] in ("turns", "prismatic"):
-            step, there = self._like(place, there, backwards, turns=kinds[0] == "turns")
-        else:
-            step, there = self._free(place, there, backwards, kinds[0])
-        found.steps.append(step)
-        if step.differs:
-            found.worst = max(found.worst, step.tilt * self.size + step.shift)
-        elif not step.unlike:
-            found.matched += 1
-        return there
+            return self._unlike(place, came, kinds, backwards), there, (0, 0.0)
+        if kinds[0] in ("turns", "prismatic"):
+            return self._like(place, there, backwards, depth, turns=kinds[0] == "turns")
+        return self._free(place, there, backwards, depth, kinds[0])
 
     def _unlike(
         self, place: _Place, came: tuple[Edge, Edge], kinds: tuple[str, str], backwards: tuple[bool, bool]
@@ -377,8 +388,8 @@ class _Walk:
         )
 
     def _free(
-        self, place: _Place, there: _Place, backwards: tuple[bool, bool], kind: str
-    ) -> tuple[Step, _Place]:
+        self, place: _Place, there: _Place, backwards: tuple[bool, bool], depth: int, kind: str
+    ) -> tuple[Step, _Place, Score]:
         """A planar or floating joint: where its frame stands, and what it counts from, is free."""
         e, f = _both(there.came)
         homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
@@ -395,34 +406,20 @@ class _Walk:
             step = replace(step, before=inverse(place.G) @ K @ place.G, tilt=tilt, shift=shift)
             there, at = replace(there, G=K @ place.G), K @ at
         if as_written:
-            return replace(step, unlike="kind" if back else ""), there
+            return replace(step, unlike="kind" if back else ""), there, (0, 0.0)
         M = inverse(seen) @ at
         if given is not None:
             tried: Iterable[FloatArray] = [inverse(given.before) if backwards[1] else given.behind]
         else:
             tried = self._behind(there, at, homes[1], undoing(M) if kind == "planar" else None)
-        N, moved = self._best_behind(there, at, homes[1], tried)
+        places = ((N, replace(there, XC=at @ N @ inverse(homes[1]))) for N in tried)
+        N, moved, score = self._best(places, depth)
         # Outwards, P_b^(1 or -1) = M P_a^(1 or -1) N.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
         before, behind = (IDENTITY if self.tolerance.holds(*apart(IDENTITY, T)) else T for T in pair)
         if before is IDENTITY and behind is IDENTITY and not back:
-            return step, there
-        return replace(step, conversion=Conversion(before, behind, back)), moved
-
-    def _best_behind(
-        self, there: _Place, at: FloatArray, home_b: FloatArray, tried: Iterable[FloatArray]
-    ) -> tuple[FloatArray, _Place]:
-        """The first N of P_b = M P_a N with which most of what follows agrees, and where it leads."""
-        best: tuple[FloatArray, _Place, tuple[int, float]] | None = None
-        for N in tried:
-            place = replace(there, XC=at @ N @ inverse(home_b))
-            score = self._score(place)
-            if best is None or _better(score, best[2]):
-                best = N, place, score
-            if not score[1]:
-                break
-        assert best is not None
-        return best[0], best[1]
+            return step, there, score
+        return replace(step, conversion=Conversion(before, behind, back)), moved, score
 
     def _behind(
         self, there: _Place, at: FloatArray, home_b: FloatArray, plane: FloatArray | None
@@ -446,8 +443,8 @@ class _Walk:
             yield N if plane is None else plane @ onto_plane(inverse(plane) @ N)
 
     def _like(
-        self, place: _Place, there: _Place, backwards: tuple[bool, bool], *, turns: bool
-    ) -> tuple[Step, _Place]:
+        self, place: _Place, there: _Place, backwards: tuple[bool, bool], depth: int, *, turns: bool
+    ) -> tuple[Step, _Place, Score]:
         """A joint that turns, or slides, in both: sense, zero, and what makes its axis the other's."""
         e, f = _both(there.came)
         s = _outwards(self.a.screw(e), backwards[0])
@@ -461,17 +458,18 @@ class _Walk:
         back = inverse(place.G)
         kind, (a, b) = "turns" if turns else "prismatic", (e.joint, f.joint)
         if self.tolerance.holds(tilt, shift):
-            offset, there, _ = self._best_zero(there, place.G, t, turns, zero)
-            return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there
+            offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
+            return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there, score
         # What hangs on the joint has moved with its axis, or its axis alone is another.
-        with_it = self._best_zero(there, K @ place.G, t, turns, zero)
-        alone = self._best_zero(there, place.G, t, turns, zero)
-        if _better(alone[2], with_it[2]):
-            other = end.moved(back)
-            step = Step(a, b, kind, place.previous, sense, alone[0], IDENTITY, s, other, tilt, shift)
-            return step, alone[1]
+        with_it = self._best_zero(there, K @ place.G, t, turns, zero, depth)
+        if depth == AHEAD:
+            alone = self._best_zero(there, place.G, t, turns, zero, depth)
+            if _better(alone[2], with_it[2]):
+                other = end.moved(back)
+                step = Step(a, b, kind, place.previous, sense, alone[0], IDENTITY, s, other, tilt, shift)
+                return step, *alone[1:]
         before = back @ K @ place.G
-        return Step(a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift), with_it[1]
+        return Step(a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift), *with_it[1:]
 
     # -- a joint's zero ------------------------------------------------------------------------------
 
@@ -480,22 +478,43 @@ class _Walk:
         return (0, None) if self.gauge is None else self.gauge.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
-        self, there: _Place, G: FloatArray, t: Screw, turns: bool, zero: float | None
-    ) -> tuple[float, _Place, tuple[int, float]]:
+        self, there: _Place, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
+    ) -> tuple[float, _Place, Score]:
         """The offset of B's joint with which most of what follows agrees; 0 has the first word."""
-        best: tuple[float, _Place, tuple[int, float]] | None = None
-        for offset in self._offsets(there, G, t, turns) if zero is None else (zero,):
-            XC = there.XC @ along(t, offset, turns=turns) if offset else there.XC
-            place = _Place(there.bodies, there.came, there.previous, G, XC)
-            score = self._score(place)
-            if best is None or _better(score, best[2]):
-                best = offset, place, score
-            if not score[1]:
-                break
-        assert best is not None
-        return best
+        offsets = self._offsets(there, G, t, turns) if zero is None else (zero,)
+        moved = (
+            (offset, there.XC @ along(t, offset, turns=turns) if offset else there.XC) for offset in offsets
+        )
+        return self._best(((offset, replace(there, G=G, XC=XC)) for offset, XC in moved), depth)
 
-    def _score(self, place: _Place) -> tuple[int, float]:
+    def _best(self, choices: Iterable[tuple[_Free, _Place]], depth: int) -> tuple[_Free, _Place, Score]:
+        """The first choice with which most agrees; between equals, what follows decides, `depth` joints on.
+
+        Two axes that meet at right angles, say, lie on two others in two ways; the third one tells which.
+        """
+        scored = list[tuple[_Free, _Place, Score]]()
+        for what, place in choices:
+            if any(self.tolerance.holds(*apart(known.XC, place.XC)) for _, known, _ in scored):
+                continue
+            score = self._score(place)
+            scored.append((what, place, score))
+            if not score[1] and self.pairing.links(*place.bodies):  # no other choice can agree as well
+                return scored[-1]
+        best = _best_of(scored)
+        equal = [one for one in scored if not _better(best[2], one[2])]
+        if not depth or self.ahead <= 0 or (len(equal) == 1 and depth == AHEAD):
+            return best
+        self.ahead -= 1
+        seen = list[tuple[_Free, _Place, Score]]()
+        for what, place, here in equal:
+            pairs = self.pairing.edges(place.bodies, place.came, place.G, place.XC)[0]
+            all_ = [here, *(self._step(place, e, f, -1, depth - 1)[2] for e, f in pairs)]
+            seen.append((what, place, (sum(count for count, _ in all_), max(off for _, off in all_))))
+            if not seen[-1][2][1]:
+                break
+        return _best_of(seen)
+
+    def _score(self, place: _Place) -> Score:
         """How many of the links and axes at a place agree, and the largest disagreement (m)."""
         off = [
             apart(place.G @ self.a.homes[i], place.XC @ self.b.homes[j])
@@ -516,15 +535,19 @@ class _Walk:
                 yield turn_about(u.direction, at[:3, :3] @ seen[:3, :3].T)
             else:
                 yield float(u.direction @ (at[:3, 3] - seen[:3, 3]))
-        pairs, _, _ = self.pairing.edges(there.bodies, there.came, G, there.XC)
-        ours = [e for e in self.a.edges_of[there.bodies[0]] if e is not there.came[0]]
-        theirs = [f for f in self.b.edges_of[there.bodies[1]] if f is not there.came[1]]
-        for e, f in [*pairs, *((e, f) for e in ours for f in theirs)]:
-            if self.a.joint(e).kind.has_axis and self.b.joint(f).kind.has_axis:
-                yield from zeros(u, self.a.screw(e).moved(G), self.b.screw(f).moved(there.XC), turns)
+        for ours, theirs in behind((self.a, self.b), there.came, there.bodies, (u.moved(inverse(G)), t)):
+            yield from zeros(u, ours.moved(G), theirs.moved(there.XC), turns)
 
 
-def _better(score: tuple[int, float], than: tuple[int, float]) -> bool:
+def _best_of(scored: Sequence[tuple[_Free, _Place, Score]]) -> tuple[_Free, _Place, Score]:
+    """The first that no other is better than by much."""
+    best = scored[0]
+    for one in scored[1:]:
+        best = one if _better(one[2], best[2]) else best
+    return best
+
+
+def _better(score: Score, than: Score) -> bool:
     """Whether more agrees, or as much and the rest twice as well."""
     return score[0] > than[0] or (score[0] == than[0] and score[1] < 0.5 * than[1])
 

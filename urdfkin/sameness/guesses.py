@@ -2,62 +2,131 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import pi, remainder
+from typing import TypeVar
 
 import numpy as np
 
 from urdfkin.model.tree import FloatArray
-from urdfkin.sameness.mechanism import Mechanism, Screw
-from urdfkin.sameness.rigid import angle_from_to
+from urdfkin.sameness.mechanism import Edge, Mechanism, Screw
+from urdfkin.sameness.rigid import along, angle_from_to, between
 
-#: None, and half a turn about x, y, z: the ways in which two lines at an angle lie on themselves.
-HALF_TURNS = tuple(
-    np.diag(signs)
-    for signs in (
-        (1.0, 1.0, 1.0, 1.0),
-        (1.0, -1.0, -1.0, 1.0),
-        (-1.0, -1.0, 1.0, 1.0),
-        (-1.0, 1.0, -1.0, 1.0),
-    )
-)
+#: Radians of tilt below which an axis says nothing of a slide along another one.
+_NOTHING = 1e-12
+_Some = TypeVar("_Some")
+#: One of A and one of B.
+Both = tuple[_Some, _Some]
 
 
-def zeros(u: Screw, ours: Screw, theirs: Screw, turns: bool) -> Iterator[float]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Axis:
+    """A joint's screw at home.
+
+    Attributes:
+        screw: Its line; that of a slide has no place.
+        turns: Whether it turns.
+        seen: The line that it is seen from.
+    """
+
+    screw: Screw
+    turns: bool
+    seen: Screw
+
+    def moved(self, T: FloatArray) -> Axis:
+        """The axis after a rigid motion."""
+        return Axis(self.screw.moved(T), self.turns, self.seen.moved(T))
+
+    def height(self, u: FloatArray) -> float | None:
+        """How far along u (m) the nearest point of the line that it is seen from is; None where any is."""
+        s, start = self.screw, self.seen
+        along_s = float(start.direction @ s.direction)
+        if not self.turns or 1.0 - along_s**2 < _NOTHING**2:
+            return None
+        way = s.point - start.point
+        foot = float(way @ start.direction - along_s * (way @ s.direction)) / (1.0 - along_s**2)
+        return float(u @ (start.point + foot * start.direction))
+
+
+def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
     """By how much theirs must be turned about u, or slid along it, to lie as ours does."""
     if not turns:
-        across = u.direction - ours.direction * (ours.direction @ u.direction)
-        if across @ across > 1e-6:  # a guess to be tried, not a result
-            yield float(across @ (ours.point - theirs.point) / (across @ across))
+        heights = ours.height(u.direction), theirs.height(u.direction)
+        if heights[0] is not None and heights[1] is not None:
+            yield heights[0] - heights[1]
         return
-    guesses = angle_from_to(u.direction, theirs.direction, ours.direction)
-    if guesses is not None:
-        yield guesses
-        yield math.remainder(guesses + math.pi, 2.0 * math.pi)
-    feet = [
-        line.point - line.direction * (line.direction @ (line.point - u.point)) for line in (theirs, ours)
-    ]
-    guesses = angle_from_to(u.direction, feet[0] - u.point, feet[1] - u.point)
-    if guesses is not None:
-        yield guesses
+    s, t = ours.screw, theirs.screw
+    guess = angle_from_to(u.direction, t.direction, s.direction)
+    if guess is not None:
+        yield guess
+        yield remainder(guess + pi, 2.0 * pi)
+    if ours.turns:
+        feet = [line.point - line.direction * (line.direction @ (line.point - u.point)) for line in (t, s)]
+        guess = angle_from_to(u.direction, feet[0] - u.point, feet[1] - u.point)
+        if guess is not None:
+            yield guess
 
 
-def axis_frames(mechanism: Mechanism, body: int) -> Iterator[FloatArray]:
-    """Frames on the first axis at a body with x across to the next that is not parallel: one for each way."""
-    for first in mechanism.edges_of[body]:
-        for second in mechanism.edges_of[first.beyond(body)]:
-            if second is first or not all(mechanism.joint(k).kind.has_axis for k in (first, second)):
-                continue
-            s, t = mechanism.screw(first), mechanism.screw(second)
-            x = np.cross(s.direction, t.direction)
-            sine = float(np.linalg.norm(x))
-            if sine < 1e-3:  # too parallel to begin with
-                continue
-            x = x / sine
-            T = np.eye(4)
-            T[:3, :3] = np.stack((x, np.cross(s.direction, x), s.direction), axis=1)
-            # The foot of the common normal on the first axis.
-            way = t.point - s.point
-            along_first = float(np.cross(way, t.direction) @ x) / sine
-            T[:3, 3] = s.point + s.direction * along_first
-            yield T
+def behind(
+    mechanisms: Both[Mechanism], came: Both[Edge | None], bodies: Both[int], seen: Both[Screw]
+) -> Iterator[Both[Axis]]:
+    """Pairs of axes at two bodies, and behind the ones along a line, which move nothing seen from it."""
+    for e, f in _led_on(mechanisms, came, bodies):
+        axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])
+        yield axes
+        screws = axes[0].screw, axes[1].screw
+        if np.linalg.norm(np.cross(screws[0].direction, seen[0].direction)) < _NOTHING:
+            beyond = e.beyond(bodies[0]), f.beyond(bodies[1])
+            yield from behind(mechanisms, (e, f), beyond, screws if axes[0].turns else seen)
+
+
+def laid(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
+    """Where B's root may stand for its axes to lie on A's: first axis on first, then by those behind it.
+
+    What is left free is a turn about the first axis and a slide along it.
+    """
+    for (ours, theirs), near, far in _firsts((a, b), (None, None), bodies, ()):
+        for start in (theirs.screw, theirs.screw.reversed()):
+            K = between(start, ours.screw, turns=True)[0]
+            for turn in _guesses(ours.screw, [*near, *far], K, turns=True):
+                X = along(ours.screw, turn, turns=True) @ K
+                for way in _guesses(ours.screw, far, X, turns=False):
+                    yield along(ours.screw, way, turns=False) @ X
+
+
+def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: bool) -> list[float]:
+    return [x for ours, theirs in pairs for x in zeros(u, ours, theirs.moved(X), turns)] or [0.0]
+
+
+def _firsts(
+    mechanisms: Both[Mechanism], came: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
+) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
+    """Pairs of first turning axes, with slides before them and what is behind; of slides where none turns."""
+    found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
+    for e, f in _led_on(mechanisms, came, bodies):
+        pair, beyond = (
+            (_axis(mechanisms[0], e), _axis(mechanisms[1], f)),
+            (e.beyond(bodies[0]), f.beyond(bodies[1])),
+        )
+        lines = pair[0].screw, pair[1].screw
+        deeper = [] if pair[0].turns else _firsts(mechanisms, (e, f), beyond, (*near, pair))
+        found += deeper or [(pair, near, list(behind(mechanisms, (e, f), beyond, lines)))]
+    return found
+
+
+def _led_on(mechanisms: Both[Mechanism], came: Both[Edge | None], bodies: Both[int]) -> Iterator[Both[Edge]]:
+    """All pairs of joints with axes that lead on from two bodies and move alike."""
+    ours, theirs = (
+        [edge for edge in mechanism.edges_of[body] if edge is not by and mechanism.joint(edge).kind.has_axis]
+        for mechanism, by, body in zip(mechanisms, came, bodies, strict=True)
+    )
+    for e, f in product(ours, theirs):
+        if _axis(mechanisms[0], e).turns is _axis(mechanisms[1], f).turns:
+            yield e, f
+
+
+def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
+    screw = mechanism.screw(edge)
+    return Axis(screw, mechanism.joint(edge).kind.turns, seen or screw)

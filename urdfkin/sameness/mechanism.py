@@ -8,6 +8,7 @@ from another body, what lies on the way is passed backwards, with its screw reve
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -188,8 +189,12 @@ def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
     """By what angle (rad), and if they have a place by what way (m), two axes differ as lines."""
-    angle = float(
-        np.arctan2(np.linalg.norm(np.cross(s.direction, t.direction)), abs(s.direction @ t.direction))
-    )
-    way = s.point - t.point
-    return angle, float(np.linalg.norm(way - t.direction * (t.direction @ way))) if placed else 0.0
+    ux, uy, uz = s.direction.tolist()  # a walk asks this thousands of times: plain numbers
+    vx, vy, vz = t.direction.tolist()
+    sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
+    angle = math.atan2(sine, abs(ux * vx + uy * vy + uz * vz))
+    if not placed:
+        return angle, 0.0
+    x, y, z = (s.point - t.point).tolist()
+    along = vx * x + vy * y + vz * z
+    return angle, math.hypot(x - along * vx, y - along * vy, z - along * vz)

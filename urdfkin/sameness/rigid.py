@@ -68,6 +68,6 @@ def turn_about(u: FloatArray, R: FloatArray) -> float:
 def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
     """The angle about u from x to y, seen along u; None where one of them is along u."""
     x, y = x - u * (u @ x), y - u * (u @ y)
-    if min(np.linalg.norm(x), np.linalg.norm(y)) < 1e-6:  # a guess to be tried, not a result
+    if min(np.linalg.norm(x), np.linalg.norm(y)) < 1e-12:
         return None
     return math.atan2(float(u @ np.cross(x, y)), float(x @ y))

@@ -42,9 +42,10 @@ def put_right(found: Alignment, rounding: Tolerance) -> tuple[str, ...]:
             constant = f" {'-' if offset < 0 else '+'} {size}" if offset else ""
             lines.append(f"q[{tree_b.joints[step.b].name}] = {sign}q[{tree_a.joints[step.a].name}]{constant}")
     for k, frame in enumerate(found.frames):
-        if not frame.differs or not _is_tool(found, frame):
+        if frame.differs and _is_tool(found, frame):
+            found.frames[k] = frame.put_right()
+        if found.frames[k].tool is IDENTITY:
             continue
-        found.frames[k] = frame.put_right()
         names = tree_b.links[frame.b], tree_a.links[frame.a]
         moved = pose_words(found.frames[k].tool, rounding)
         lines.append(f"frame {names[0]} is A's {names[1]} moved by {moved}")
