@@ -437,7 +437,7 @@ def test_only_what_is_told_is_mended(here: Path) -> None:
 def test_diff_shows_a_patch_that_does_what_fix_does(here: Path) -> None:
     arm = put("arm.urdf", LONG.replace("    <axis", "\t<axis"))
     done = check("--diff")
-    assert (done.code, done.err) == (1, "1 findings to fix in 1 files\n")
+    assert (done.code, done.err) == (1, "1 finding to fix in 1 file\n")
     assert arm.read_text() == LONG.replace("    <axis", "\t<axis")
     subprocess.run(["git", "apply", "-p0"], input=done.out, check=True, capture_output=True)
     assert arm.read_text() == GOOD.replace("    <axis", "\t<axis")

@@ -142,7 +142,9 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
     if options["write_baseline"] is not None:
         _write_baseline(run, options["write_baseline"])
     if options["diff"]:
-        say(f"{run.outcome.to_fix} findings to fix in {len(run.outcome.files)} files", err=True)
+        found, among = run.outcome.to_fix, len(run.outcome.files)
+        many = "s" * (found != 1), "s" * (among != 1)
+        say(f"{found} finding{many[0]} to fix in {among} file{many[1]}", err=True)
     else:
         print_outcome(run.outcome, options["style"], statistics=options["statistics"])
     for failure in run.outcome.unreadable:

@@ -23,7 +23,10 @@ _LINES, _JSON = 10.0, 0.5
 
 
 class Pace:
-    """Chunks a second in this run, and how long what is missing takes at that; no clock that can be set."""
+    """Chunks a second in this run, and how long what is missing takes at that; no clock that can be set.
+
+    It counts from when last nothing was computed yet: what was compiled before makes nobody slow.
+    """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._begin = now, now()
@@ -31,6 +34,8 @@ class Pace:
     def of(self, standing: Standing) -> tuple[float | None, float | None]:
         """Chunks a second and seconds left; None while nobody can know."""
         seconds, fresh = self._now() - self._begin, standing.chunks_done - standing.chunks_kept
+        if fresh <= 0:
+            self._begin = self._now()
         if fresh <= 0 or seconds <= 0.0:
             return None, None
         rate = fresh / seconds

@@ -78,7 +78,7 @@ def validate(
         retry: "failed": what the store has of robots that could not be checked is computed again; their
             texts may have changed.
         shard: "2/4": only the second of four equal parts, into a store; the report tells of that part alone.
-        progress: Told after each chunk.
+        progress: Told before the work and after each chunk.
 
     Returns:
         The report, on every robot that was asked for. One that cannot be read or checked is reported,
@@ -130,6 +130,7 @@ def validate(
             if missing and (isolate or any(map(_is_robot, missing))):
                 load_kernels()  # once, here: no worker has to compile, no robot's seconds hold it
                 begin = time.perf_counter()
+            gathering.begin()
             _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
         except KeyboardInterrupt:
             interrupted = True

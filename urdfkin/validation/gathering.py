@@ -34,7 +34,7 @@ class Gathering:
         subjects: The robots.
         cut: Their chunks.
         parts: Which of its chunks each robot shall have here.
-        progress: Told after each answer.
+        progress: Told before the work, and after each answer.
     """
 
     def __init__(
@@ -44,6 +44,11 @@ class Gathering:
         self._robots = [_Robot(part) for part in parts]
         self._chunks = sum(map(len, parts))
         self._chunks_done = self._kept = self._over = self._failures = 0
+
+    def begin(self) -> None:
+        """Tell where it stands: from now on there is work, and nothing else."""
+        if self._progress is not None:
+            self._progress(self.standing(self._subjects[0].label if self._subjects else ""))
 
     def enter(self, task: Task, found: Answer, *, kept: bool = False) -> None:
         """Take an answer; one that was kept from an earlier run counts as none of this one's work."""
