@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.door import say
-from urdfkin.cli.output import check_line, console, write_file
-from urdfkin.errors.printable import csv_cell, json_text
+from urdfkin.cli.output import check_line, console, hand_out, npy
+from urdfkin.errors.printable import csv_cell, csv_text, json_text
 from urdfkin.report.listing import print_named
 from urdfkin.verify.quantities import SIX
 
@@ -34,12 +31,7 @@ def emit_breakdown(
         say(check_line(certificate))
         return
     writer = {"table": _as_csv, "csv": _as_csv, "json": _as_json, "npy": _as_npy}[format_]
-    data = writer(inputs, reference, parts)
-    if output is not None:
-        write_file(output, data)
-    else:
-        sys.stdout.buffer.write(data)
-        sys.stdout.buffer.flush()
+    hand_out(writer(inputs, reference, parts), output)
     if format_ != "json":
         say(check_line(certificate), err=True)
 
@@ -91,19 +83,13 @@ def _as_json(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> by
 
 
 def _as_csv(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> bytes:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["sample", "joint", "kind", *SIX])
+    rows: list[list[object]] = [["sample", "joint", "kind", *SIX]]
     for sample in range(len(parts.base)):
         for joint, kind, six in parts.contributions((sample,)):
-            writer.writerow([sample, csv_cell(joint), kind, *map(repr, six.tolist())])
-        writer.writerow([sample, "sum", "", *map(repr, parts.total[sample].tolist())])
-    return stream.getvalue().encode()
+            rows.append([sample, csv_cell(joint), kind, *map(repr, six.tolist())])
+        rows.append([sample, "sum", "", *map(repr, parts.total[sample].tolist())])
+    return csv_text(rows).encode()
 
 
 def _as_npy(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> bytes:
-    import numpy as np  # noqa: PLC0415
-
-    stream = io.BytesIO()
-    np.save(stream, parts.terms)
-    return stream.getvalue()
+    return npy(parts.terms)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,9 +18,9 @@ from urdfkin.cli.arguments import (
 )
 from urdfkin.cli.door import say
 from urdfkin.cli.endings import form_of
-from urdfkin.cli.output import console, hand_out, output_option
+from urdfkin.cli.output import console, end_of_path, hand_out, output_option
 from urdfkin.errors import InputError
-from urdfkin.errors.printable import csv_cell, json_text
+from urdfkin.errors.printable import csv_cell, csv_text, json_text
 
 if TYPE_CHECKING:
     from urdfkin.model.chain import FrameChain
@@ -63,7 +61,6 @@ def command(
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
     from urdfkin.verify.chains import check_chain  # noqa: PLC0415  keeps --help fast
-    from urdfkin.verify.pinocchio import version  # noqa: PLC0415
 
     format_ = form_of(context, output, _ENDINGS, "csv")
     loaded = load_robot(robot, verify=verify)
@@ -72,7 +69,7 @@ def command(
     if len(at) != 1:
         raise InputError("a chain is shown in one configuration", where="--q", found=str(len(at)))
     said = check_chain(loaded.verifier, path, at) if verify else None
-    line = f"Pinocchio {version()}: {said}" if said else f"NOT VERIFIED by Pinocchio {version()}"
+    line, code = end_of_path(said)
     if format_ == "table" and output is None:
         _print(path, path.coupling.select(loaded.tree, at)[0])
         say(line)
@@ -80,7 +77,7 @@ def command(
         form = _as_json if format_ == "json" else _as_csv
         hand_out(form(loaded, path, at[0], line if said else None).encode(), output)
         say(line, err=True)
-    context.exit(0 if said else 3)
+    context.exit(code)
 
 
 def _print(path: FrameChain, q: FloatArray) -> None:
@@ -140,12 +137,10 @@ def _as_json(robot: Robot, path: FrameChain, q: FloatArray, line: str | None) ->
 
 def _as_csv(robot: Robot, path: FrameChain, q: FloatArray, _line: str | None) -> str:
     own = path.coupling.select(robot.tree, q)
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
     vectors = [f"{name}{axis}" for name in ("z", "O", "d") for axis in "xyz"]
-    writer.writerow(["i", "joint", "kind", "backwards", *vectors])
-    rows = zip(path.joints, path.axes(own), path.origins(own), path.interorigin(own), strict=False)
-    for i, (joint, *three) in enumerate(rows, 1):
+    rows: list[list[object]] = [["i", "joint", "kind", "backwards", *vectors]]
+    joints = zip(path.joints, path.axes(own), path.origins(own), path.interorigin(own), strict=False)
+    for i, (joint, *three) in enumerate(joints, 1):
         numbers = [repr(x) for vector in three for x in vector.tolist()]
-        writer.writerow([i, csv_cell(joint.name), joint.kind.value, int(joint.backwards), *numbers])
-    return stream.getvalue()
+        rows.append([i, csv_cell(joint.name), joint.kind.value, int(joint.backwards), *numbers])
+    return csv_text(rows)

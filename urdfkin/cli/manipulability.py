@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +21,7 @@ from urdfkin.cli.arguments import (
 from urdfkin.cli.door import say
 from urdfkin.cli.endings import form_of
 from urdfkin.cli.output import check_line, compiling, console, exit_code, hand_out, output_option
-from urdfkin.errors.printable import csv_cell, json_text
+from urdfkin.errors.printable import csv_cell, csv_text, json_text
 from urdfkin.report.listing import print_named
 
 if TYPE_CHECKING:
@@ -142,15 +140,14 @@ def _finite(value: object) -> object:
 
 
 def _as_csv(x: Inputs, rows: str, found: SingularValues, gradient: FloatArray, check: str) -> str:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
     sides = ("", " lower", " upper")
     names = [name + side for name in (*_names(found), "condition", "manipulability") for side in sides]
-    writer.writerow(["sample", *names, *(csv_cell(f"by {rate}") for rate in x.robot.rate_names)])
+    rates = (csv_cell(f"by {rate}") for rate in x.robot.rate_names)
+    lines: list[list[object]] = [["sample", *names, *rates]]
     for k, slopes in enumerate(gradient.tolist()):
         between = [tuple(side[k].tolist() for side in found.values)]
         numbers = [number for of_one in zip(*between[0], strict=True) for number in of_one]
         for summary in (found.condition, found.manipulability):
             numbers += [float(side[k]) for side in summary]
-        writer.writerow([k, *map(repr, numbers), *map(repr, slopes)])
-    return stream.getvalue()
+        lines.append([k, *map(repr, numbers), *map(repr, slopes)])
+    return csv_text(lines)

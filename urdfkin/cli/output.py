@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import os
 import sys
@@ -16,7 +15,7 @@ import click
 from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.door import say
 from urdfkin.errors.numerals import whole
-from urdfkin.errors.printable import csv_cell, json_text
+from urdfkin.errors.printable import csv_cell, csv_text, json_text
 from urdfkin.report.listing import NOISE, make_table, print_named
 from urdfkin.system.files import write_file
 
@@ -116,6 +115,15 @@ def hand_out(data: bytes, output: Path | None) -> None:
         sys.stdout.buffer.flush()
 
 
+def npy(array: FloatArray) -> bytes:
+    """An array as NumPy's own file."""
+    import numpy as np  # noqa: PLC0415  keeps --help fast
+
+    stream = io.BytesIO()
+    np.save(stream, array)
+    return stream.getvalue()
+
+
 def check_line(certificate: Certificate) -> str:
     """One line: what was checked and how closely, or why not."""
     by = certificate.oracle
@@ -127,6 +135,14 @@ def check_line(certificate: Certificate) -> str:
         for line in certificate.lines
     ]
     return f"verified by {by}: {'; '.join(parts)}"
+
+
+def end_of_path(said: str | None) -> tuple[str, int]:
+    """The last line of a command about a path, of what its check said or None, and its exit code."""
+    from urdfkin.verify.pinocchio import version  # noqa: PLC0415  keeps --help fast
+
+    by = f"Pinocchio {version()}"
+    return (f"{by}: {said}", 0) if said else (f"NOT VERIFIED by {by}", 3)
 
 
 def exit_code(certificate: Certificate) -> int:
@@ -166,34 +182,29 @@ def _as_json(
 def _as_csv(
     inputs: Inputs, quantity: Quantity, reference: str | None, result: FloatArray, certificate: Certificate
 ) -> bytes:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
+    rows: list[list[object]]
     if quantity.columns:
         rates = [csv_cell(name) for name in inputs.robot.rate_names]
         # A Hessian's lines say which column of the Jacobian they are of, and its columns by which rate.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
             keys = [[*key, rate] for key in keys for rate in rates]
-        writer.writerow(["sample", "row", *["column"] * (quantity.axes - 2), *rates])
+        rows = [["sample", "row", *["column"] * (quantity.axes - 2), *rates]]
         for k, J in enumerate(result.reshape(len(result), len(keys), len(rates)).tolist()):
-            writer.writerows([k, *key, *map(repr, row)] for key, row in zip(keys, J, strict=True))
+            rows += ([k, *key, *map(repr, row)] for key, row in zip(keys, J, strict=True))
     else:
         names = quantity.labels or [f"T{i}{j}" for i in range(4) for j in range(4)]
         times = range(len(result)) if inputs.t is None else map(repr, inputs.t.tolist())
-        writer.writerow(["sample" if inputs.t is None else "t", *names])
-        rows = zip(times, result.reshape(len(result), -1).tolist(), strict=True)
-        writer.writerows([t, *map(repr, row)] for t, row in rows)
-    return stream.getvalue().encode()
+        rows = [["sample" if inputs.t is None else "t", *names]]
+        samples = zip(times, result.reshape(len(result), -1).tolist(), strict=True)
+        rows += ([t, *map(repr, row)] for t, row in samples)
+    return csv_text(rows).encode()
 
 
 def _as_npy(
     inputs: Inputs, quantity: Quantity, reference: str | None, result: FloatArray, certificate: Certificate
 ) -> bytes:
-    import numpy as np  # noqa: PLC0415
-
-    stream = io.BytesIO()
-    np.save(stream, result)
-    return stream.getvalue()
+    return npy(result)
 
 
 # -- tables ------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import click
 
 from urdfkin.cli.arguments import load_robot, path_options, robot_argument, verify_option
 from urdfkin.cli.numbers import Whole
-from urdfkin.cli.output import output_option
+from urdfkin.cli.output import end_of_path, output_option, write_file
 
 FORMS = ("terminal", "latex", "toml", "json", "numpy", "matlab")
 
@@ -41,15 +41,13 @@ def command(
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
     from urdfkin.cli.door import say, say_file  # noqa: PLC0415  keeps --help fast
-    from urdfkin.cli.output import write_file  # noqa: PLC0415
     from urdfkin.dh.export.screws import write_screws  # noqa: PLC0415
-    from urdfkin.verify.pinocchio import version  # noqa: PLC0415
     from urdfkin.verify.screws import check_screws  # noqa: PLC0415
 
     loaded = load_robot(robot, verify=verify)
     screws = loaded.screws(tip, base, verify=False)
     said = check_screws(loaded.verifier, screws) if verify else None
-    line = f"Pinocchio {version()}: {said}" if said else f"NOT VERIFIED by Pinocchio {version()}"
+    line, code = end_of_path(said)
     text = write_screws(screws, format_, digits)
     text = f"{text}\n{line}\n" if format_ == "terminal" else text
     if output is not None:
@@ -61,4 +59,4 @@ def command(
         say_file(text)
     if format_ != "terminal":
         say(line, err=True)
-    context.exit(0 if said else 3)
+    context.exit(code)

@@ -9,6 +9,7 @@ import click
 
 from urdfkin.cli.arguments import load_robot, path_options, robot_argument, verify_option
 from urdfkin.cli.numbers import Number
+from urdfkin.cli.output import end_of_path
 
 if TYPE_CHECKING:
     from urdfkin.dh.structure import Kind, Structure
@@ -48,7 +49,6 @@ def command(
 
     from urdfkin.cli.door import say, say_file  # noqa: PLC0415
     from urdfkin.dh.structure import structure  # noqa: PLC0415
-    from urdfkin.verify.pinocchio import version  # noqa: PLC0415
     from urdfkin.verify.screws import check_screws  # noqa: PLC0415
 
     loaded = load_robot(robot, verify=verify)
@@ -57,14 +57,14 @@ def command(
     screws = loaded.screws(tip, base, verify=False)
     said = check_screws(loaded.verifier, screws) if verify else None
     found = structure(screws)
-    line = f"Pinocchio {version()}: {said}" if said else f"NOT VERIFIED by Pinocchio {version()}"
+    line, code = end_of_path(said)
     if as_json:
         say_file(json.dumps(found.as_mapping(), indent=2).replace("Infinity", "null") + "\n")
         say(line, err=True)
     else:
         for text in [*_lines(found), "", line]:
             say(text)
-    context.exit(0 if said else 3)
+    context.exit(code)
 
 
 def _opw(robot: Robot, path: FrameChain, tolerance: float, *, verify: bool) -> int:
@@ -72,14 +72,14 @@ def _opw(robot: Robot, path: FrameChain, tolerance: float, *, verify: bool) -> i
 
     from urdfkin.cli.door import say, say_file  # noqa: PLC0415
     from urdfkin.dh.opw import opw_of  # noqa: PLC0415
-    from urdfkin.verify.pinocchio import version  # noqa: PLC0415
     from urdfkin.verify.screws import check_opw  # noqa: PLC0415
 
     found = opw_of(path, tolerance)
     said = check_opw(robot.verifier, path, found) if verify else None
     say_file("".join(f"{key}: {json.dumps(value)}\n" for key, value in found.as_mapping().items()))
-    say(f"Pinocchio {version()}: {said}" if said else f"NOT VERIFIED by Pinocchio {version()}", err=True)
-    return 0 if said else 3
+    line, code = end_of_path(said)
+    say(line, err=True)
+    return code
 
 
 def _lines(found: Structure) -> list[str]:

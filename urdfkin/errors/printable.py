@@ -6,8 +6,11 @@ HTML, formulas. What acts in the target is written as an escape that can be read
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import re
+from collections.abc import Iterable
 from typing import Any
 
 #: What a spreadsheet takes for the beginning of a formula.
@@ -64,6 +67,18 @@ _LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
 def latex_text(text: str) -> str:
     """Text with LaTeX's special characters made harmless, on one line."""
     return "".join(_LATEX.get(character, character) for character in printable(text))
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    r"""Rows as CSV; words that a file brings go through `csv_cell` first.
+
+    Example:
+        >>> csv_text([["joint", "lower"], ["a, b", 0.5]])
+        'joint,lower\n"a, b",0.5\n'
+    """
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue()
 
 
 def json_text(data: Any) -> str:

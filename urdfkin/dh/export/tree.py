@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable
 from dataclasses import asdict, fields
 from typing import Any
@@ -12,7 +10,7 @@ from urdfkin.dh.export.cells import added
 from urdfkin.dh.export.terminal import aligned
 from urdfkin.dh.tree_parameters import TreeParameters, TreeRow
 from urdfkin.dh.units import Units
-from urdfkin.errors.printable import csv_cell, markdown_code, printable
+from urdfkin.errors.printable import csv_cell, csv_text, markdown_code, printable
 
 FORMULA = "T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r), i = a(j)"
 
@@ -44,14 +42,12 @@ def write_tree(table: TreeParameters, form: str, units: Units) -> str:
 
 def _csv(table: TreeParameters) -> str:
     """A line for each row: its numbers, then the three upper rows of T_frame_link, T11 to T34."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
     places = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
-    writer.writerow([*(field.name for field in fields(TreeRow)), *places])
+    lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *places]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3].tolist(), strict=True):
         own = [csv_cell(value) if isinstance(value, str) else value for value in row.values()]
-        writer.writerow([*own, *(x for line in T for x in line)])
-    return out.getvalue()
+        lines.append([*own, *(x for line in T for x in line)])
+    return csv_text(lines)
 
 
 def _heads(table: TreeParameters, units: Units) -> list[str]:
