@@ -46,7 +46,7 @@ def near_tests(path: Path) -> list[str]:
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
     )
     part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-    near = {test for test, text in _texts().items() if named.search(text)}
+    near = {test for test, text in _texts().items() if name in text and named.search(text)}
     own = _tests_of(part, f"test_{part}.py") or _tests_of(*_OF_ROBOTS)
     order = sorted(near | own, key=lambda test: (path.stem not in test.stem, test not in near, str(test)))
     return [str(test.relative_to(ROOT)) for test in order]
