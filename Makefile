@@ -22,7 +22,8 @@ fast:  ## the quick tests: a minute on two quiet cores
 	pytest -q -n 2 -m "not slow and not browser"
 
 test: check  ## everything that must pass
-	pytest -q -n 2
+	urdfkin warm
+	pytest -q -n 2 --dist worksteal
 
 search:  ## the quick tests, their properties on examples that were never tried
 	pytest -q -n 2 -m "not slow and not browser" --hypothesis-profile=search
