@@ -8,7 +8,7 @@ A core is loaded when it is first needed, so that a first use compiles only what
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,47 +41,33 @@ def _cores() -> Any:
     return cores
 
 
-def placements(
-    plan: Plan,
-    q: FloatArray,
-    *,
-    base: FloatArray = STILL_STATE,
-    out: FloatArray | None = None,
-    threads: int | None = None,
-) -> FloatArray:
+class How(TypedDict, total=False):
+    """What every function here takes by name.
+
+    Attributes:
+        base: (n, 24) or (1, 24) the base's state.
+        out: C-contiguous float64 array of the result's size to write into.
+        threads: How many compute; None: every processor from a number of configurations on.
+    """
+
+    base: FloatArray
+    out: FloatArray | None
+    threads: int | None
+
+
+def placements(plan: Plan, q: FloatArray, **how: Unpack[How]) -> FloatArray:
     """(n, frames, 4, 4) T_world_frame: 7.77 with the rotations alongside."""
-    core = _cores().placements
-    shape = len(q), len(plan.frames), 16
-    flat = np.empty(shape) if out is None else out.reshape(shape)
-    _run(core, plan, program_of(plan, turned=True), [q], _ALIGNED, base, flat, threads)
-    return flat.reshape(len(q), len(plan.frames), 4, 4)
+    program = program_of(plan, turned=True)
+    return _computed(_cores().placements, plan, program, [q], _ALIGNED, (4, 4), **how)
 
 
 def velocities(
-    plan: Plan,
-    q: FloatArray,
-    v: FloatArray,
-    reference: Reference = _ALIGNED,
-    *,
-    base: FloatArray = STILL_STATE,
-    out: FloatArray | None = None,
-    threads: int | None = None,
+    plan: Plan, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
     """(n, frames, 6) [linear; angular]: 7.127, 7.128."""
-    cores = _cores()
-    core = cores.local_velocities if reference is Reference.LOCAL else cores.velocities
-    out = np.empty((len(q), len(plan.frames), 6)) if out is None else out
-    _run(
-        core,
-        plan,
-        program_of(plan, turned=reference is Reference.LOCAL),
-        [q, v],
-        reference,
-        base,
-        out,
-        threads,
-    )
-    return out
+    local = reference is Reference.LOCAL
+    core = _cores().local_velocities if local else _cores().velocities
+    return _computed(core, plan, program_of(plan, turned=local), [q, v], reference, (6,), **how)
 
 
 def accelerations(
@@ -90,119 +76,66 @@ def accelerations(
     v: FloatArray,
     a: FloatArray,
     reference: Reference = _ALIGNED,
-    *,
-    base: FloatArray = STILL_STATE,
-    out: FloatArray | None = None,
-    threads: int | None = None,
+    **how: Unpack[How],
 ) -> FloatArray:
     """(n, frames, 6) [linear; angular], classical: 7.129, 7.130."""
-    from urdfkin.compiled.cores import accelerations, local_accelerations  # noqa: PLC0415
-
-    core = local_accelerations if reference is Reference.LOCAL else accelerations
-    out = np.empty((len(q), len(plan.frames), 6)) if out is None else out
-    _run(
-        core,
-        plan,
-        program_of(plan, turned=reference is Reference.LOCAL),
-        [q, v, a],
-        reference,
-        base,
-        out,
-        threads,
-    )
-    return out
+    local = reference is Reference.LOCAL
+    core = _cores().local_accelerations if local else _cores().accelerations
+    return _computed(core, plan, program_of(plan, turned=local), [q, v, a], reference, (6,), **how)
 
 
-def jacobians(
-    plan: Plan,
-    q: FloatArray,
-    reference: Reference = _ALIGNED,
-    *,
-    base: FloatArray = STILL_STATE,
-    out: FloatArray | None = None,
-    threads: int | None = None,
-) -> FloatArray:
+def jacobians(plan: Plan, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]) -> FloatArray:
     """(n, frames, 6, nv) velocity Jacobians: 7.85."""
-    core = _cores().jacobians
-    out = np.empty((len(q), len(plan.frames), 6, plan.nv)) if out is None else out
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
-    _run(core, plan, program, [q], reference, base, out, threads)
-    return out
+    return _computed(_cores().jacobians, plan, program, [q], reference, (6, plan.nv), **how)
 
 
 def jacobian_rates(
-    plan: Plan,
-    q: FloatArray,
-    v: FloatArray,
-    reference: Reference = _ALIGNED,
-    *,
-    base: FloatArray = STILL_STATE,
-    out: FloatArray | None = None,
-    threads: int | None = None,
+    plan: Plan, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
     """(n, frames, 6, nv) time derivatives of the velocity Jacobians: the J-dot of 7.126."""
-    core = _cores().jacobian_rates
-    out = np.empty((len(q), len(plan.frames), 6, plan.nv)) if out is None else out
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
-    _run(core, plan, program, [q, v], reference, base, out, threads)
-    return out
+    return _computed(_cores().jacobian_rates, plan, program, [q, v], reference, (6, plan.nv), **how)
 
 
-def hessians(
-    plan: Plan,
-    q: FloatArray,
-    reference: Reference = _ALIGNED,
-    *,
-    base: FloatArray = STILL_STATE,
-    out: FloatArray | None = None,
-    threads: int | None = None,
-) -> FloatArray:
+def hessians(plan: Plan, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]) -> FloatArray:
     """(n, frames, 6, nv, nv) derivatives of the velocity Jacobians: [..., i, j] of column i by rate j."""
-    core = _cores().hessians
-    out = np.empty((len(q), len(plan.frames), 6, plan.nv, plan.nv)) if out is None else out
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True, pairs=True)
-    _run(core, plan, program, [q], reference, base, out, threads)
-    return out
+    return _computed(_cores().hessians, plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
 
 
 def imus(
-    plan: Plan,
-    q: FloatArray,
-    v: FloatArray,
-    a: FloatArray,
-    *,
-    gravity: FloatArray,
-    base: FloatArray = STILL_STATE,
-    out: FloatArray | None = None,
-    threads: int | None = None,
+    plan: Plan, q: FloatArray, v: FloatArray, a: FloatArray, *, gravity: FloatArray, **how: Unpack[How]
 ) -> FloatArray:
     """(n, frames, 6) [proper acceleration; angular velocity] in each frame's own axes.
 
     An accelerometer cannot tell gravity from a world that is accelerated against it, and so the base is.
     """
-    out = np.empty((len(q), len(plan.frames), 6)) if out is None else out
+    how["base"] = against_gravity(how.get("base", STILL_STATE), gravity)
     program = program_of(plan, turned=True)
-    base = against_gravity(base, gravity)
-    _run(_cores().imus, plan, program, [q, v, a], Reference.LOCAL, base, out, threads)
-    return out
+    return _computed(_cores().imus, plan, program, [q, v, a], Reference.LOCAL, (6,), **how)
 
 
-def _run(
+def _computed(
     core: Core,
     plan: Plan,
     program: Program,
     inputs: Sequence[FloatArray],
     reference: Reference,
-    base: FloatArray,
-    out: FloatArray,
-    threads: int | None,
-) -> None:
-    """Have a core fill `out` from q, and v, and a.
+    shape: tuple[int, ...],
+    *,
+    base: FloatArray = STILL_STATE,
+    out: FloatArray | None = None,
+    threads: int | None = None,
+) -> FloatArray:
+    """(n, frames, *shape) by a core, of q, and v, and a.
 
     Raises:
         NotFiniteError: an input is not finite.
         RangeError: a result is not, although the inputs are.
     """
+    shape = len(inputs[0]), len(plan.frames), *shape
+    out = np.empty(shape) if out is None else out.reshape(shape)
     inputs = [x[:1] if _is_the_same_for_all(x) else x for x in inputs]
     staged = is_staged(out)
 
@@ -214,6 +147,7 @@ def _run(
 
     if in_blocks(compute, [base, *inputs], out, threads) or plan.is_large or _is_large(base):
         _demand_finite([base, *inputs], out)
+    return out
 
 
 def is_staged(out: FloatArray) -> bool:
