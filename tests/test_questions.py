@@ -12,7 +12,7 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.pages import DOCS
-from urdfkin.cli.questions import answer, answers
+from urdfkin.cli.questions import answer_to, answers
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.questions import Question
 from urdfkin.urdf import xacro
@@ -127,9 +127,9 @@ def test_each_of_the_fifteen_pains_that_has_a_message_is_led_to_from_one() -> No
 
 def test_a_word_that_one_question_has_is_enough() -> None:
     for words, topic in (("mimic", "mimic-joints"), ("Meshes", "packages-and-meshes"), ("unit axes", AXES)):
-        assert answer(words) == answers()[topic]
-    assert answer("frames") is None  # two have it
-    assert answer("") is None
+        assert answer_to(words) == answers()[topic]
+    assert answer_to("frames") is None  # two have it
+    assert answer_to("") is None
     assert run("explain", "mimic").text.startswith("Mimic joints\n")
     assert run("explain", "frames").code == 2
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from urdfkin.cli.completing import complete_topic
-from urdfkin.cli.questions import answer, answers
+from urdfkin.cli.questions import answer_to, answers
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.lint.explain import explain
@@ -30,15 +30,15 @@ def command(topic: str | None) -> None:
       urdfkin explain reference-frames
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
     if topic is None:
-        for one in (*RULES.values(), *OF_MJCF.values()):
-            click.echo(f"{one.id}  {one.severity.value:7}  {one.slug:26}  {page(one.id).title}")
+        for rule in (*RULES.values(), *OF_MJCF.values()):
+            click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")
         click.echo(f"questions: {', '.join(answers())}")
     elif (equation := explain_equation(topic)) is not None:
         click.echo(equation)
-    elif (rule := _rule(topic)) is not None:
-        click.echo(explain(rule))
-    elif (found := answer(topic)) is not None:
-        click.echo(found)
+    elif (asked := _rule(topic)) is not None:
+        click.echo(explain(asked))
+    elif (answer := answer_to(topic)) is not None:
+        click.echo(answer)
     else:
         rules = (*RULES.values(), *OF_MJCF.values())
         known = [name for one in rules for name in (one.id, one.slug)]

@@ -40,7 +40,7 @@ def command(robot: str, format_: str) -> None:
 
 
 def _print(robot: Robot) -> None:
-    """What `print(robot)` says, in tables that fit the terminal."""
+    """What a robot says of itself, in tables that fit the terminal."""
     from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
 
     out = console()

@@ -16,7 +16,7 @@ def answers() -> dict[str, str]:
     return {anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in sections}
 
 
-def answer(topic: str) -> str | None:
+def answer_to(topic: str) -> str | None:
     """The section of an anchor, or of words that one anchor alone has."""
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]
