@@ -508,7 +508,8 @@ class _Walk:
         seen = list[tuple[_Free, _Place, Score]]()
         for what, place, here in equal:
             pairs = self.pairing.edges(place.bodies, place.came, place.G, place.XC)[0]
-            all_ = [here, *(self._step(place, e, f, -1, depth - 1)[2] for e, f in pairs)]
+            all_: list[Score] = [here]
+            all_ += [self._step(place, e, f, -1, depth - 1)[2] for e, f in pairs]
             seen.append((what, place, (sum(count for count, _ in all_), max(off for _, off in all_))))
             if not seen[-1][2][1]:
                 break
