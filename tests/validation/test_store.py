@@ -426,6 +426,17 @@ def test_a_second_client_is_refused_and_told_who_is_at_work(tmp_path: Path) -> N
     assert "somebody else is at work on this store: found process " in refused[0]
 
 
+@pytest.mark.slow
+def test_two_clients_that_begin_at_the_same_time_leave_what_one_would(
+    undisturbed: str, tmp_path: Path
+) -> None:
+    how: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+    both = [subprocess.Popen([*_COMMAND, str(tmp_path / "s")], **how) for _ in range(2)]
+    said = [process.communicate()[1] for process in both]
+    assert sum("somebody else is at work on this store" in err for err in said) <= 1
+    assert numbers(stored(tmp_path / "s")) == undisturbed
+
+
 def test_a_clock_that_is_set_back_changes_nothing(
     undisturbed: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

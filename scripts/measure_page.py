@@ -1,0 +1,95 @@
+"""How soon the page of thousands of robots is on the screen: written, opened in Chromium, searched, unfolded.
+
+The robots are those of a real validation, over and over, under other names. Medians over browsers that have
+never seen the page; needs Debian's chromium and chromium-driver.
+
+    python scripts/measure_page.py --robots 2000
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from itertools import cycle, islice
+from pathlib import Path
+from statistics import median
+from typing import cast
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+
+from tests.report.browser import Browser, opened
+from urdfkin.report.document import Document
+from urdfkin.report.html import as_files
+from urdfkin.validation.campaign import validate
+
+_ROBOTS = ("ur5", "panda", "z1", "kinova", "planar_two_link")
+_PAINTED = "return performance.getEntriesByName('first-contentful-paint')[0].startTime"
+_READY = "return performance.getEntriesByType('navigation')[0].domComplete"
+_FIND = (
+    "const t = performance.now(), find = document.querySelector('#find'); find.value = arguments[0];"
+    "find.dispatchEvent(new Event('input')); document.body.offsetHeight; return performance.now() - t"
+)
+_UNFOLD = """
+    const done = arguments[1], row = document.querySelector(`#robot-${arguments[0]}`), t = performance.now();
+    const look = () => row.querySelector('table.checks') ? done(performance.now() - t) : setTimeout(look, 5);
+    row.open = true; look();
+"""
+
+
+def main() -> None:
+    """Print what each step takes."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--robots", type=int, default=2000)
+    parser.add_argument("--rounds", type=int, default=5)
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        page, begin = Path(folder) / "fleet.html", time.process_time()
+        (page.parent / "fleet-robots").mkdir()
+        sizes = [
+            _write(page.parent / place, text) for place, text in as_files(fleet(given.robots), page.name)
+        ]
+        print(f"written: {time.process_time() - begin:.1f} s of processor, {len(sizes)} files,", end=" ")
+        print(f"the page {sizes[-1] / 1e6:.2f} MB, {sum(sizes) / 1e6:.0f} MB together")
+        rounds = [_opened(page, Path(folder) / f"profile-{i}", given.robots) for i in range(given.rounds)]
+    for name in rounds[0]:
+        print(f"{name}: {median(times[name] for times in rounds):.0f} ms", end=" ")
+        print(f"({', '.join(f'{times[name]:.0f}' for times in rounds)})")
+
+
+def fleet(robots: int) -> Document:
+    """The document of so many."""
+    document = validate(list(_ROBOTS), samples=10).as_dict()
+    names = (f"fleet/{i:04}.urdf" for i in range(robots))
+    document["robots"] = [
+        robot | {"source": name}
+        for name, robot in zip(names, islice(cycle(document["robots"]), robots), strict=True)
+    ]
+    document["asked"] = robots
+    return cast("Document", document)
+
+
+def _write(path: Path, text: str) -> int:
+    return path.write_text(text, encoding="utf-8")
+
+
+def _opened(page: Path, profile: Path, robots: int) -> dict[str, float]:
+    with opened(profile) as browser:
+        browser.chrome.get("about:blank")
+        browser.open(page)
+        return {
+            "first paint": browser.js(_PAINTED),
+            "loaded": browser.js(_READY),
+            "one robot found": browser.js(_FIND, f"{robots - 1:04}"),
+            "all found again": browser.js(_FIND, ""),
+            "one robot unfolded, its file read": _unfolded(browser, robots // 2),
+        }
+
+
+def _unfolded(browser: Browser, robot: int) -> float:
+    return float(browser.chrome.execute_async_script(_UNFOLD, robot))
+
+
+if __name__ == "__main__":
+    main()
