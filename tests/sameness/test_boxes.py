@@ -7,15 +7,15 @@ import pytest
 
 import urdfkin
 from tests.sameness.pairs import changed, robot
-from urdfkin.sameness.alignment import FramePair, align
+from urdfkin.model.mechanisms.alignment import FramePair, align
+from urdfkin.model.mechanisms.upper import FINE, behind_first, upper_bounds
+from urdfkin.model.mechanisms.variables import variables_of
 from urdfkin.sameness.boxes import Boxes, tightened
 from urdfkin.sameness.certificate import certificate, recheck
 from urdfkin.sameness.curvature import curvature
 from urdfkin.sameness.judging import Judge
 from urdfkin.sameness.lower import Search
 from urdfkin.sameness.result import Verdict
-from urdfkin.sameness.upper import FINE, behind_first, upper_bounds
-from urdfkin.sameness.variables import variables_of
 
 #: Robots, changes, frames: turns alone, a slide, followers, an axis that alone is bent.
 CASES = [

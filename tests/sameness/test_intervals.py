@@ -12,10 +12,10 @@ import urdfkin
 from tests.sameness import pairs
 from tests.sameness.pairs import robot
 from tests.sameness.searching import far, searched
+from urdfkin.model.mechanisms.mechanism import Screw
+from urdfkin.model.mechanisms.rigid import along
+from urdfkin.model.mechanisms.support import Grid, point
 from urdfkin.robot import Robot
-from urdfkin.sameness.mechanism import Screw
-from urdfkin.sameness.rigid import along
-from urdfkin.sameness.support import Grid, point
 from urdfkin.urdf.writer import to_urdf
 
 CASES: dict[str, tuple[str, Callable[[Robot], str]]] = {

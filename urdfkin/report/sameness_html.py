@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from urdfkin.model.chain import inverse
+from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.document import asset
 from urdfkin.report.html import as_is, environment
 from urdfkin.report.sameness import HEADS, as_written, far_frames, headline, renamed, rows, where
 from urdfkin.robot import Robot
-from urdfkin.sameness.mechanism import Mechanism
 from urdfkin.sameness.result import Interval, Sameness, length
 
 #: The picture's half side, and how much of it the robots take, in its own units.

@@ -1,7 +1,8 @@
 """A sharper bound where many things differ: branch and bound on boxes of configurations.
 
-`urdfkin.sameness.upper` adds up what each difference does at its own worst configuration. Here D(q), how far
-B's frame is from A's, is looked at in boxes of all variables together. In one with middle c, half widths h,
+`urdfkin.model.mechanisms.upper` adds up what each difference does at its own worst configuration. Here D(q),
+how far B's frame is from A's, is looked at in boxes of all variables together. In one with middle c, half
+widths h,
 
     |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i,
 
@@ -17,13 +18,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from urdfkin.model.chain import inverse
+from urdfkin.model.mechanisms.alignment import FramePair
+from urdfkin.model.mechanisms.upper import behind_first
+from urdfkin.model.mechanisms.variables import Line
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.sameness.alignment import FramePair
 from urdfkin.sameness.curvature import curvature
 from urdfkin.sameness.lower import Search, urdfkins
-from urdfkin.sameness.upper import behind_first
-from urdfkin.sameness.variables import Line
 
 #: How many boxes there may be at a time: a second or two of a processor for a frame.
 MOST = 2**17

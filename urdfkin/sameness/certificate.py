@@ -10,15 +10,15 @@ import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.mechanisms.alignment import FramePair, Gauge, align
+from urdfkin.model.mechanisms.conversion import Conversion
+from urdfkin.model.mechanisms.upper import COARSE, FINE, upper_bounds
+from urdfkin.model.mechanisms.variables import variables_of
 from urdfkin.robot import Robot
-from urdfkin.sameness.alignment import FramePair, Gauge, align
 from urdfkin.sameness.boxes import tightened
-from urdfkin.sameness.conversion import Conversion
 from urdfkin.sameness.judging import Judge, digest
 from urdfkin.sameness.lower import Search, pinocchios, urdfkins
 from urdfkin.sameness.result import Difference, Interval, JointMap, Sameness, Verdict
-from urdfkin.sameness.upper import COARSE, FINE, upper_bounds
-from urdfkin.sameness.variables import variables_of
 from urdfkin.sameness.wording import differences, put_right
 
 #: How many boxes there may be at a time to prove a bound that is claimed.

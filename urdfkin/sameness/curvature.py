@@ -6,7 +6,7 @@ turn, and then u x. So y, where B's frame is, and d, how far it is from A's, giv
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
 
 with Y = e(S' t') y, and these pass the joints in front as vectors that have no place
-(`urdfkin.sameness.upper`).
+(`urdfkin.model.mechanisms.upper`).
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from urdfkin.model.mechanisms.alignment import IDENTITY, FramePair, Step
+from urdfkin.model.mechanisms.mechanism import Screw
+from urdfkin.model.mechanisms.support import Grid, Support, point
+from urdfkin.model.mechanisms.upper import COARSE, at_the_frame, before_it, difference, passed
+from urdfkin.model.mechanisms.variables import Pair, Variables
 from urdfkin.model.tree import FloatArray
-from urdfkin.sameness.alignment import IDENTITY, FramePair, Step
-from urdfkin.sameness.mechanism import Screw
-from urdfkin.sameness.support import Grid, Support, point
-from urdfkin.sameness.upper import COARSE, at_the_frame, before_it, difference, passed
-from urdfkin.sameness.variables import Pair, Variables
 
 _ORIGIN = np.zeros(3)
 _Vectors = tuple[Support, Support]

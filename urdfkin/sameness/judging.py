@@ -15,17 +15,17 @@ from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.demands import whole_number
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.loading import load
+from urdfkin.model.mechanisms.alignment import AS_WRITTEN, Alignment, FramePair, align
+from urdfkin.model.mechanisms.mechanism import Mechanism, Tolerance, tolerance_of
+from urdfkin.model.mechanisms.rigid import apart
+from urdfkin.model.mechanisms.upper import FINE, upper_bounds
+from urdfkin.model.mechanisms.variables import Variables, variables_of
 from urdfkin.model.ranges import WIDEST
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
-from urdfkin.sameness.alignment import AS_WRITTEN, Alignment, FramePair, align
 from urdfkin.sameness.boxes import MOST, tightened
 from urdfkin.sameness.lower import Search, pinocchios, urdfkins
-from urdfkin.sameness.mechanism import Mechanism, Tolerance, tolerance_of
 from urdfkin.sameness.result import Interval, JointMap, Sameness, Verdict, demand_joint_names
-from urdfkin.sameness.rigid import apart
-from urdfkin.sameness.upper import FINE, upper_bounds
-from urdfkin.sameness.variables import Variables, variables_of
 from urdfkin.sameness.wording import differences, put_right, remarks
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.choosing import checked_choice

@@ -1,8 +1,8 @@
 """How far apart a frame of two models does come: the worst configuration that a search finds.
 
 Whatever it finds is attained, so that its distance is a lower bound; how near that is to the largest one, the
-upper bound tells (`urdfkin.sameness.upper`). Each joint's value enters a position as a sine and a cosine, so
-that going along one coordinate after the other, from the worst of many configurations, ends well.
+upper bound tells (`urdfkin.model.mechanisms.upper`). Each joint's value enters a position as a sine and a
+cosine, so that going along one coordinate after the other, from the worst of many configurations, ends well.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy as np
 from urdfkin.kinematics.roundings import EPS, FOLLOWER
 from urdfkin.model.chain import inverse
 from urdfkin.model.configuration import neutral
+from urdfkin.model.mechanisms.alignment import Alignment, FramePair
+from urdfkin.model.mechanisms.variables import Line, Variables
 from urdfkin.model.ranges import WIDEST
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.sameness.alignment import Alignment, FramePair
-from urdfkin.sameness.variables import Line, Variables
 from urdfkin.verify.sampling import sample
 
 SAMPLES, STARTS, ALONG = 512, 4, 13

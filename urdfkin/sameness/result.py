@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError
 from urdfkin.model.configuration import checked, neutral
+from urdfkin.model.mechanisms.conversion import Conversion
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.sameness.conversion import Conversion
 
 
 class Verdict(Enum):

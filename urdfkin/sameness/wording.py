@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from urdfkin.dh.elements import nearest_twelfth
 from urdfkin.dh.units import units_of
 from urdfkin.kinematics.rotation.euler import rpy_of
+from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step
+from urdfkin.model.mechanisms.conversion import Conversion
+from urdfkin.model.mechanisms.mechanism import Tolerance
+from urdfkin.model.mechanisms.variables import Variables, limits
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
-from urdfkin.sameness.alignment import IDENTITY, Alignment, FramePair, Step
-from urdfkin.sameness.conversion import Conversion
-from urdfkin.sameness.mechanism import Tolerance
 from urdfkin.sameness.result import Difference, angle, length
-from urdfkin.sameness.variables import Variables, limits
 
 
 def put_right(found: Alignment, rounding: Tolerance) -> tuple[str, ...]:

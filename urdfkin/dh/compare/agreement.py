@@ -11,6 +11,7 @@ import numpy as np
 from urdfkin.dh.compare.align import Alignment, align
 from urdfkin.dh.compare.fit import CELLS, Model, columns, fit_cells, hidden_cells
 from urdfkin.dh.compare.freedoms import fit_freedoms
+from urdfkin.dh.compare.proof import most_apart
 from urdfkin.dh.compare.result import CellDifference, Comparison, TakenUp
 from urdfkin.dh.convert import to_standard
 from urdfkin.dh.elements import along_axis, between_axes
@@ -62,8 +63,10 @@ def compare(
     values, there = _samples(chain, CHECK_SAMPLES, 2)
     off, residual = _off(fitted, written, values, there), _apart(complete, values, there)[0]
     cells = _differences(chain, reference, fitted, complete, values, scale, digits, fit)
+    table = _fitted_table(chain, standard, fitted)
+    most_metres, most_radians = most_apart(chain, table, _slides(chain))
     found = Comparison(
-        reference=_fitted_table(chain, standard, fitted),
+        reference=table,
         reach=scale,
         fitted=fit,
         senses=tuple(int(s) * row.sense for s, row in zip(fitted.senses, standard.rows, strict=True)),
@@ -77,6 +80,8 @@ def compare(
         residual=residual,
         tolerance=tolerance,
         samples=CHECK_SAMPLES,
+        most_metres=most_metres,
+        most_radians=most_radians,
         **off,
     )
     if fit and not found.as_written:
@@ -227,11 +232,17 @@ def _own(model: Model, i: int) -> int:
 
 def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
     """Values of all joints (count, n), each joint free, and the tip's poses there."""
-    bounds = [(-math.pi, math.pi) if joint.kind.turns else _slide(joint.limit) for joint in chain.joints]
+    slides = _slides(chain)
+    bounds = [slides.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     lower, upper = np.array(bounds).T
     values = np.random.default_rng(seed).uniform(lower, upper, (count, len(bounds)))
     free = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints))
     return values, free.placement(values)
+
+
+def _slides(chain: FrameChain) -> dict[str, tuple[float, float]]:
+    """Between what the values of sliding joints lie, metres."""
+    return {joint.name: _slide(joint.limit) for joint in chain.joints if not joint.kind.turns}
 
 
 def _slide(limit: object) -> tuple[float, float]:

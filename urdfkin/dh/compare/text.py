@@ -47,12 +47,13 @@ def _verdict(found: Comparison) -> list[str]:
     path = f"{table.robot}, {table.base_frame} to {table.tip_frame}"
     verdict = "agrees exactly" if found.exact else "agrees" if found.agrees else "DIFFERS"
     off = _off(found.metres, found.radians)
+    proof = f"{found.samples} samples; proven for all values of the joints: {_proven(found)}"
     if found.as_written:
-        return [f"The table {verdict} as it is written: {path}: {off}", f"({found.samples} samples)."]
+        return [f"The table {verdict} as it is written: {path}: {off}", f"({proof})."]
     if not found.fitted:
         return [
             f"The table {verdict}: {path}: {off}",
-            f"({found.samples} samples, nothing fitted: base, tool and joint variables as written).",
+            f"({proof}; nothing fitted: base, tool and joint variables as written).",
         ]
     fine = resolution(found)
     ends = [
@@ -69,8 +70,8 @@ def _verdict(found: Comparison) -> list[str]:
             f"the way {reversed_} joint{'s' if reversed_ > 1 else ''} count{'s' * (reversed_ == 1)} (below)"
         )
     once = " once base, tool and joint offsets are fitted" if found.agrees and ends else ""
-    fitted = "" if found.agrees else ", base, tool and joint offsets fitted"
-    lines = [f"The table {verdict}{once}: {path}: {off}", f"({found.samples} samples{fitted})."]
+    fitted = "" if found.agrees else "; base, tool and joint offsets fitted"
+    lines = [f"The table {verdict}{once}: {path}: {off}", f"({proof}{fitted})."]
     lines.append(f"As it is written {_off(found.written_metres, found.written_radians)}.")
     if ends:
         lines.append(f"Fitting gave {', '.join(ends)}; --no-fit keeps to what is written.")
@@ -79,6 +80,15 @@ def _verdict(found: Comparison) -> list[str]:
 
 def _off(metres: float, radians: float) -> str:
     return f"the tip is off by at most {metres * 1e3:.3g} mm and {radians:.3g} rad"
+
+
+def _proven(found: Comparison) -> str:
+    """What is proven, in words."""
+    if found.exact:
+        return "rounding alone"
+    if math.isinf(found.most_metres):
+        return "nothing"
+    return f"{found.most_metres * 1e3:.3g} mm and {found.most_radians:.3g} rad"
 
 
 def _is_taken(taken: TakenUp, found: Comparison) -> bool:

@@ -10,9 +10,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw
+from urdfkin.model.mechanisms.rigid import along, angle_from_to, between
 from urdfkin.model.tree import FloatArray
-from urdfkin.sameness.mechanism import Edge, Mechanism, Screw
-from urdfkin.sameness.rigid import along, angle_from_to, between
 
 #: Radians of tilt below which an axis says nothing of a slide along another one.
 _NOTHING = 1e-12

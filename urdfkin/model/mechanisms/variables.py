@@ -11,9 +11,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from urdfkin.model.mechanisms.alignment import Alignment, Step
+from urdfkin.model.mechanisms.mechanism import Tolerance
 from urdfkin.model.tree import FloatArray, Joint, JointKind
-from urdfkin.sameness.alignment import Alignment, Step
-from urdfkin.sameness.mechanism import Tolerance
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,9 +5,9 @@ Behind joint i, seen from A's home, let y be where B's frame is and d how far B'
     d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d.
 
 All but the last are nothing where nothing differs. For each direction u the largest u . d' is at most the sum
-of the largest of each term, which support functions of y and d give (`urdfkin.sameness.support`). Where a
-single thing differs there is one term, and nothing is given away; where several do, each may have its own
-worst configuration, and the bound is larger than the truth by what they do not share.
+of the largest of each term, which support functions of y and d give (`urdfkin.model.mechanisms.support`).
+Where a single thing differs there is one term, and nothing is given away; where several do, each may have its
+own worst configuration, and the bound is larger than the truth by what they do not share.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from urdfkin.kinematics.rotation.axis_angle import rotation_about
+from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step
+from urdfkin.model.mechanisms.mechanism import Screw
+from urdfkin.model.mechanisms.rigid import apart
+from urdfkin.model.mechanisms.support import Grid, Support, point
+from urdfkin.model.mechanisms.variables import Pair, Variables
 from urdfkin.model.tree import FloatArray
-from urdfkin.sameness.alignment import IDENTITY, Alignment, FramePair, Step
-from urdfkin.sameness.mechanism import Screw
-from urdfkin.sameness.rigid import apart
-from urdfkin.sameness.support import Grid, Support, point
-from urdfkin.sameness.variables import Pair, Variables
 
 #: For every frame; for the one that is farthest.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
@@ -44,7 +44,11 @@ def upper_bounds(
         return 0.0, 0.0
     if any(step.unlike and pair is None for step, pair in zip(steps, pairs, strict=True)):
         return math.inf, math.inf
-    return _metres(steps, pairs, variables, frame, grid), _radians(steps, pairs, variables, frame)
+    radians = _radians(steps, pairs, variables, frame)
+    if not steps:  # nothing that moves it one way in A and another in B: as far off everywhere
+        d = frame.end[:3, :3] @ frame.home[:3, 3] + frame.end[:3, 3] - frame.home[:3, 3]
+        return float(np.linalg.norm(d)), radians
+    return _metres(steps, pairs, variables, frame, grid), radians
 
 
 def behind_first(

@@ -21,12 +21,12 @@ from typing import TypeVar
 import numpy as np
 
 from urdfkin.model.chain import inverse
+from urdfkin.model.mechanisms.conversion import Conversion, onto_plane, undoing
+from urdfkin.model.mechanisms.guesses import behind, laid, zeros
+from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, tolerance_of
+from urdfkin.model.mechanisms.pairing import Pairing, family
+from urdfkin.model.mechanisms.rigid import along, apart, between, turn_about
 from urdfkin.model.tree import FloatArray
-from urdfkin.sameness.conversion import Conversion, onto_plane, undoing
-from urdfkin.sameness.guesses import behind, laid, zeros
-from urdfkin.sameness.mechanism import Edge, Mechanism, Screw, tolerance_of
-from urdfkin.sameness.pairing import Pairing, family
-from urdfkin.sameness.rigid import along, apart, between, turn_about
 
 #: Of joints whose order does not matter, so many orders are tried: all of five slides.
 MOST_ORDERS = 120
@@ -507,13 +507,16 @@ class _Walk:
         self.ahead -= 1
         seen = list[tuple[_Free, _Place, Score]]()
         for what, place, here in equal:
-            pairs = self.pairing.edges(place.bodies, place.came, place.G, place.XC)[0]
-            all_: list[Score] = [here]
-            all_ += [self._step(place, e, f, -1, depth - 1)[2] for e, f in pairs]
-            seen.append((what, place, (sum(count for count, _ in all_), max(off for _, off in all_))))
+            seen.append((what, place, self._with_behind(place, here, depth)))
             if not seen[-1][2][1]:
                 break
         return _best_of(seen)
+
+    def _with_behind(self, place: _Place, here: Score, depth: int) -> Score:
+        """The score of a place together with what follows."""
+        pairs = self.pairing.edges(place.bodies, place.came, place.G, place.XC)[0]
+        scores = [here, *(self._step(place, e, f, -1, depth - 1)[2] for e, f in pairs)]
+        return sum(count for count, _ in scores), max(off for _, off in scores)
 
     def _score(self, place: _Place) -> Score:
         """How many of the links and axes at a place agree, and the largest disagreement (m)."""

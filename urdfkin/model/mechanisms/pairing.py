@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, between_lines, tolerance_of
+from urdfkin.model.mechanisms.rigid import apart
 from urdfkin.model.tree import FloatArray, JointKind
-from urdfkin.sameness.mechanism import Edge, Mechanism, Screw, between_lines, tolerance_of
-from urdfkin.sameness.rigid import apart
 
 Pair = tuple[Edge, Edge]
 

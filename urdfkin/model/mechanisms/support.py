@@ -22,8 +22,8 @@ import numpy as np
 
 from urdfkin.kinematics.rotation.aligning import axis_aligning
 from urdfkin.kinematics.rotation.axis_angle import rotation_about
+from urdfkin.model.mechanisms.mechanism import Screw
 from urdfkin.model.tree import FloatArray
-from urdfkin.sameness.mechanism import Screw
 
 _WHOLE = 2.0 * math.pi
 

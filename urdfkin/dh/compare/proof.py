@@ -1,0 +1,55 @@
+"""How far a table's tip is off at most, in every configuration: proven as `urdfkin same` proves it.
+
+The path and the table become two mechanisms with the same joints. `urdfkin.model.mechanisms` lays them on
+each other as they are written, joint by joint; what is left is passed through support functions from the tip
+to the base.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from urdfkin.dh.table import DHTable
+from urdfkin.dh.to_tree import free_tree, link_names
+from urdfkin.model.chain import FrameChain
+from urdfkin.model.mechanisms.alignment import AS_WRITTEN, align
+from urdfkin.model.mechanisms.mechanism import Mechanism, tolerance_of
+from urdfkin.model.mechanisms.upper import FINE, upper_bounds
+from urdfkin.model.mechanisms.variables import variables_of
+from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit, build_tree
+
+
+def most_apart(
+    path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]
+) -> tuple[float, float]:
+    """(m, rad) that the tip of a table of a path's joints is off at most, without what counts as rounding.
+
+    Args:
+        path: The path, each joint free.
+        table: The table, whose variables are the path's coordinates, senses and zeros in it.
+        slides: Between what the values of sliding joints lie.
+    """
+    mechanisms = Mechanism(_free(path, table, slides)), Mechanism(free_tree(table))
+    found = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
+    variables = variables_of(found, tolerance_of(*mechanisms))
+    tip = link_names(table)[-1]
+    frame = next(frame for frame in found.frames if found.a.tree.links[frame.a] == tip)
+    return upper_bounds(found, variables, frame, FINE)
+
+
+def _free(path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]) -> KinematicTree:
+    """A path as a tree whose links are called as the table's, followers set free."""
+    names, z = link_names(table), np.array([0.0, 0.0, 1.0])
+    joints = list[tuple[Joint, str, str]]()
+    for i, joint in enumerate(path.joints):
+        kind = JointKind.CONTINUOUS if joint.kind.turns else JointKind.PRISMATIC
+        limit = Limit(*slides[joint.name], math.inf, math.inf) if joint.name in slides else None
+        one = Joint(joint.name, kind, 0, joint.T_previous_joint, z, limit)
+        joints.append((one, names[i], names[i + 1]))
+    last = free_tree(table).joints[-1]
+    joints.append((replace(last, T_parent_joint=path.T_last_tip), names[-2], names[-1]))
+    return build_tree(path.robot, names[0], joints)
