@@ -79,7 +79,7 @@ def _verdict(found: Comparison) -> list[str]:
 
 
 def _off(metres: float, radians: float) -> str:
-    return f"the tip is off by at most {metres * 1e3:.3g} mm and {radians:.3g} rad"
+    return f"the tip is off by up to {metres * 1e3:.3g} mm and {radians:.3g} rad"
 
 
 def _proven(found: Comparison) -> str:

@@ -464,7 +464,7 @@ class _Walk:
         with_it = self._best_zero(there, K @ place.G, t, turns, zero, depth)
         if depth == AHEAD:
             alone = self._best_zero(there, place.G, t, turns, zero, depth)
-            if _better(alone[2], with_it[2]):
+            if _better(self._score(alone[1]), self._score(with_it[1])):
                 other = end.moved(back)
                 step = Step(a, b, kind, place.previous, sense, alone[0], IDENTITY, s, other, tilt, shift)
                 return step, *alone[1:]
