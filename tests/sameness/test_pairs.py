@@ -15,6 +15,7 @@ from tests.dh.test_compare import disguised, elbow
 from tests.sameness import pairs
 from tests.sameness.pairs import changed, robot
 from urdfkin.dh import dh_table
+from urdfkin.sameness.certificate import certificate, recheck
 from urdfkin.sameness.result import Verdict
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.writer import to_urdf
@@ -86,3 +87,12 @@ def test_a_table_with_other_signs_zeros_base_and_tool_is_the_same_robot(kinds: s
     a = urdfkin.load(to_urdf(pairs.bounded(tree)), verify=False)
     found = urdfkin.same(a, urdfkin.load(table, verify=False), map=given, bounds=False)
     assert found.verdict is Verdict.SAME_AFTER, found.differences
+
+
+def test_joints_of_one_name_are_each_others_however_many_hang_on_a_body() -> None:
+    a = robot("go2")
+    b = changed("go2", "axis bent")
+    assert b is not None
+    found = urdfkin.same(a, b)
+    assert [one.a for one in found.joints] == [one.b for one in found.joints]
+    assert recheck(certificate(found), a, b) == []

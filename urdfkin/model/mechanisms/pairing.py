@@ -53,7 +53,7 @@ class Pairing:
         left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not came[0]]
         left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not came[1]]
         pairs: list[Pair] = []
-        for e, f in self._by_name(bodies, left_a, left_b):
+        for e, f in self._by_name(bodies, list(left_a), list(left_b)):
             if e in left_a and f in left_b:
                 pairs.append((e, f))
                 left_a.remove(e)
