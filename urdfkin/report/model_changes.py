@@ -9,8 +9,8 @@ import numpy as np
 
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.model.described import axis_words, rule_words
+from urdfkin.model.mechanisms.mechanism import Tolerance
 from urdfkin.report.document import Joint, Model
-from urdfkin.sameness.mechanism import Tolerance
 from urdfkin.sameness.result import angle, length
 from urdfkin.sameness.wording import pose_words
 
