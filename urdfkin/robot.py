@@ -1014,7 +1014,7 @@ class Robot(Shown):
         from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  loads mpmath
 
         frame = self._default_frame() if frame is None else frame
-        inputs = q, v, a
+        inputs, hessian = (q, v, a), switch(hessian, "hessian")
         return enclose(self.verifier, self.plan, inputs, frame, reference, base, digits, hessian=hessian)
 
     def prepare(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> PreparedFrame:

@@ -170,7 +170,7 @@ def _moved(d: Any) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("edit", "what"), [(_turned, "axis"), (_moved, "placement")])
+@pytest.mark.parametrize(("edit", "what"), [(_turned, "axis"), (_moved, "origin")])
 def test_another_axis_or_place_is_told_as_a_change_of_the_robot(
     edit: Callable[[Any], None], what: str, tmp_path: Path
 ) -> None:
