@@ -54,6 +54,19 @@ def _interrupt(d: Any) -> None:
     d["interrupted"] = True
 
 
+def test_a_robot_is_known_again_in_a_file_of_another_name() -> None:
+    moved = arms()
+    moved["robots"][1]["source"] = "models/ur5_v2.urdf"
+    assert words(arms(), moved) == [(False, "ur5: file: ur5 -> models/ur5_v2.urdf")]
+
+
+def test_of_two_new_files_that_call_their_robot_alike_none_is_taken_for_the_old_one() -> None:
+    doubled = arms()
+    ur5 = doubled["robots"].pop(1)
+    doubled["robots"] += [ur5 | {"source": "first.urdf"}, ur5 | {"source": "second.urdf"}]
+    assert (True, "ur5: robot: verified -> nothing") in words(arms(), doubled)
+
+
 WORSE: list[tuple[Callable[[Any], None], str]] = [
     (_drop_robot, "ur5: robot: verified -> nothing"),
     (_fail, "panda: placement: 0 outside the bound -> 2 outside the bound"),

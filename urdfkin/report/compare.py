@@ -4,7 +4,7 @@ A change is a regression when something that held no longer does: the run passed
 or its verdict worse, more results lie outside their bound, a quantity, a table, samples or results are
 compared no more, a bound is wider for the same joints, or the worst disagreement or its share of the bound
 grew by more than a factor and past what rounding of a single operation gives. A robot that moves otherwise is
-a change.
+a change, and so is another name of its file: it is known again by what its text calls it.
 """
 
 from __future__ import annotations
@@ -110,8 +110,14 @@ def _mapping(prefix: str, old: Mapping[str, str], new: Mapping[str, str]) -> Ite
 
 def _robots(old: Document, new: Document, factor: float) -> Iterator[Change]:
     before, after = _by_source(old), _by_source(new)
+    moved = _moved(before, after)
     for source in dict.fromkeys([*before, *after]):
-        if source not in after:
+        if source in moved:
+            yield Change(source, "file", source, moved[source])
+            yield from _robot(source, before[source], after[moved[source]], factor)
+        elif source in moved.values():
+            continue
+        elif source not in after:
             yield Change(source, "robot", before[source]["verdict"], "", regression=True)
         elif source not in before:
             verdict = after[source]["verdict"]
@@ -129,6 +135,23 @@ def _by_source(document: Document) -> dict[str, Robot]:
             count += 1
             source = f"{robot['source']} ({count})"
         named[source] = robot
+    return named
+
+
+def _moved(before: Mapping[str, Robot], after: Mapping[str, Robot]) -> dict[str, str]:
+    """Where a robot's file has another name now: what is gone and what is new call their robot alike."""
+    gone, new = _by_name(before, after), _by_name(after, before)
+    return {
+        gone[name][0]: new[name][0] for name in gone if len(gone[name]) == 1 and len(new.get(name, [])) == 1
+    }
+
+
+def _by_name(robots: Mapping[str, Robot], besides: Mapping[str, Robot]) -> dict[str, list[str]]:
+    """The sources that the other report has not, by what the robot is called in its text."""
+    named: dict[str, list[str]] = {}
+    for source, robot in robots.items():
+        if source not in besides:
+            named.setdefault(robot["name"], []).append(source)
     return named
 
 
