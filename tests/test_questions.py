@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.pages import DOCS
-from urdfkin.cli.questions import answer_to, answers
+from urdfkin.cli.questions import answer_to, answers, as_text
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.questions import Question
 from urdfkin.urdf import xacro
@@ -132,6 +133,20 @@ def test_a_word_that_one_question_has_is_enough() -> None:
     assert answer_to("") is None
     assert run("explain", "mimic").text.startswith("Mimic joints\n")
     assert run("explain", "frames").code == 2
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # one answer is about what is warned of
+@pytest.mark.parametrize("topic", answers())
+def test_an_answer_on_a_terminal_is_filled_and_its_code_runs_after_what_it_says(topic: str) -> None:
+    shown = as_text(answers()[topic])
+    assert "`" * 3 not in shown
+    assert all(len(line) <= 88 for line in shown.splitlines() if not line.startswith("    "))
+    own = "".join(re.findall(r"```python\n(.*?)```", answers()[topic], re.DOTALL))
+    assert ("It runs after:" in shown) == bool(own)
+    if own:
+        names: dict[str, object] = {}
+        exec(textwrap.dedent(shown.partition("It runs after:")[2]), names)
+        exec(own, names)
 
 
 def test_every_link_to_a_question_leads_to_one() -> None:

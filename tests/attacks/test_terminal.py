@@ -277,7 +277,7 @@ def test_what_is_printed_goes_through_the_door() -> None:
         "door.py": ("click.echo(printable(line)",),
         "info.py": ("click.echo()",), "robots.py": ("click.echo()",),
         "explain.py": (
-            "click.echo(equation)", "click.echo(answer)", "click.echo(explain(", 'click.echo(f"{rule.id}',
+            "click.echo(equation)", "click.echo(as_text(", "click.echo(explain(", 'click.echo(f"{rule.id}',
             'click.echo(f"questions: ',
         ),
         "checked.py": ("click.echo(as_json(", "click.echo(as_sarif("),

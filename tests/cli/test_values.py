@@ -332,7 +332,7 @@ LONG = "a_joint_of_the_left_manipulator_whose_name_is_as_long_as_names_of_people
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("columns", ["80", ""])
-def test_names_are_never_folded_and_nothing_wraps_in_a_pipe(
+def test_names_are_never_folded_nothing_wraps_and_no_line_ends_in_blanks_in_a_pipe(
     words: str, columns: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", columns)
@@ -344,6 +344,7 @@ def test_names_are_never_folded_and_nothing_wraps_in_a_pipe(
     )
     done = urdfkin(*words.replace("ROBOT", str(path)).split())
     assert done.code == 0, done.err
+    assert not any(line.endswith(" ") for line in done.text.splitlines())
     named = [line for line in done.text.splitlines() if "a_joint_of" in line]
     assert named
     assert all(line.count("a_joint_of") == line.count("prefixes_are") for line in named)

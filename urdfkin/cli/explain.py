@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from urdfkin.cli.completing import complete_topic
-from urdfkin.cli.questions import answer_to, answers
+from urdfkin.cli.questions import answer_to, answers, as_text
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.lint.explain import explain
@@ -38,7 +38,7 @@ def command(topic: str | None) -> None:
     elif (asked := _rule(topic)) is not None:
         click.echo(explain(asked))
     elif (answer := answer_to(topic)) is not None:
-        click.echo(answer)
+        click.echo(as_text(answer))
     else:
         rules = (*RULES.values(), *OF_MJCF.values())
         known = [name for one in rules for name in (one.id, one.slug)]

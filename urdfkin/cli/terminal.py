@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, TextIO, cast
 
 from rich.console import Console
 
 from urdfkin.cli.door import Door
 from urdfkin.errors.printable import printable
+
+_TRAILING = re.compile(r" +$", re.MULTILINE)
 
 
 class Terminal(Console):
@@ -20,5 +23,12 @@ class Terminal(Console):
 
     def print(self, *objects: Any, **options: Any) -> None:
         """As rich does; tables bring their own cells. Text is never wrapped: what is copied stays whole."""
-        options = {"soft_wrap": all(isinstance(o, str) for o in objects)} | options
-        super().print(*(printable(o) if isinstance(o, str) else o for o in objects), **options)
+        texts = [printable(o) if isinstance(o, str) else o for o in objects]
+        lines_alone = all(isinstance(o, str) for o in objects)
+        if self.is_terminal or lines_alone:
+            super().print(*texts, **{"soft_wrap": lines_alone} | options)
+            return
+        # A table is padded to its width: blanks that a file and a pasted text are better without.
+        with self.capture() as held:
+            super().print(*texts, **options)
+        self.file.write(_TRAILING.sub("", held.get()))
