@@ -90,6 +90,24 @@ def test_other_settings_of_the_judge_never_meet_what_it_found_and_leave_the_chun
     assert first.moving_base
 
 
+def test_parts_judge_each_robot_once_and_merge_to_the_report_of_one_run(judge: Judge, tmp_path: Path) -> None:
+    one, whole, again = tmp_path / "one.json", str(tmp_path / "whole"), tmp_path / "again.json"
+    urdfkin(*WORDS, "--json", str(one))
+    expected, judge.asked = judged(one), []
+    shards = [(f"{i}/2", str(tmp_path / str(i))) for i in (1, 2)]
+    for shard, store in shards:
+        urdfkin(*WORDS, "--store", store, "--shard", shard)
+    assert judge.asked == ["planar_two_link", "double_pendulum"]
+    merged = urdfkin("campaign", "merge", whole, *(store for _, store in shards))
+    assert "judged: 2 of 2 robots" in merged.text
+    urdfkin("report", whole, "--json", str(again))
+    assert judged(again) == expected
+    urdfkin(*WORDS[:-1], "2", "--store", shards[1][1], "--shard", "2/2")
+    refused = urdfkin("campaign", "merge", whole, *(store for _, store in shards))
+    assert refused.code == 2
+    assert "--judge-samples 2 --seed 0, and --judge-samples 1 --seed 0 in" in refused.err
+
+
 def test_a_damaged_judgement_is_told_and_made_again(judge: Judge, tmp_path: Path) -> None:
     urdfkin(*WORDS, "--store", str(tmp_path))
     for i, place in enumerate(sorted(tmp_path.glob("chunks/*/*.judged"))):

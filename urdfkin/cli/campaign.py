@@ -104,11 +104,12 @@ def _seconds(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
 @click.argument("folder", metavar="DIR", type=_FOLDER)
 @click.argument("stores", metavar="STORE...", nargs=-1, required=True, type=_FOLDER)
 def merge(folder: Path, stores: tuple[Path, ...]) -> None:
-    """Copy into DIR what other stores of the same campaign have: shards from other machines.
+    """Copy into DIR what other stores of the same campaign have, the judge's too: shards from other machines.
 
     Each file is read and checked; what is damaged is said and left out. DIR is made if it is not there.
     """
-    from urdfkin.validation.store import Store, opened  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.judging import Judged  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.store import Store, opened  # noqa: PLC0415
 
     others = [Store.reading(store, _warn) for store in stores]
     with opened(folder, others[0].manifest, _warn) as whole:
@@ -116,9 +117,12 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
             whole.demand_same(other.manifest, other.folder)
         for other in others:
             say(f"{other.folder}: {whole.take(other):,} chunks taken")
+        if any(other.has_judge for other in others):
+            Judged.merge(whole, others)
         counts = whole.counts()
         size = len(whole.manifest.cut)
         missing = sum(size - done for done, failed in counts.values() if not failed)
+        _say_judged(whole, [robot for robot, (_, has_failed) in counts.items() if not has_failed])
     say(f"{folder}: complete" if not missing else f"{folder}: {missing:,} chunks are missing")
 
 

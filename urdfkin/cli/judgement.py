@@ -24,6 +24,7 @@ def judge_all(
     asked: Asked,
     *,
     store: Path | None = None,
+    shard: str | None = None,
     retry: bool = False,
     how: Mapping[str, Any],
 ) -> ValidationReport:
@@ -36,20 +37,25 @@ def judge_all(
         given: Robots, or what names them.
         asked: What the judge is asked for.
         store: The folder that keeps what `validate` found, and the judge.
+        shard: Only the robots whose first chunk is in that part, of which the report tells.
         retry: Whether what could not be judged before is tried again.
         how: `mimic`, `root_joint` and `xacro_args`, as in `load`.
     """
-    from urdfkin.validation.judging import NotJudged  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.campaign import shares  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.chunk import Cut  # noqa: PLC0415
+    from urdfkin.validation.judging import NotJudged  # noqa: PLC0415
 
+    parts = shares(len(given), Cut(report.samples), shard)
+    here = [i for i, part in enumerate(parts) if part]
     judgements: list[Judgement | None] = []
     try:
-        with _kept(store, asked) as kept:
-            for i, (robot, source) in enumerate(zip(report.robots, given, strict=True)):
-                if not robot.tallies:
+        with _kept(store, asked, shard) as kept:
+            for i, robot in zip(here, report.robots, strict=True):
+                if not robot.tallies or parts[i].start > 0:
                     continue
                 found = None if kept is None else kept.found(i)
                 if found is None or (retry and isinstance(found, NotJudged)):
-                    found, is_lasting = _judged(source, asked, None if kept is None else kept.stamp(i), how)
+                    found, is_lasting = _judged(given[i], asked, None if kept is None else kept.stamp(i), how)
                     if kept is not None and is_lasting:
                         kept.keep(i, found)
                 if isinstance(found, NotJudged):
@@ -61,8 +67,8 @@ def judge_all(
 
 
 @contextmanager
-def _kept(folder: Path | None, asked: Asked) -> Iterator[Judged | None]:
-    """The judgements in a store, for this process alone."""
+def _kept(folder: Path | None, asked: Asked, shard: str | None) -> Iterator[Judged | None]:
+    """The judgements in a store, of which the whole or a part is for this process alone."""
     if folder is None:
         yield None
         return
@@ -72,7 +78,7 @@ def _kept(folder: Path | None, asked: Asked) -> Iterator[Judged | None]:
     def tell(message: str) -> None:
         say(f"urdfkin: warning: {message}", err=True)
 
-    with opened(folder, Store.reading(folder, tell).manifest, tell) as store:
+    with opened(folder, Store.reading(folder, tell).manifest, tell, shard=shard) as store:
         judged = Judged(store, asked)
         judged.begin()
         yield judged

@@ -108,7 +108,7 @@ def command(
         raise click.UsageError(
             "--jobs and --isolate are for this machine's processes, --scheduler for others'"
         )
-    if shard and (judged or json_ or html or junit or markdown):
+    if shard and (json_ or html or junit or markdown):
         raise click.UsageError("a shard has no report: merge the stores, then `urdfkin report DIR`")
     from urdfkin.report.document import Document  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.terminal import print_report  # noqa: PLC0415
@@ -138,7 +138,9 @@ def command(
         )
         if judged and not report.interrupted:
             asked = Asked(judge_samples, seed, judge_moving_base)
-            report = judge_all(report, given, asked, store=store, retry=retry is not None, how=how)
+            report = judge_all(
+                report, given, asked, store=store, shard=shard, retry=retry is not None, how=how
+            )
     if shard:
         _say_shard(report, shard, store)
         context.exit(stop.exit_code(report.exit_code))

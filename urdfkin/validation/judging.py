@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from urdfkin.errors import InputError
 from urdfkin.validation.answer_file import DamagedError, packed, unpacked
 from urdfkin.validation.judgement import Errors, Judgement, Line
 from urdfkin.validation.manifest import LAYOUT
@@ -41,6 +43,12 @@ class Asked:
     seed: int
     moving_base: bool
 
+    @property
+    def words(self) -> str:
+        """As options."""
+        moving = " --judge-moving-base" if self.moving_base else ""
+        return f"--judge-samples {self.samples} --seed {self.seed}{moving}"
+
 
 class Judged:
     """The judgements in a store.
@@ -52,6 +60,22 @@ class Judged:
 
     def __init__(self, store: Store, asked: Asked) -> None:
         self._store, self._asked = store, asked
+
+    @classmethod
+    def merge(cls, store: Store, others: Sequence[Store]) -> None:
+        """Copy what other stores of the same campaign have and this one has not.
+
+        Raises:
+            InputError: they were asked for different things.
+        """
+        theirs = [judged for judged in map(cls.of, others) if judged is not None]
+        if theirs:
+            mine = cls.of(store) or cls(store, theirs[0]._asked)
+            for judged in theirs:
+                mine._demand_same(judged)
+            mine.begin()
+            for judged in theirs:
+                mine._take(judged)
 
     @classmethod
     def of(cls, store: Store) -> Judged | None:
@@ -88,6 +112,20 @@ class Judged:
     def stamp(self, robot: int) -> str:
         """The sha256 of the text that was compared."""
         return self._store.manifest.robots[robot][1]
+
+    def _take(self, other: Judged) -> None:
+        for robot in range(len(self._store.manifest.robots)):
+            if self.found(robot) is None and (found := other.found(robot)) is not None:
+                self.keep(robot, found)
+
+    def _demand_same(self, other: Judged) -> None:
+        if other._asked != self._asked:
+            raise InputError(
+                "judged with other options",
+                where=str(other._store.folder),
+                found=f"{other._asked.words}, and {self._asked.words} in {self._store.folder}",
+                remedy="judge all parts with the same",
+            )
 
     def _key(self, robot: int) -> str:
         manifest = self._store.manifest
