@@ -112,11 +112,12 @@ def tell(lines: Sequence[dict[str, Any]]) -> int:
         print("WRONG", line)
     ways = sorted({way for line in lines for way, share in line.items() if isinstance(share, float)})
     worst = ", ".join(f"{way} {max(line.get(way, 0.0) for line in lines):.2g}" for way in ways)
-    of = sum(1 for name in examples() for _ in urdfkin.load(name).tree.leaves())
-    robots = len({line["robot"] for line in lines})
+    found = {(line["robot"], line["frame"]) for line in lines}
+    trees = {name: urdfkin.load(name).tree for name in examples()}
+    leaves = {(name, tree.frame_name(leaf)) for name, tree in trees.items() for leaf in tree.leaves()}
     print(
-        f"{len(lines)} of {of} leaves, of {robots} robots; {len(wrong)} outside the bound or unverified;"
-        f" worst error as a share of the bound: {worst}"
+        f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots, {len(found - leaves)} other tips;"
+        f" {len(wrong)} outside the bound or unverified; worst error as a share of the bound: {worst}"
     )
     return bool(wrong)
 

@@ -104,7 +104,6 @@ def _function(code: Code, function: Function) -> str:
         given_rest=f"{_given(function, 'real')})",
         count=count,
         room=layout.room,
-        lane_room=layout.room + len(layout.made),
         inputs=", ".join(f"{x.op}[{x.of[0]}]" for x in layout.inputs) or "R(0.0)",
         unasked="\n".join(f"    (void){x};" for x in widths),
         lines="\n".join(f"    {line}" for line in _lines(writer, layout)),
@@ -137,20 +136,27 @@ def advance(code: Code, function: Function) -> str:
 
 
 class Layout:
-    """Where a function's inputs, sines and cosines stand in front of its line."""
+    """Where a function's inputs, angles, sines and cosines stand in front of its line.
+
+    The angles lie side by side: first those that are inputs, then those that are computed.
+    """
 
     def __init__(self, function: Function) -> None:
-        self.inputs = [node for node in function.nodes if node.op in function.inputs]
-        self.angles = function.angles
-        self.made = [node for node in self.angles if node not in self.inputs]
-        self.room = max(1, len(self.inputs) + 2 * len(self.angles))
+        given = [node for node in function.nodes if node.op in function.inputs]
+        turning = [node for node in given if node in function.angles]
+        self.inputs = [*(node for node in given if node not in turning), *turning]
+        self.made = [node for node in function.angles if node not in turning]
+        self.angles = [*turning, *self.made]
+        self.first = len(self.inputs) - len(turning)
+        self.room = max(1, self.first + 3 * len(self.angles))
 
     def place(self, node: Node) -> int:
-        """Of an input, a sine or a cosine."""
-        if node.op not in ("sin", "cos"):
-            return self.inputs.index(node)
-        at = len(self.inputs) + self.angles.index(node.of[0])
-        return at + len(self.angles) * (node.op == "cos")
+        """Of an input, an angle, a sine or a cosine."""
+        if node.op in ("sin", "cos"):
+            return self.place(node.of[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
+        if node in self.angles:
+            return self.first + self.angles.index(node)
+        return self.inputs.index(node)
 
 
 def _lines(writer: Writer, layout: Layout) -> Iterator[str]:
@@ -163,11 +169,18 @@ def _lines(writer: Writer, layout: Layout) -> Iterator[str]:
 
 
 def _sines(writer: Writer, layout: Layout) -> Iterator[str]:
-    at, count = len(layout.inputs), len(layout.angles)
-    for k, node in enumerate(layout.angles):
-        angle = writer.whole(node, lambda x: f"in[{layout.place(x)}]")
-        yield f"in[{at + k}] = sin({angle});"
-        yield f"in[{at + count + k}] = cos({angle});"
+    count = len(layout.angles)
+    yield from (f"{angle};" for angle in _made(writer, layout, "in[{}]"))
+    for k in range(layout.first, layout.first + count):
+        yield f"in[{k + count}] = sin(in[{k}]);"
+        yield f"in[{k + 2 * count}] = cos(in[{k}]);"
+
+
+def _made(writer: Writer, layout: Layout, at: str) -> Iterator[str]:
+    """The angles that are no inputs themselves."""
+    for node in layout.made:
+        value = writer.whole(node, lambda x: at.format(layout.place(x)))
+        yield f"{at.format(layout.place(node))} = {value}"
 
 
 def _reads(layout: Layout, widths: dict[str, int]) -> Iterator[str]:
@@ -185,21 +198,11 @@ def _reads(layout: Layout, widths: dict[str, int]) -> Iterator[str]:
 
 
 def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
-    at, count = len(layout.inputs), len(layout.angles)
-    if not count:
-        return
-    for k, node in enumerate(layout.made):
-        value = writer.whole(node, lambda x: f"in[{layout.place(x)} * LANES + k]")
-        yield f"for (int k = 0; k < LANES; ++k) in[{layout.room + k} * LANES + k] = {value};"
-    calls = []
-    for k, node in enumerate(layout.angles):
-        angle = layout.place(node) if node in layout.inputs else layout.room + layout.made.index(node)
-        calls.append(", ".join(f"in + {place} * LANES" for place in (angle, at + k, at + count + k)))
-    yield "real squares[LANES] = {R(0.0)};"
-    yield from (f"sine_cosine({call}, squares);" for call in calls)
-    yield "if (any_far(squares)) {"
-    yield from (f"    library_sines({call});" for call in calls)
-    yield "}"
+    if count := len(layout.angles):
+        for made in _made(writer, layout, "in[{} * LANES + k]"):
+            yield f"for (int k = 0; k < LANES; ++k) {made};"
+        places = (f"in + {layout.first + k * count} * LANES" for k in range(3))
+        yield f"sines_cosines({', '.join(places)}, {count});"
 
 
 # -- its test vectors --------------------------------------------------------------------------------------

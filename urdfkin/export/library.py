@@ -62,7 +62,7 @@ def _entrance(code: Code) -> str:
     lines = {
         "inputs": "    const double *{x} = (const double *)(uintptr_t)places[{place}];",
         "look": "        look({width}, {x}, bad);",
-        "look_left": "    for (size_t i = 0; i < n * {width}; ++i) bad[0] += 0.0 * {x}[i];",
+        "look_left": "    for (size_t i = 0; i < n * {width}; ++i) bad[0][0] += 0.0 * {x}[i];",
     }
     parts = {
         part: "\n".join(
@@ -78,7 +78,7 @@ def _entrance(code: Code) -> str:
         name=function.name,
         passed=", ".join(widths),
         given=", ".join(f"const double *{x}" for x in widths),
-        room=layout.room + len(layout.made),
+        room=layout.room,
         spread="\n".join([*(f"    (void){x};" for x in widths), *spread]),
         count=len(function.results),
         STAGE=int(Task.STAGE),

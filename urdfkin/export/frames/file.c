@@ -14,9 +14,11 @@
 #endif
 #ifdef __GNUC__
 #define INLINE static inline __attribute__((always_inline, unused))
+#define SELDOM static __attribute__((noinline, cold, unused))
 #define ALIGNED __attribute__((aligned(64)))
 #else
 #define INLINE static inline
+#define SELDOM static
 #define ALIGNED
 #endif
 

@@ -27,7 +27,7 @@ static void all_lanes_@name@(real *restrict in, real *restrict results)
 
 static void lanes_@name@@given@
 {
-    ALIGNED real in[@lane_room@ * LANES];
+    ALIGNED real in[@room@ * LANES];
     ALIGNED real results[@count@ * LANES];
 @reads@
     all_lanes_@name@(in, results);
