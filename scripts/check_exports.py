@@ -116,8 +116,8 @@ def tell(lines: Sequence[dict[str, Any]]) -> int:
     trees = {name: urdfkin.load(name).tree for name in examples()}
     leaves = {(name, tree.frame_name(leaf)) for name, tree in trees.items() for leaf in tree.leaves()}
     print(
-        f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots, {len(found - leaves)} other tips;"
-        f" {len(wrong)} outside the bound or unverified; worst error as a share of the bound: {worst}"
+        f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots, {len(found - leaves)} other tips"
+        f"; {len(wrong)} outside the bound or unverified; worst error as a share of the bound: {worst}"
     )
     return bool(wrong)
 

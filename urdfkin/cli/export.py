@@ -32,7 +32,8 @@ EXAMPLE = "urdfkin export panda --frame panda_hand --to c -o panda_hand.c"
     "quantities",
     multiple=True,
     metavar="NAMES",
-    help=f"placement, velocity, jacobian, jacobian_rate, acceleration. Default: {','.join(QUANTITIES)}.",
+    help="placement, velocity, jacobian, jacobian_rate, hessian, acceleration."
+    f" Default: {','.join(QUANTITIES)}.",
 )
 @reference_option
 @click.option("--to", type=click.Choice(tuple(LANGUAGES)), default="c", show_default=True, help="Language.")
