@@ -10,6 +10,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +50,20 @@ def compiling_allowed() -> Iterator[None]:
         yield
     finally:
         _config.DISABLE_JIT = before
+
+
+def _believe_in_blas() -> None:
+    """Keep Numba from importing SciPy's linear algebra to see that it is there: a fifth of a command's time.
+
+    No kernel calls it. Compiled code that does imports it then, and has it checked as ever.
+    """
+    if "numba.np.arraymath" not in sys.modules and find_spec("scipy") is not None:
+        linalg: Any = import_module("numba.np.linalg")
+        before, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+        try:
+            import_module("numba.np.arraymath")
+        finally:
+            linalg.ensure_blas = before
 
 
 def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -106,6 +122,7 @@ class Kernel:
     def _make(self, made: Any, make: Callable[[], object]) -> None:
         """Compile, or read from disk; whoever listens is told which takes so long."""
         with told(self.__name__.strip("_").replace("_", " ")) as missed, compiling_allowed():
+            _believe_in_blas()
             if (folder := cache_folder()) is None:
                 missed()
             else:
