@@ -158,11 +158,6 @@ def test_an_oracle_that_nobody_knows_is_an_error() -> None:
 
 
 def test_a_witness_that_is_not_installed_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(name: str) -> str:
-        raise witnesses_metadata.PackageNotFoundError(name)
-
-    from importlib import metadata as witnesses_metadata  # noqa: PLC0415
-
-    monkeypatch.setattr(witnesses_metadata, "version", missing)
+    monkeypatch.setattr("urdfkin.urdf.mujoco.installed_version", lambda _: None)
     with pytest.raises(urdfkin.InputError, match=r"MuJoCo is not installed; pip install 'urdfkin\[mujoco\]'"):
         urdfkin.load(arm(), oracle="mujoco")

@@ -110,7 +110,8 @@ class LazyGroup(click.Group):
 def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
     if not wanted:
         return
-    from urdfkin.verify.pinocchio_module import own_version, pinocchio, version  # noqa: PLC0415
+    from urdfkin.system.versions import own_version  # noqa: PLC0415
+    from urdfkin.verify.pinocchio_module import pinocchio, version  # noqa: PLC0415
 
     click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
     pinocchio()  # says why there is none, and what cures it

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import importlib.metadata
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -18,6 +17,7 @@ from urdfkin.lint.formats import as_github, as_json, statistics, summary
 from urdfkin.lint.pages import RULES, page
 from urdfkin.lint.runner import Examined
 from urdfkin.lint.sarif import as_sarif
+from urdfkin.system.versions import installed_version
 
 STYLES = ("terminal", "concise", "json", "sarif", "github")
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}
@@ -58,7 +58,7 @@ class Outcome:
 
 def print_outcome(outcome: Outcome, style: str, *, statistics: bool) -> None:
     """All that was found, in one form."""
-    findings, version = outcome.findings, _version()
+    findings, version = outcome.findings, installed_version("urdfkin") or "0+unknown"
     if style == "json":
         click.echo(as_json(findings, outcome.files, version, outcome.silenced))
     elif style == "sarif":
@@ -70,13 +70,6 @@ def print_outcome(outcome: Outcome, style: str, *, statistics: bool) -> None:
         _print_statistics(outcome)
     elif outcome.files or outcome.unchanged:
         _print_terminal(outcome, excerpts=style == "terminal")
-
-
-def _version() -> str:
-    try:
-        return importlib.metadata.version("urdfkin")
-    except importlib.metadata.PackageNotFoundError:  # run from a checkout that is not installed
-        return "0+unknown"
 
 
 def _print_terminal(outcome: Outcome, *, excerpts: bool) -> None:

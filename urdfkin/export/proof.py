@@ -13,7 +13,6 @@ import hashlib
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
-from importlib import metadata
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from urdfkin.export.naming import quiet
 from urdfkin.kinematics.roundings import SMALLEST
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
+from urdfkin.system.versions import own_version
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.exact.decimals import read_exact
@@ -111,17 +111,10 @@ def prove(
         checker.check(function.quantity, call, found, bool(checker.wanted(verify)))
     return Proof(
         sha256=hashlib.sha256(verifier.text.encode()).hexdigest(),
-        urdfkin=_version(),
+        urdfkin=own_version(),
         certificate=checker.certificate(),
         vectors=_vectors(verifier, plan_of, frame, reference, functions),
     )
-
-
-def _version() -> str:
-    try:
-        return metadata.version("urdfkin")
-    except metadata.PackageNotFoundError:
-        return "of a checkout"
 
 
 def _vectors(

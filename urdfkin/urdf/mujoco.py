@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from importlib import metadata
 from typing import Any
 
 from urdfkin.errors import InputError
+from urdfkin.system.versions import installed_version
 
 
 def library() -> Any:
@@ -23,7 +23,6 @@ def library() -> Any:
 
 def version() -> str:
     """The version that is installed, found without importing it."""
-    try:
-        return metadata.version("mujoco")
-    except metadata.PackageNotFoundError:
-        raise InputError("MuJoCo is not installed", remedy="pip install 'urdfkin[mujoco]'") from None
+    if (found := installed_version("mujoco")) is None:
+        raise InputError("MuJoCo is not installed", remedy="pip install 'urdfkin[mujoco]'")
+    return found

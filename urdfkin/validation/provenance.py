@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 from functools import cache
-from importlib import metadata
 from pathlib import Path
+
+from urdfkin.system.versions import installed_version
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 #: What only shows results, and may change between two runs of a campaign.
@@ -23,10 +24,7 @@ def provenance() -> dict[str, str]:
 
 def version(package: str) -> str:
     """The version of an installed package; in words where there is none."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "a checkout" if package == "urdfkin" else "not installed"
+    return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
 
 
 def _code() -> str:

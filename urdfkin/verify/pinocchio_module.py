@@ -55,14 +55,6 @@ def version() -> str:
         return "not installed"
 
 
-def own_version() -> str:
-    """Urdfkin's own version."""
-    try:
-        return importlib.metadata.version("urdfkin")
-    except importlib.metadata.PackageNotFoundError:
-        return "of a checkout"
-
-
 def _impostor(found: Any) -> InstallationError:
     """What is installed under Pinocchio's name, and how to be rid of it."""
     file = found.__file__ or next(iter(found.__path__), "a folder without modules")

@@ -20,6 +20,7 @@ from urdfkin.errors import RangeError
 from urdfkin.kinematics.roundings import EPS, of_joints
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.system.versions import own_version
 from urdfkin.urdf.origin import Origin
 from urdfkin.verify import bounds
 from urdfkin.verify.asked import Rows
@@ -29,7 +30,7 @@ from urdfkin.verify.certificate import Certificate, Comparison, Ledger, Verifica
 from urdfkin.verify.choosing import SAMPLE, Verify, checked_choice, parts
 from urdfkin.verify.magnitudes import magnitudes
 from urdfkin.verify.pinocchio import Oracle, OracleError, build_model
-from urdfkin.verify.pinocchio_module import own_version, pinocchio, version
+from urdfkin.verify.pinocchio_module import pinocchio, version
 from urdfkin.verify.quantities import Quantity
 from urdfkin.verify.replay import replay_line
 from urdfkin.verify.sampling import draw
