@@ -8,7 +8,7 @@ from urdfkin.errors.printable import markdown_text as text
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.words import counted
 from urdfkin.sameness.changes import Change, Changes, word
-from urdfkin.sameness.result import length
+from urdfkin.sameness.result import up_to
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,7 +21,7 @@ def headline(found: Changes) -> str:
     head = counted(len(found.changes), "change")
     if found.total is None:
         return f"{head}, nothing moves otherwise" if not any(c.moves for c in found.changes) else head
-    far = f"{length(found.total.lower)} (at most {length(found.total.upper)})"
+    far = up_to(found.total.lower, found.total.upper)
     return f"{head}; together they move {found.total.frame} by up to {far}"
 
 
@@ -47,15 +47,16 @@ def markdown_of(found: Changes, limit: int = LIMIT) -> str:
     """For a pull request's comment."""
     lines = [f"## {text(headline(found))}", "", f"{text(found.sources[0])} → {text(found.sources[1])}", ""]
     if found:
-        lines += ["| element | what | old | new | moves, at most |", "| --- | --- | --- | --- | --- |"]
+        lines += ["| element | what | old | new | alone |", "| --- | --- | --- | --- | --- |"]
     left = limit - sum(map(len, lines)) - 200
     for k, change in enumerate(found.changes):
         effect = found.effect_of.get(change.element)
-        said = f"{effect.interval.frame}: {length(effect.interval.upper)}" if effect and change.moves else ""
+        said = effect.words if effect and change.moves else ""
         old, new = (
             shortened("" if value is None else word(value), 120) for value in (change.old, change.new)
         )
-        row = f"| {' | '.join(map(text, (change.element, change.what or 'all', old, new, said)))} |"
+        cells = (change.element, change.what, old, new) if change.what else (str(change), "", "", "")
+        row = f"| {' | '.join(map(text, (*cells, said)))} |"
         left -= len(row) + 1
         if left < 0:
             lines += ["", f"{counted(len(found.changes) - k, 'change')} more did not fit."]

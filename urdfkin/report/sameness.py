@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from urdfkin.errors.printable import markdown_text
 from urdfkin.report.terminal import plain_table
 from urdfkin.report.words import counted
-from urdfkin.sameness.result import Interval, Sameness, Verdict, angle, length
+from urdfkin.sameness.result import Interval, Sameness, Verdict, angle, length, up_to
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -22,7 +22,9 @@ def headline(found: Sameness) -> str:
     """The verdict in a line."""
     if found.verdict is Verdict.DIFFERS:
         worst = found.worst
-        by = f" by up to {length(worst.lower)}, at most {length(worst.upper)}" if worst else ""
+        by = f" by up to {up_to(worst.lower, worst.upper)}" if worst else ""
+        if found.frames and not far_frames(found):
+            by = ", though no frame of both is off by more than rounding"
         return f"DIFFERS{by}; first here: {found.differences[0].words}"
     how = "SAME" if found.verdict is Verdict.SAME else "SAME after what is said below"
     metres, radians = found.rounding
@@ -48,11 +50,11 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """How far they are off as they stand; empty where nothing has to be done."""
+    """How far they are off as they stand; empty where that is no more than rounding."""
     frame = found.as_written
-    if frame is None:
+    if frame is None or (frame.upper <= found.rounding[0] and frame.radians <= found.rounding[1]):
         return ""
-    off = f"{length(frame.lower)} off, and at most {length(frame.upper)}"
+    off = "turned" if frame.upper <= found.rounding[0] else f"{up_to(frame.lower, frame.upper)} off"
     return f"as they are written, {frame.frame} comes {off}"
 
 

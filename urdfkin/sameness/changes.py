@@ -13,7 +13,7 @@ from urdfkin.loading import load
 from urdfkin.model.tree import Joint, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.sameness.judging import same
-from urdfkin.sameness.result import Interval, angle, length
+from urdfkin.sameness.result import Interval, angle, up_to
 from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source
 from urdfkin.urdf.writer import to_urdf
@@ -71,12 +71,17 @@ class Effect:
     element: str
     interval: Interval
 
-    def __str__(self) -> str:
+    @property
+    def words(self) -> str:
+        """What they do."""
         frame = self.interval
         if frame.lower == 0.0:
             turned = f"{angle(frame.radians_seen)} (at most {angle(frame.radians)})"
-            return f"alone turns {frame.frame} by up to {turned}"
-        return f"alone moves {frame.frame} by up to {length(frame.lower)} (at most {length(frame.upper)})"
+            return f"turns {frame.frame} by up to {turned}"
+        return f"moves {frame.frame} by up to {up_to(frame.lower, frame.upper)}"
+
+    def __str__(self) -> str:
+        return f"alone {self.words}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -206,6 +206,18 @@ def length(metres: float) -> str:
     return _with_prefix(metres, "m")
 
 
+def up_to(lower: float, upper: float) -> str:
+    """An interval of lengths: what is attained, and what is proven where that reads otherwise.
+
+    >>> up_to(0.025, 0.025), up_to(0.4297, 0.4327), up_to(1.0, math.inf)
+    ('25 mm', '429.7 mm (at most 432.7 mm)', '1 m (without bound)')
+    """
+    attained, most = length(lower), length(upper)
+    if attained == most:
+        return attained
+    return f"{attained} ({most})" if math.isinf(upper) else f"{attained} (at most {most})"
+
+
 def angle(radians: float) -> str:
     """Likewise.
 

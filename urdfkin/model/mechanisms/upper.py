@@ -6,8 +6,9 @@ Behind joint i, seen from A's home, let y be where B's frame is and d how far B'
 
 All but the last are nothing where nothing differs. For each direction u the largest u . d' is at most the sum
 of the largest of each term, which support functions of y and d give (`urdfkin.model.mechanisms.support`).
-Where a single thing differs there is one term, and nothing is given away; where several do, each may have its
-own worst configuration, and the bound is larger than the truth by what they do not share.
+Where a single thing differs there is one term, and nothing is given away but what the grid costs; where
+several do, each may have its own worst configuration, and the bound is larger than the truth by what they do
+not share. Where nothing is but moved, the lengths of the ways add up to a bound that costs nothing.
 """
 
 from __future__ import annotations
@@ -87,9 +88,18 @@ def _metres(
     steps: Sequence[Step], pairs: Sequence[Pair | None], variables: Variables, frame: FramePair, grid: Grid
 ) -> float:
     d, y = at_the_frame(frame, grid)
+    ways = _off(frame.end, y.largest())
     for step, pair in zip(reversed(steps), reversed(pairs), strict=True):
         d, y = passed(step, pair, variables, d, y)
-    return d.largest()
+        moves_alike = step.other is step.axis and pair is not None and pair.a == pair.b
+        ways += _off(step.before, y.largest()) if moves_alike else math.inf
+    return min(d.largest(), ways)
+
+
+def _off(L: FloatArray, reach: float) -> float:
+    """How far (m) L moves any point within reach at most: |(R - 1) y + p|, y before L or behind it."""
+    turned, moved = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
+    return moved + turned * reach if turned else moved
 
 
 def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
