@@ -16,6 +16,8 @@ import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.sameness import pairs
 from tests.sameness.pairs import changed, robot
+from urdfkin.model.mechanisms.conversion import Conversion
+from urdfkin.model.tree import JointKind
 from urdfkin.report.certificates import read_certificate
 from urdfkin.robot import Robot
 from urdfkin.sameness.certificate import certificate, recheck
@@ -122,6 +124,10 @@ def test_joints_can_be_paired_by_hand() -> None:
     assert urdfkin.same(a, b, map={"panda_joint1": name}, bounds=False)
     with pytest.raises(urdfkin.UnknownNameError, match="unknown joint 'panda_jointl'; did you mean"):
         urdfkin.same(a, b, map={"panda_jointl": name})
+    with pytest.raises(urdfkin.InputError, match=r"cannot be each other's.*'panda_joint1' of A"):
+        urdfkin.same(a, a, map={"panda_joint1": "panda_joint2"})
+    with pytest.raises(urdfkin.InputError, match="joints of A and their names in B"):
+        urdfkin.same(a, a, map=["panda_joint1"])  # type: ignore[arg-type]
     with pytest.raises(urdfkin.InputError, match="given twice"):
         urdfkin.same(a, b, map={"panda_joint1": name, "panda_joint2": name})
 
@@ -169,6 +175,16 @@ FORGED: dict[str, Any] = {
     "not named as a difference": lambda d: d.update(differences=[]),
     "no difference": lambda d: d["differences"].append({**d["differences"][0], "words": "joint x"}),
     "has no interval": lambda d: d["frames"].pop(),
+    "a frame has two intervals": lambda d: d["frames"].append(d["frames"][-1]),
+    "rad there, not": lambda d: d["frames"][-1].update(radians_seen=0.1),
+    "remarks: the models say otherwise": lambda d: d["remarks"].append(d["differences"][0]),
+    "after: the models say otherwise": lambda d: d["after"].append("q[joint_1] = -q[joint_1]"),
+    "links: the models say otherwise": lambda d: d["links"].pop(),
+    "joints: the models say otherwise": lambda d: d["joints"].pop(),
+    "rounding: the models say otherwise": lambda d: d["rounding"].update(metres=1.0),
+    "base_links: the models say otherwise": lambda d: d.update(base_links=["tool"] * 2),
+    "base: no rigid motion": lambda d: d["base"][2].__setitem__(2, -1.0),
+    "orders: axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),
 }
 
 
@@ -179,6 +195,36 @@ def test_a_forged_certificate_does_not(compared: tuple[Robot, Robot, dict[str, A
     forged = copy.deepcopy(document)
     FORGED[said](forged)
     assert any(said in line for line in recheck(forged, a, b))
+
+
+def test_a_certificate_that_names_what_is_not_there_is_refused(
+    compared: tuple[Robot, Robot, dict[str, Any]],
+) -> None:
+    a, b, document = compared
+    forged = copy.deepcopy(document)
+    forged["joints"][0]["b"] = "elsewhere"
+    with pytest.raises(urdfkin.InputError, match=r"names what a model does not have: .*'elsewhere'"):
+        recheck(forged, a, b)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("end", ["upper", "lower"])
+def test_what_is_said_of_the_models_as_written_is_proven_again_too(end: str) -> None:
+    a, b = robot("elbow"), other("elbow", "axes flipped")
+    document = json.loads(json.dumps(certificate(urdfkin.same(a, b))))
+    assert recheck(document, a, b) == []
+    document["as_written"][end] *= 0.9 if end == "upper" else 1.1
+    assert any(line.startswith("as written: frame ") for line in recheck(document, a, b))
+
+
+@pytest.mark.parametrize("kind", ["planar", "floating"])
+def test_a_free_joint_goes_only_where_a_rigid_motion_takes_it(kind: str) -> None:
+    kinds = JointKind(kind)
+    lift, lower, mirror = np.eye(4), np.eye(4), np.diag([1.0, 1.0, -1.0, 1.0])
+    lift[2, 3], lower[2, 3] = 0.1, -0.1
+    assert Conversion(lift, lower).holds_for(kinds)
+    assert Conversion(lift, np.eye(4)).holds_for(kinds) is (kind == "floating")
+    assert not Conversion(mirror, mirror).holds_for(kinds)
 
 
 def test_a_certificate_of_other_texts_is_refused(compared: tuple[Robot, Robot, dict[str, Any]]) -> None:
@@ -211,10 +257,27 @@ def test_the_commands_exit_says_whether(tmp_path: Path) -> None:
     assert (tmp_path / "html").read_text().count('<svg viewBox="-150') == 3
     assert "| tool |" in (tmp_path / "markdown").read_text()
     again = run("same", str(base), tilted, "--recheck", str(tmp_path / "certificate"))
-    assert (again.code, again.text) == (1, "the certificate holds: differs\n")
+    assert again.code == 1
+    assert again.text.startswith("the certificate holds: differs; first here: joint joint_4")
     refused = run("same", str(base), flipped, "--recheck", str(tmp_path / "certificate"))
     assert refused.code == 2
     assert "another text" in refused.err
+
+
+def test_arguments_of_a_xacro_file_go_to_the_one_that_is_one(tmp_path: Path) -> None:
+    text = robot("elbow").urdf
+    (tmp_path / "elbow.urdf").write_text(text)
+    named = (
+        text.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1)
+        .replace('name="tool"', 'name="$(arg tool)"')
+        .replace('link="tool"', 'link="$(arg tool)"')
+    )
+    at = named.index(">", named.index("<robot")) + 1
+    (tmp_path / "elbow.xacro").write_text(f'{named[:at]}<xacro:arg name="tool" default="hand"/>{named[at:]}')
+    both = [str(tmp_path / name) for name in ("elbow.xacro", "elbow.urdf")]
+    assert "link hand is tool" in run("same", *both).text
+    assert "link hand is tool" not in run("same", *both, "--xacro-arg", "tool:=tool").text
+    assert run("same", *both[1:], *both[1:], "--xacro-arg", "tool:=tool").code == 2
 
 
 @pytest.mark.parametrize(
@@ -225,6 +288,7 @@ def test_the_commands_exit_says_whether(tmp_path: Path) -> None:
         (["panda", "pandaa"], "did you mean"),
         (["panda", "panda", "--map", "x"], "a pair of joints is JOINT_OF_A=JOINT_OF_B"),
         (["panda", "panda", "--map", "x=y"], "unknown joint 'x'"),
+        (["-", "-"], "standard input can be one of the two"),
         (["panda", "panda", "--recheck", "/dev/null"], "not a JSON file"),
     ],
 )

@@ -182,6 +182,21 @@ def load_robot(source: str, *, verify: bool = True, oracle: WitnessName = "pinoc
     return robot
 
 
+def load_two(a: str, b: str) -> tuple[Robot, Robot]:
+    """Two robots of a command; arguments of a .xacro file go to those that are one, if either is.
+
+    Raises:
+        UsageError: both are to come from standard input.
+    """
+    from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415  keeps --help fast
+
+    if a == b == "-":
+        raise click.UsageError("standard input can be one of the two models")
+    none: dict[str, Any] = {"xacro_args": None} if is_xacro(a) or is_xacro(b) else {}
+    one, other = (load_robot(source, **({} if is_xacro(source) else none)) for source in (a, b))
+    return one, other
+
+
 def read_inputs(
     robot: Robot,
     frame: str | None,

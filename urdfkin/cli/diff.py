@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from urdfkin.cli.arguments import load_robot, xacro_option
+from urdfkin.cli.arguments import load_two, xacro_option
 from urdfkin.cli.completing import complete_robot
 from urdfkin.cli.door import say_file
 from urdfkin.cli.output import compiling, console, write_file
@@ -43,7 +43,7 @@ def command(
     from urdfkin.sameness.changes import diff  # noqa: PLC0415
 
     check_writable(markdown)
-    old, new = load_robot(a), load_robot(b)
+    old, new = load_two(a, b)
     with compiling():
         found = diff(old, new, effects=effects)
     if markdown is not None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from urdfkin.cli.arguments import load_robot, xacro_option
+from urdfkin.cli.arguments import load_two, xacro_option
 from urdfkin.cli.completing import complete_robot
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.numbers import NumberFrom, Whole
@@ -90,7 +90,7 @@ def command(
     if a is None or b is None:
         raise click.UsageError("name two models: urdfkin same A B")
     check_writable(certificate, markdown, html)
-    robots = load_robot(a), load_robot(b)
+    robots = load_two(a, b)
     with compiling():
         if recheck is not None:
             from urdfkin.sameness.certificate import recheck as held  # noqa: PLC0415
@@ -99,11 +99,9 @@ def command(
             against = held(document, *robots)
             for line in against:
                 say(line, err=True)
-            say(
-                "the certificate does not hold"
-                if against
-                else f"the certificate holds: {document['verdict']}"
-            )
+            first = [f"; first here: {one['words']}" for one in document["differences"][:1]]
+            holds = f"the certificate holds: {document['verdict']}{''.join(first)}"
+            say("the certificate does not hold" if against else holds)
             context.exit(1 if against or document["verdict"] == "differs" else 0)
         from urdfkin.sameness.boxes import MOST  # noqa: PLC0415
         from urdfkin.sameness.judging import parse_map, same  # noqa: PLC0415

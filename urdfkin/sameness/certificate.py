@@ -10,21 +10,24 @@ import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.mechanisms.alignment import FramePair, Gauge, align
-from urdfkin.model.mechanisms.conversion import Conversion
+from urdfkin.model.mechanisms.alignment import Alignment, FramePair, Gauge, align
+from urdfkin.model.mechanisms.conversion import Conversion, is_pose
+from urdfkin.model.mechanisms.rigid import apart
 from urdfkin.model.mechanisms.upper import COARSE, FINE, upper_bounds
 from urdfkin.model.mechanisms.variables import variables_of
+from urdfkin.model.tree import JointKind
 from urdfkin.robot import Robot
 from urdfkin.sameness.boxes import tightened
 from urdfkin.sameness.judging import Judge, digest
 from urdfkin.sameness.lower import Search, pinocchios, urdfkins
-from urdfkin.sameness.result import Difference, Interval, JointMap, Sameness, Verdict
-from urdfkin.sameness.wording import differences, put_right
+from urdfkin.sameness.result import Difference, Interval, JointMap, Sameness
 
 #: How many boxes there may be at a time to prove a bound that is claimed.
 MOST_AGAIN = 2**22
 #: The layout of the document, and its version.
 LAYOUT = "urdfkin-same-1"
+#: Parts that follow from how the models are laid on each other.
+DERIVED = ("after", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
 def certificate(found: Sameness) -> dict[str, Any]:
@@ -80,8 +83,10 @@ def _interval(frame: Interval) -> dict[str, Any]:
 def recheck(document: Mapping[str, Any], a: Robot, b: Robot) -> list[str]:
     """What of a certificate does not hold for two models; nothing where all of it does.
 
-    The models are laid on each other as the certificate says, so that nothing is searched: what then differs
-    must be what it names; each lower bound is computed at its configuration, each upper bound proven again.
+    The models are laid on each other as the certificate says, so that nothing is searched. That has to be
+    something that two models of one robot may differ in: rigid motions, joints that there are, orders that
+    axes allow. What follows must be what it says, to the last remark; each lower bound is computed at its
+    configuration, by urdfkin and Pinocchio, each upper bound is proven again.
 
     Args:
         document: What `certificate` made, checked against its schema.
@@ -106,55 +111,121 @@ def recheck(document: Mapping[str, Any], a: Robot, b: Robot) -> list[str]:
 
 
 def _against(document: Mapping[str, Any], judge: Judge) -> Iterator[str]:
-    zeros = {one["a"]: (one["sense"], one["offset"]) for one in document["joints"]}
-    given = {one["a"]: one["b"] for one in document["joints"]}
-    base = document["base_links"]
-    conversions = {
-        one["a"]: Conversion(np.array(made["before"]), np.array(made["behind"]), made["back"])
-        for one in document["joints"]
-        if (made := one["conversion"]) is not None
-    }
-    orders = tuple(tuple(names) for names in document["orders"])
-    gauge = Gauge((base[0], base[1]), np.array(document["base"]), zeros, conversions, orders)
-    found = align(*judge.mechanisms, given, gauge)
+    gauge = _gauge(document)
+    if (why := _not_a_gauge(document, gauge, judge)) is not None:
+        yield why
+        return
+    found = align(*judge.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, gauge)
     variables = variables_of(found, judge.tolerance)
-    after = put_right(found, judge.tolerance)
-    wrong = [one.words for one in differences(found, variables)]
+    said = judge.said(found, variables)
+    wrong = [one.words for one in said.differences]
     claimed = [one["words"] for one in document["differences"]]
     yield from (f"not named as a difference: {words}" for words in wrong if words not in claimed)
     yield from (f"no difference: {words}" for words in claimed if words not in wrong)
-    verdict = Verdict.DIFFERS if wrong else Verdict.SAME_AFTER if after else Verdict.SAME
-    if document["verdict"] != verdict.value:
-        yield f"the verdict is {verdict.value}, not {document['verdict']}"
-    rounding = judge.rounding(found, variables)
-    claims = {frame["a"]: frame for frame in document["frames"]}
+    if document["verdict"] != said.verdict.value:
+        yield f"the verdict is {said.verdict.value}, not {document['verdict']}"
+    again = certificate(said)
+    yield from (
+        f"{part}: the models say otherwise" for part in DERIVED if not _alike(document[part], again[part])
+    )
+    claims = {(frame["a"], frame["b"]): frame for frame in document["frames"]}
+    if len(claims) < len(document["frames"]):
+        yield "a frame has two intervals"
     search = judge.search(found, variables)
-    for frame in found.frames:
-        name = found.a.tree.links[frame.a]
-        if (claim := claims.pop(name, None)) is None:
-            yield f"frame {name} has no interval"
-            continue
-        metres = (math.inf if claim["upper"] is None else claim["upper"]) - rounding[0]
-        radians = (math.inf if claim["radians"] is None else claim["radians"]) - rounding[1]
-        for grid in (COARSE, FINE):
-            proven = upper_bounds(found, variables, frame, grid)
-            if holds := _within(proven[0], metres, rounding[0]) and _within(proven[1], radians, rounding[1]):
-                break
-        # A claim below what is attained is not searched for: no search could prove it.
-        possible = metres >= claim["lower"] - rounding[0]
-        if not holds and possible and _within(proven[1], radians, rounding[1]):
-            proven = tightened(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
-            holds = _within(proven[0], metres, rounding[0])
-        if not holds:
-            are = f"{proven[0]:.6g} m and {proven[1]:.6g} rad are"
-            yield f"frame {name}: its upper bound is not proven, {are}"
-        if claim["lower"] > 0.0:
-            yield from _not_attained(search, frame, claim, rounding[0])
-    yield from (f"frame {name} is not one of both models" for name in claims)
+    for frame, names in zip(found.frames, said.links, strict=True):
+        if (claim := claims.pop(names, None)) is None:
+            yield f"frame {names[0]} has no interval"
+        else:
+            yield from _interval_against(search, frame, claim, said.rounding)
+    yield from (f"frame {names[0]} is not one of both models" for names in claims)
+    if document["as_written"] is not None:
+        yield from _as_written_against(document["as_written"], judge, found)
+
+
+def _gauge(document: Mapping[str, Any]) -> Gauge:
+    """What is free, as the document has it."""
+    joints, base = document["joints"], document["base_links"]
+    return Gauge(
+        (base[0], base[1]),
+        np.array(document["base"]),
+        {one["a"]: (one["sense"], one["offset"]) for one in joints},
+        {
+            one["a"]: Conversion(np.array(made["before"]), np.array(made["behind"]), made["back"])
+            for one in joints
+            if (made := one["conversion"]) is not None
+        },
+        tuple(tuple(names) for names in document["orders"]),
+    )
+
+
+def _not_a_gauge(document: Mapping[str, Any], gauge: Gauge, judge: Judge) -> str | None:
+    """Why what is said to be free is nothing that a model may differ in; None where it is."""
+    a, b = judge.mechanisms
+    for joint in document["joints"]:
+        a.tree.joint_index(joint["a"])
+        b.tree.joint_index(joint["b"])
+    if not is_pose(JointKind.FLOATING, gauge.X):
+        return "base: no rigid motion"
+    for name, made in gauge.conversions.items():
+        if not made.holds_for(a.tree.joints[a.tree.joint_index(name)].kind):
+            return f"joint {name}: B's joint cannot be where its conversion says"
+    for names in gauge.orders:
+        if not b.may_be_taken(names, judge.tolerance):
+            return f"orders: axes do not allow {', '.join(names)}"
+        b = b.in_order(names)
+    return None
+
+
+def _alike(claimed: Any, said: Any) -> bool:
+    """Whether two parts of a document are the same, numbers but for the last digits."""
+    if isinstance(said, dict):
+        return claimed.keys() == said.keys() and all(_alike(claimed[key], said[key]) for key in said)
+    if isinstance(said, list):
+        return len(claimed) == len(said) and all(map(_alike, claimed, said))
+    if isinstance(said, float) and isinstance(claimed, float | int):
+        return math.isclose(claimed, said, rel_tol=1e-9, abs_tol=1e-15)
+    return bool(claimed == said)
+
+
+def _as_written_against(claim: Mapping[str, Any], judge: Judge, found: Alignment) -> Iterator[str]:
+    """What does not hold of how far a frame is off with nothing put right."""
+    written = judge.as_written(found)
+    variables = variables_of(written, judge.tolerance)
+    names = [(judge.trees[0].links[frame.a], judge.trees[1].links[frame.b]) for frame in written.frames]
+    if (claim["a"], claim["b"]) not in names:
+        yield f"as written: frame {claim['a']} is not one of both models"
+        return
+    frame = written.frames[names.index((claim["a"], claim["b"]))]
+    against = _interval_against(
+        judge.search(written, variables), frame, claim, judge.rounding(written, variables)
+    )
+    yield from (f"as written: {line}" for line in against)
+
+
+def _interval_against(
+    search: Search, frame: FramePair, claim: Mapping[str, Any], rounding: tuple[float, float]
+) -> Iterator[str]:
+    """What does not hold of an interval: its upper bounds are proven again, its lower one is computed."""
+    metres = (math.inf if claim["upper"] is None else claim["upper"]) - rounding[0]
+    radians = (math.inf if claim["radians"] is None else claim["radians"]) - rounding[1]
+    for grid in (COARSE, FINE):
+        proven = upper_bounds(search.found, search.variables, frame, grid)
+        if holds := _within(proven[0], metres, rounding[0]) and _within(proven[1], radians, rounding[1]):
+            break
+    # A claim below what is attained is not searched for: no search could prove it.
+    possible = metres >= claim["lower"] - rounding[0]
+    if not holds and possible and _within(proven[1], radians, rounding[1]):
+        proven = tightened(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
+        holds = _within(proven[0], metres, rounding[0])
+    if not holds:
+        are = f"{proven[0]:.6g} m and {proven[1]:.6g} rad are"
+        yield f"frame {claim['a']}: its upper bound is not proven, {are}"
+    if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
+        yield from _not_attained(search, frame, claim, rounding)
 
 
 def _not_attained(
-    search: Search, frame: FramePair, claim: Mapping[str, Any], rounding: float
+    search: Search, frame: FramePair, claim: Mapping[str, Any], rounding: tuple[float, float]
 ) -> Iterator[str]:
     """Why a lower bound is none: its configurations, or what either library finds there."""
     place = f"frame {claim['a']}"
@@ -163,9 +234,11 @@ def _not_attained(
         yield f"{place}: its configurations do not belong together, or leave the limits"
         return
     for computed, by in ((urdfkins, "urdfkin"), (pinocchios, "Pinocchio")):
-        off = float(search.at(q_a, q_b, [frame], computed)[0, 0])
-        if off < claim["lower"] - rounding:
+        turned, off = apart(*(Ts[0, 0] for Ts in search.poses_at(q_a, q_b, [frame], computed)))
+        if off < claim["lower"] - rounding[0]:
             yield f"{place}: {by} finds {off:.6g} m at its configuration, not {claim['lower']:.6g} m"
+        if turned < claim["radians_seen"] - rounding[1]:
+            yield f"{place}: {by} finds {turned:.6g} rad there, not {claim['radians_seen']:.6g} rad"
 
 
 def _within(proven: float, claimed: float, rounding: float) -> bool:

@@ -79,12 +79,23 @@ def same(
         False
     """
     robots = _robot(a), _robot(b)
-    given = dict(map or {})
+    given = _demand_map(map)
     whole_number(boxes, "boxes", 0)
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
     # Copies, whose accounts are their own: what is computed here nobody was handed.
     return Judge((copy(robots[0]), copy(robots[1])), given, bounds, boxes).judged()
+
+
+def _demand_map(given: Mapping[str, str] | None) -> dict[str, str]:
+    """Names and names, or InputError."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping) or any(
+        not isinstance(name, str) for pair in given.items() for name in pair
+    ):
+        raise InputError("joints of A and their names in B", where="map", found=repr(given))
+    return dict(given)
 
 
 def _robot(source: Robot | Source | DHTable) -> Robot:
@@ -106,39 +117,65 @@ class Judge:
 
     def judged(self) -> Sameness:
         """The verdict."""
-        a, b = self.trees
         found = align(*self.mechanisms, self.given)
+        self._demand_the_map(found)
         variables = variables_of(found, self.tolerance)
-        after = put_right(found, self.tolerance)
-        wrong = differences(found, variables)
-        verdict = Verdict.DIFFERS if wrong else Verdict.SAME_AFTER if after else Verdict.SAME
+        said = self.said(found, variables)
         frames = self._intervals(found, variables)
         as_written = None
-        if after and self.bounds:
-            written = align(*self.mechanisms, self._map(found), replace(AS_WRITTEN, orders=found.b.orders))
+        if said.after and self.bounds:
+            written = self.as_written(found)
             as_written = self._farthest(written, variables_of(written, self.tolerance))
+        checked = self._confirmed(found, variables, frames)
+        return replace(said, frames=frames, as_written=as_written, checked=checked)
+
+    def said(self, found: Alignment, variables: Variables) -> Sameness:
+        """What follows from how the models are laid on each other; intervals and Pinocchio do not.
+
+        Frames that are tools, set elsewhere, are put right in `found`.
+        """
+        names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
+        links = self.trees[0].links, self.trees[1].links
+        after = put_right(found, self.tolerance)
+        wrong = differences(found, variables)
         return Sameness(
             names=(self.robots[0].name, self.robots[1].name),
             sources=(self.robots[0].source, self.robots[1].source),
             digests=(digest(self.robots[0]), digest(self.robots[1])),
-            verdict=verdict,
+            verdict=Verdict.DIFFERS if wrong else Verdict.SAME_AFTER if after else Verdict.SAME,
             after=after,
             differences=wrong,
             remarks=remarks(found, variables, self.tolerance),
             joints=tuple(
-                JointMap(a.joints[s.a].name, b.joints[s.b].name, s.sense, s.offset, s.conversion)
-                for s in found.steps
+                JointMap(names[0][s.a], names[1][s.b], s.sense, s.offset, s.conversion) for s in found.steps
             ),
-            links=tuple((self.trees[0].links[f.a], self.trees[1].links[f.b]) for f in found.frames),
+            links=tuple((links[0][f.a], links[1][f.b]) for f in found.frames),
             orders=found.b.orders,
             base=found.X,
-            base_links=(self.trees[0].links[found.base[0]], self.trees[1].links[found.base[1]]),
+            base_links=(links[0][found.base[0]], links[1][found.base[1]]),
             rounding=self.rounding(found, variables),
-            frames=frames,
-            as_written=as_written,
-            checked=self._confirmed(found, variables, frames),
+            frames=(),
+            as_written=None,
+            checked="",
             trees=self.trees,
         )
+
+    def as_written(self, found: Alignment) -> Alignment:
+        """The same joints and links laid on each other with nothing put right."""
+        written = replace(AS_WRITTEN, orders=found.b.orders)
+        return align(*self.mechanisms, self._map(found), written)
+
+    def _demand_the_map(self, found: Alignment) -> None:
+        """Raise InputError for a pair that was given and cannot be."""
+        made = self._map(found)
+        for ours, theirs in self.given.items():
+            if made.get(ours) != theirs:
+                raise InputError(
+                    "these joints cannot be each other's: the links that carry them are not",
+                    where="map",
+                    found=f"{ours!r} of A, {theirs!r} of B",
+                    remedy="pair the joints before them, too, or leave these out",
+                )
 
     def search(self, found: Alignment, variables: Variables) -> Search:
         """What looks for the largest distances."""

@@ -112,11 +112,12 @@ class Search:
             frames: Links of both.
             computed: Who computes them, for either robot.
         """
-        return self._poses(*self.configurations(z), frames, computed)
+        return self.poses_at(*self.configurations(z), frames, computed)
 
-    def _poses(
+    def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> tuple[FloatArray, FloatArray]:
+        """`poses` at configurations of each robot, (n, nq)."""
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.found.base[1]]
@@ -128,7 +129,7 @@ class Search:
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> FloatArray:
         """(n, frames) how far (m) frames are off at configurations of each robot, (n, nq)."""
-        return _distances(*self._poses(q_a, q_b, frames, computed))
+        return _distances(*self.poses_at(q_a, q_b, frames, computed))
 
     def random(self, n: int) -> FloatArray:
         """(n, variables) values within their ranges."""

@@ -19,6 +19,8 @@ from urdfkin.kinematics.rotation.axis_angle import rotation_about
 from urdfkin.kinematics.rotation.quaternion import quaternion_of, rotation_of
 from urdfkin.model.tree import FloatArray, JointKind
 
+#: What the entries of a pose that was computed may be off by, as a share of their size.
+NEARLY = 1e-9
 _Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -41,6 +43,13 @@ class Conversion:
         P = pose_of(kind, own)
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
+    def holds_for(self, kind: JointKind) -> bool:
+        """Whether M and N are rigid, and M P N one of the joint's poses at home and turned and moved away."""
+        if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
+            return False
+        away = pose_of(JointKind.PLANAR, np.array([1.0, 2.0, 3.0]))
+        return all(is_pose(kind, self.before @ P @ self.behind) for P in (np.eye(4), away))
+
 
 def pose_of(kind: JointKind, own: FloatArray) -> FloatArray:
     """(..., 4, 4) P at a joint's coordinates: (x, y, angle), or (x, y, z, qx, qy, qz, qw)."""
@@ -58,6 +67,15 @@ def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
     if kind is JointKind.PLANAR:
         return np.concatenate((P[..., :2, 3], turn_in_plane(P)[..., np.newaxis]), axis=-1)
     return np.concatenate((P[..., :3, 3], quaternion_of(P[..., :3, :3])), axis=-1)
+
+
+def is_pose(kind: JointKind, T: FloatArray) -> bool:
+    """Whether a matrix is one that a planar or floating joint reaches; a floating one reaches every pose."""
+    R = T[:3, :3]
+    near = NEARLY * (1.0 + np.abs(T).max())
+    if np.abs(R @ R.T - np.eye(3)).max() > near or np.linalg.det(R) < 0.0 or T[3].tolist() != [0, 0, 0, 1]:
+        return False
+    return kind is JointKind.FLOATING or bool(np.abs(onto_plane(T) - T).max() <= near)
 
 
 def turn_in_plane(P: FloatArray) -> FloatArray:

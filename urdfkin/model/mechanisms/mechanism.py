@@ -13,6 +13,7 @@ from collections.abc import Collection, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -114,6 +115,22 @@ class Mechanism:
                 other.bodies[edge.outer] = []
         other.orders = (*self.orders, tuple(names))
         return other
+
+    def may_be_taken(self, names: Sequence[str], tolerance: Tolerance) -> bool:
+        """Whether joints are such a run, and axes allow that order: any two that change places commute."""
+        joints = [self.tree.joint_index(name) for name in names]
+        run = [edge for edge in self.edges if edge.joint in joints]
+        one_line = all(
+            inner.outer == outer.inner and len(self.edges_of[outer.inner]) == 2
+            for inner, outer in pairwise(run)
+        )
+        changed = (
+            (one, other)
+            for k, one in enumerate(run)
+            for other in run[k + 1 :]
+            if joints.index(one.joint) > joints.index(other.joint)
+        )
+        return len(run) == len(names) and one_line and all(self._commute(*two, tolerance) for two in changed)
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
         """For each run of joints, nothing else on the bodies between, its orders that move alike."""
