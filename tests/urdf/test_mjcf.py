@@ -170,8 +170,8 @@ def test_a_file_with_everything_is_verified_and_says_what_it_does_not_hold(tmp_p
     assert {"world", "base", "imu", "tool"} <= set(robot.link_names)
     said = {f.message for f in robot.findings if f.code == "MJCF101"}
     assert {
-        "equality curve: a constraint that is no line between two joints",
-        "equality glue: a constraint (weld) that a tree cannot hold",
+        "equality curve: a constraint (g and f) that is no line between two joints",
+        "equality glue: a constraint (weld of tip and base) that a tree cannot hold",
         "tendons: tendons move nothing here",
     } <= said
     noted = " ".join(f.message for f in robot.findings if f.code == "MJCF102")

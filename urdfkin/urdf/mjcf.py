@@ -153,7 +153,7 @@ def read_mjcf(source: str | bytes | os.PathLike[str]) -> Mjcf:
             where=name_of(source),
             found=found,
         ) from None
-    reader = _Reader(mujoco, model, spec.modelname or "robot")
+    reader = _Reader(mujoco, model, spec.modelname or "robot", name_of(source))
     tree = reader.tree()
     text = isinstance(source, bytes) or _is_text(source)
     return Mjcf(tree, model, reader.frames, reader.coordinates, (*reader.listed, *left), text)
@@ -172,10 +172,11 @@ def _stripped(mujoco: Any, spec: Any) -> Iterator[Listed]:
     """Take out what kinematics does not need, so that no mesh has to be there; say what it was."""
     spec.compiler.fusestatic = False
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
-    for one in list(spec.equalities):
+    for i, one in enumerate(list(spec.equalities)):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
-            kind = str(one.type).rpartition("_")[2].lower()
-            yield Listed(f"a constraint ({kind}) that a tree cannot hold", f"equality {one.name}", moves=True)
+            kind, names = str(one.type).rpartition("_")[2].lower(), _joined(one.name1, one.name2)
+            what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot hold"
+            yield Listed(what, f"equality {one.name or i}", moves=bool(one.active))
             spec.delete(one)
     gone = []
     for words in (
@@ -199,13 +200,18 @@ def _stripped(mujoco: Any, spec: Any) -> Iterator[Listed]:
         body.inertia, body.iquat, body.fullinertia = (1.0,) * 3, (1.0, 0.0, 0.0, 0.0), (np.nan,) * 6
 
 
+def _joined(*names: str) -> str:
+    return " and ".join(name for name in names if name)
+
+
 @dataclass(slots=True)
 class _Reader:
-    """Reads one compiled model."""
+    """Reads one compiled model; `source` is what it is called in messages."""
 
     mujoco: Any
     model: Any
     name: str
+    source: str
     frames: dict[str, tuple[str, int]] = field(default_factory=dict)
     coordinates: dict[str, int] = field(default_factory=dict)
     listed: list[Listed] = field(default_factory=list)
@@ -271,7 +277,7 @@ class _Reader:
         if kind == kinds.mjJNT_BALL:
             raise InputError(
                 "a ball joint cannot be held: urdfkin has no joint for it yet",
-                where=f"joint {name}",
+                where=f"{self.source}: joint {name}",
                 remedy="three hinges in one body turn likewise, but where the middle one is at a right angle",
             )
         at = int(m.jnt_qposadr[j])
@@ -313,9 +319,9 @@ class _Reader:
             if not m.eq_active0[i]:
                 self.listed.append(Listed("a constraint that is not active", where))
             elif rule is None:
-                self.listed.append(
-                    Listed("a constraint that is no line between two joints", where, moves=True)
-                )
+                names = _joined(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
+                said = f"a constraint ({names}) that is no line between two joints"
+                self.listed.append(Listed(said, where, moves=True))
             elif rule[0] in rules or _leads(rules, rule[1].leader, rule[0]):
                 self.listed.append(
                     Listed(f"joint {rule[0]} is held twice, or in a circle", where, moves=True)
