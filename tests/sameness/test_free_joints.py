@@ -159,3 +159,21 @@ def test_the_schema_knows_conversions_and_orders() -> None:
         urdfkin.same(gantry("xyz"), gantry("zyx"), bounds=False),
     ):
         schema.validate(json.loads(json.dumps(certificate(found))))
+
+
+@pytest.mark.parametrize("floating_first", [True, False])
+def test_what_carries_the_root_of_one_model_alone_is_all_that_differs(floating_first: bool) -> None:
+    text = CHAIN.format("fixed", "0").replace(
+        '<axis xyz="0 0 1"/></joint><joint name="hip"', '</joint><joint name="hip"'
+    )
+    fixed, longer = (loaded(each, verify=True) for each in (text, text.replace("0 0 -0.4", "0 0 -0.425")))
+    floating = urdfkin.load(text, root_joint="floating")
+    both = (floating, fixed) if floating_first else (fixed, floating)
+    found = urdfkin.same(*both)
+    assert [one.words for one in found.differences] == [f"joint root_joint is only in {'BA'[floating_first]}"]
+    assert found.worst is None
+    found = urdfkin.same(*(floating, longer) if floating_first else (longer, floating))
+    assert found.worst is not None
+    assert found.worst.lower == pytest.approx(0.025, rel=1e-9)
+    assert found.worst.upper == pytest.approx(0.025, rel=1e-9)
+    assert recheck(certificate(found), *((floating, longer) if floating_first else (longer, floating))) == []

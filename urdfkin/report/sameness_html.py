@@ -53,8 +53,9 @@ def pictures(found: Sameness, robots: tuple[Robot, Robot], worst: Interval | Non
     q_b = np.array(worst.q_b) if worst else found.to_b(a.neutral())
     T_a = a.placement(q_a, a.link_frames, verify=False)
     T_b = b.placement(q_b, b.link_frames, verify=False)
-    base = b.tree.link_index(found.base_links[1])
-    T_b = found.base @ Mechanism(b.tree).homes[base] @ inverse(T_b[base]) @ T_b
+    i, j = a.tree.link_index(found.base_links[0]), b.tree.link_index(found.base_links[1])
+    moved = T_a[i] @ inverse(Mechanism(a.tree).homes[i])
+    T_b = moved @ found.base @ Mechanism(b.tree).homes[j] @ inverse(T_b[j]) @ T_b
     bones = _bones(a, T_a), _bones(b, T_b)
     drawn = [_drawn(title, turn, tip, bones) for title, turn, tip in VIEWS]
     if worst is not None:

@@ -106,8 +106,7 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
         for line in (pair.a, pair.b)
         if line.slope and math.inf in np.abs(variables.ranges[line.variable])
     )
-    stands = search.found.b.body_of[search.found.base[1]] == 0
-    if not target < upper < math.inf or len(some) < len(pairs) or not (stands and all_round):
+    if not target < upper < math.inf or len(some) < len(pairs) or not (all(search.stands) and all_round):
         return upper
     names, M = curvature(steps, some, variables, frame)
     boxes = Boxes(search, frame, names)

@@ -49,8 +49,12 @@ class Search:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: (4, 4) where B's base link stands, seen from A's root.
+        #: (4, 4) where B's base link stands, seen from A's root; it moves with A's base link.
         self.hold = found.X @ found.b.homes[found.base[1]]
+        #: Whether either base link is on the robot's root body.
+        self.stands = tuple(
+            m.body_of[link] == 0 for m, link in zip((found.a, found.b), found.base, strict=True)
+        )
 
     def _ends(self, name: str) -> tuple[float, float]:
         low, high = self.variables.ranges[name]
@@ -123,7 +127,12 @@ class Search:
         base = b.tree.link_frames[self.found.base[1]]
         Ts_b = computed(b, q_b, [base, *(b.tree.link_frames[frame.b] for frame in frames)])
         tools = np.array([inverse(frame.tool) for frame in frames]).reshape(-1, 4, 4)
-        return Ts_a, self.hold @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
+        hold = self.hold
+        if not self.stands[0]:
+            link = self.found.base[0]
+            moved = computed(a, q_a, [a.tree.link_frames[link]])
+            hold = moved @ inverse(self.found.a.homes[link]) @ hold
+        return Ts_a, hold @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
 
     def at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements

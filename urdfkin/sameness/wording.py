@@ -20,11 +20,10 @@ def put_right(found: Alignment, rounding: Tolerance) -> tuple[str, ...]:
     """What makes B as A is, a line each; frames that are tools, set elsewhere, are put right in `found`."""
     lines = list[str]()
     tree_a, tree_b = found.a.tree, found.b.tree
-    seen_from = found.b.body_of[found.base[1]]
-    if seen_from:
-        lines.append(
-            f"B's root is {tree_b.links[0]}: seen from {tree_a.links[found.base[0]]}, joints between run back"
-        )
+    for which, mechanism, link in (("A", found.a, found.base[0]), ("B", found.b, found.base[1])):
+        if mechanism.body_of[link]:
+            root, base = mechanism.tree.links[0], mechanism.tree.links[link]
+            lines.append(f"{which}'s root is {root}: seen from {base}, joints between run back")
     if found.X is not IDENTITY:
         lines.append(f"B's root stands in A's root frame at {pose_words(found.X, rounding)}")
     for step in found.steps:

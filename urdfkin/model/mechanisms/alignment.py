@@ -236,7 +236,7 @@ def _laid(
         found = walk.run(base, X)
         if best is None or _better((found.matched, found.worst), (best.matched, best.worst)):
             best = found
-        if not best.worst:
+        if not best.worst and not (best.only_a and best.only_b):
             break
     assert best is not None
     return best
@@ -277,13 +277,19 @@ class _Walk:
         return a.body_of[a.tree.link_index(link_a)], b.body_of[b.tree.link_index(link_b)]
 
     def _bases(self) -> Iterator[tuple[int, int]]:
-        """A's root body with the body of B that has most of its links, or with any of B's."""
-        ours = {self.a.tree.links[link] for link in self.a.bodies[0]}
-        shared = [len(ours & {self.b.tree.links[k] for k in body}) for body in self.b.bodies]
-        if any(shared):
-            yield 0, max(range(len(shared)), key=shared.__getitem__)
+        """A's root body with the body of B that has most of its links, or with any of B's.
+
+        Where those share no name, B's root body too, with the one of A: what carries A's root, a floating
+        joint say, may be A's alone.
+        """
+        theirs = _most_shared(self.a, self.b)
+        if theirs is not None:
+            yield 0, theirs
             return
         yield from ((0, body) for body, links in enumerate(self.b.bodies) if links)
+        ours = _most_shared(self.b, self.a)
+        if ours is not None:
+            yield ours, 0
 
     def _by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         """Where B's first axes come to lie on A's, as well as they do."""
@@ -541,6 +547,13 @@ class _Walk:
                 yield float(u.direction @ (at[:3, 3] - seen[:3, 3]))
         for ours, theirs in behind((self.a, self.b), there.came, there.bodies, (u.moved(inverse(G)), t)):
             yield from zeros(u, ours.moved(G), theirs.moved(there.XC), turns)
+
+
+def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
+    """The body of another mechanism that has most links of one's root body by name; None where none has."""
+    names = {one.tree.links[link] for link in one.bodies[0]}
+    shared = [len(names & {other.tree.links[k] for k in body}) for body in other.bodies]
+    return max(range(len(shared)), key=shared.__getitem__) if any(shared) else None
 
 
 def _best_of(scored: Sequence[tuple[_Free, _Place, Score]]) -> tuple[_Free, _Place, Score]:
