@@ -132,7 +132,9 @@ def _load_table(
         for doubt in doubts(table):
             warnings.warn(f"{name}: {doubt}", UrdfWarning, stacklevel=3)
     text = Text(urdf.encode(), name, name)
-    robot = robot_of(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, made=True)
+    robot = robot_of(
+        text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, made=True, table=True
+    )
     if checked_choice(verify):
         plain = mimic is not False and root_joint is None
         verifier = (robot if plain else robot_of(text)).verifier
@@ -210,6 +212,7 @@ def robot_of(
     oracle: WitnessName = "pinocchio",
     listed: tuple[Finding, ...] = (),
     made: bool = False,
+    table: bool = False,
 ) -> Robot:
     """As `load`, of a text that was read already.
 
@@ -221,10 +224,11 @@ def robot_of(
         oracle: See there.
         listed: What was said of the text that this one was made of.
         made: Whether it was made of something else, so that nobody has it as a file.
+        table: Whether that is a table.
     """
     witness_of(oracle)
     other = None if oracle == "pinocchio" else oracle
-    origin = Origin(text.source, mimic, root_joint, text.xacro_args, other)
+    origin = Origin(text.source, mimic, root_joint, text.xacro_args, other, table)
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data)

@@ -136,7 +136,8 @@ class Judge:
         """
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
-        after = put_right(found, self.tolerance)
+        tables = any(robot.origin.table for robot in self.robots)
+        after = put_right(found, self.tolerance, tables=tables)
         wrong = differences(found, variables)
         return Sameness(
             names=(self.robots[0].name, self.robots[1].name),

@@ -16,8 +16,14 @@ from urdfkin.model.tree import FloatArray, Joint, KinematicTree
 from urdfkin.sameness.result import Difference, angle, length
 
 
-def put_right(found: Alignment, rounding: Tolerance) -> tuple[str, ...]:
-    """What makes B as A is, a line each; frames that are tools, set elsewhere, are put right in `found`."""
+def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[str, ...]:
+    """What makes B as A is, a line each; frames that are tools, set elsewhere, are put right in `found`.
+
+    Args:
+        found: How they lie on each other.
+        rounding: What counts as none.
+        tables: Whether either is a table, whose frames are its convention's and no more than looked at.
+    """
     lines = list[str]()
     tree_a, tree_b = found.a.tree, found.b.tree
     for which, mechanism, link in (("A", found.a, found.base[0]), ("B", found.b, found.base[1])):
@@ -41,7 +47,7 @@ def put_right(found: Alignment, rounding: Tolerance) -> tuple[str, ...]:
             constant = f" {'-' if offset < 0 else '+'} {size}" if offset else ""
             lines.append(f"q[{tree_b.joints[step.b].name}] = {sign}q[{tree_a.joints[step.a].name}]{constant}")
     for k, frame in enumerate(found.frames):
-        if frame.differs and _is_tool(found, frame):
+        if frame.differs and (tables or _is_tool(found, frame)):
             found.frames[k] = frame.put_right()
         if found.frames[k].tool is IDENTITY:
             continue

@@ -19,6 +19,8 @@ class Origin:
         root_joint: As it was given.
         xacro_args: Names and values.
         oracle: Who checks besides Pinocchio or in its place, if anybody.
+        table: Whether it is a table, whose frames between base and tip are its convention's, not links that
+            somebody placed.
 
     Raises:
         InputError: `mimic` is neither True, False nor None, or `root_joint` is no name.
@@ -29,6 +31,7 @@ class Origin:
     root_joint: str | None = None
     xacro_args: tuple[tuple[str, str], ...] = ()
     oracle: Literal["pinocchio", "mujoco"] | None = None
+    table: bool = False
 
     def __post_init__(self) -> None:
         if self.mimic is not None:
