@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -55,9 +55,12 @@ def compiling_allowed() -> Iterator[None]:
 def _believe_in_blas() -> None:
     """Keep Numba from importing SciPy's linear algebra to see that it is there: a fifth of a command's time.
 
-    No kernel calls it. Compiled code that does imports it then, and has it checked as ever.
+    No kernel calls it. Compiled code that does imports it then, and has it checked as ever. A Numba that keeps
+    it elsewhere imports it, and all is as it would be without this.
     """
-    if "numba.np.arraymath" not in sys.modules and find_spec("scipy") is not None:
+    if "numba.np.arraymath" in sys.modules or find_spec("scipy") is None:
+        return
+    with suppress(ImportError, AttributeError):
         linalg: Any = import_module("numba.np.linalg")
         before, linalg.ensure_blas = linalg.ensure_blas, lambda: None
         try:
