@@ -2,8 +2,10 @@
 
 import subprocess
 
+import numpy as np
 import pytest
 
+import urdfkin
 from urdfkin.system.interpreter import own_python
 
 _TRIED = """
@@ -17,5 +19,6 @@ print(before, product, "scipy.linalg" in sys.modules)
 
 @pytest.mark.slow
 def test_scipy_is_imported_for_compiled_code_that_calls_blas_and_for_none_of_ours() -> None:
+    urdfkin.load("one_link", verify=False).placement(np.zeros(1))  # kept from here on: compiling imports more
     done = subprocess.run(own_python(_TRIED), check=True, capture_output=True, text=True)
     assert done.stdout == "False 11.0 True\n"

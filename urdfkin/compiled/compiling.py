@@ -55,8 +55,8 @@ def compiling_allowed() -> Iterator[None]:
 def _believe_in_blas() -> None:
     """Keep Numba from importing SciPy's linear algebra to see that it is there: a fifth of a command's time.
 
-    No kernel calls it. Compiled code that does imports it then, and has it checked as ever. A Numba that keeps
-    it elsewhere imports it, and all is as it would be without this.
+    No kernel calls it. Compiled code that does imports it then, and has it checked as ever. A Numba that
+    keeps it elsewhere imports it, and all is as it would be without this.
     """
     if "numba.np.arraymath" in sys.modules or find_spec("scipy") is None:
         return
