@@ -115,9 +115,10 @@ def tell(lines: Sequence[dict[str, Any]]) -> int:
     found = {(line["robot"], line["frame"]) for line in lines}
     trees = {name: urdfkin.load(name).tree for name in examples()}
     leaves = {(name, tree.frame_name(leaf)) for name, tree in trees.items() for leaf in tree.leaves()}
+    tips = len(found - leaves)
     print(
-        f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots, {len(found - leaves)} other tips"
-        f"; {len(wrong)} outside the bound or unverified; worst error as a share of the bound: {worst}"
+        f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots, {tips} tips that are none;"
+        f" {len(wrong)} outside the bound or unverified; worst error as a share of the bound: {worst}"
     )
     return bool(wrong)
 

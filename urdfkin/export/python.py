@@ -17,7 +17,7 @@ class Dialect:
 
     Attributes:
         about: What a function of the file takes and gives.
-        imports: Lines, `sin`, `cos` and `sqrt` among what they bring.
+        imports: Lines, one with a place for those of `cos`, `sin` and `sqrt` that are used.
         decorator: Before each function, if anything.
         entering: Lines at a function's beginning, from its inputs.
         index: Of a number of an input.
@@ -44,7 +44,7 @@ def _in_array(create: str, index: str) -> Callable[[list[str], tuple[int, ...]],
     """Written one by one into an array."""
 
     def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
-        yield f"out = {create.format(', '.join(map(str, shape)))}"
+        yield f"out = {create.format(shape, ', '.join(map(str, shape)))}"
         for place, value in zip(np.ndindex(shape), values, strict=True):
             yield f"out[{index}{', '.join(map(str, place))}] = {value}"
         yield "return out"
@@ -82,22 +82,22 @@ _ONE_BY_ONE = "return [{} for one in zip(*inputs)]"
 DIALECTS = {
     "numpy": Dialect(
         about="Arrays q (..., {nq}), v and a (..., {nv}), which broadcast; results have the same.",
-        imports="import numpy as np\nfrom numpy import cos, sin, sqrt",
+        imports="import numpy as np\nfrom numpy import {}",
         entering=_shapes,
         index="{}[..., {}]",
-        result=_in_array("np.empty((*shape, {}))", "..., "),
+        result=_in_array("np.empty((*shape, {1}))", "..., "),
         values="return np.reshape(function(*map(np.array, inputs)), (len(inputs[0]), -1)).tolist()",
     ),
     "numba": Dialect(
         about="One configuration, float64 arrays q ({nq},), v and a ({nv},); compiled when first called.",
-        imports="from math import cos, sin, sqrt\n\nimport numpy as np\nfrom numba import njit",
+        imports="from math import {}\n\nimport numpy as np\nfrom numba import njit",
         decorator='@njit(error_model="numpy")',
-        result=_in_array("np.empty(({},))", ""),
+        result=_in_array("np.empty({0})", ""),
         values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
         about="One configuration, arrays q ({nq},), v and a ({nv},), of any precision; for jit, vmap, grad.",
-        imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import cos, sin, sqrt",
+        imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
         entering=lambda inputs: [f"{x} = jnp.asarray({x})" for x in inputs],
         result=_nested("jnp.array([", "], dtype=q.dtype)", deeper=".reshape({})"),
         values="found = jax.vmap(jax.jit(function))(*map(jnp.array, inputs))\n"
@@ -106,7 +106,7 @@ DIALECTS = {
     ),
     "casadi": Dialect(
         about="Columns SX, MX or DM: q ({nq}), v and a ({nv}); a Hessian is ({nv} times 6, {nv}).",
-        imports="import casadi\nfrom casadi import cos, sin, sqrt",
+        imports="import casadi\nfrom casadi import {}",
         result=_nested("casadi.vertcat(", ")", "casadi.horzcat({})"),
         values=_ONE_BY_ONE.format(
             "[float(x) for row in casadi.DM(function(*map(casadi.DM, one))).full().tolist() for x in row]"
@@ -115,8 +115,8 @@ DIALECTS = {
     "sympy": Dialect(
         about="Lists of symbols or numbers: q ({nq}), v and a ({nv}); a result is a Matrix, a Hessian"
         " ({nv} times 6, {nv}).",
-        imports="from sympy import Matrix, cos, sin, sqrt",
-        result=_nested("Matrix([", "])"),
+        imports="import sympy\nfrom sympy import {}",
+        result=_nested("sympy.Matrix([", "])"),
         values=_ONE_BY_ONE.format("[float(x) for x in function(*one)]"),
     ),
 }
@@ -135,10 +135,17 @@ def write(code: Code, to: str) -> str:
         '"""',
         "",
     ]
-    lines += [dialect.imports, ""]
+    lines += [_imports(code, dialect), ""]
     for function in code.functions:
         lines += ["", *_function(code, function, dialect), ""]
     return "\n".join([*lines, *_check(code, dialect), ""])
+
+
+def _imports(code: Code, dialect: Dialect) -> str:
+    nodes = [node.op for function in code.functions for node in function.nodes]
+    used = ", ".join(name for name in ("cos", "sin", "sqrt") if name in nodes)
+    lines = [line for line in dialect.imports.split("\n") if used or "{}" not in line]
+    return "\n".join(lines).strip().format(used)
 
 
 def _function(code: Code, function: Function, dialect: Dialect) -> Iterator[str]:
@@ -166,14 +173,15 @@ def _values(function, inputs):
 def check():
     """For each function its largest error as a share of what it may be off by: at most 1."""
     shares = {{}}
-    for function in ({functions},):
+    for function in ({functions}):
         name, worst = function.__name__, 0.0
         inputs = [GIVEN[letter] for letter in INPUTS[name]]
         for found, true, within in zip(_values(function, inputs), TRUE[name], WITHIN[name]):
             for x, y, k in zip(found, true, within):
                 error, least = abs(x - float(y)), k * 2.0**-52
                 share = error / least if least else (0.0 if error == 0.0 else float("inf"))
-                worst = worst if share <= worst else share  # NaN is the worst
+                if not share <= worst:  # NaN is the worst
+                    worst = share
         shares[name] = worst
     return shares
 
@@ -215,6 +223,7 @@ def _check(code: Code, dialect: Dialect) -> Iterator[str]:
         yield "}"
     yield _CHECK.format(
         values=dialect.values,
-        functions=", ".join(function.name for function in code.functions),
+        functions=", ".join(function.name for function in code.functions)
+        + ("," if len(code.functions) == 1 else ""),
         before=f"    {dialect.before}\n" if dialect.before else "",
     ).rstrip()
