@@ -16,6 +16,7 @@ from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
 
 _FRAMES = Path(__file__).with_name("frames")
+_FAST = "-O3 -march=native -ffp-contract=fast -fno-math-errno"
 _PLACE = re.compile(r"@(\w+)@")
 
 
@@ -59,11 +60,13 @@ def _head(code: Code) -> list[str]:
         *code.head,
         "",
         f"To try it:     cc -std=c99 -O2 -D{up}_MAIN {name}.c -lm && ./a.out",
-        f"To compile it: cc -std=c99 -O3 -march=native -ffp-contract=fast -fno-math-errno -c {name}.c",
+        f"To compile it: cc -std=c99 {_FAST} -c {name}.c",
         f"In float:      add -D{up}_REAL=float",
         f'To call it:    #define {up}_DECLARATIONS, then #include "{name}.c"',
         f"CMake:         add_library({name} STATIC {name}.c)",
+        f"               target_compile_options({name} PRIVATE {_FAST})",
         f"               target_link_libraries({name} PUBLIC m)",
+        f"               target_include_directories({name} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})",
         f"pkg-config:    Name: {name}",
         f"               Description: kinematics of {code.robot}",
         "               Version: 1",

@@ -12,13 +12,15 @@ from urdfkin.export.function import Function
 def write(code: Code, to: str = "cpp") -> str:
     """A header, with its check as a program where `NAME_MAIN` is defined."""
     name, up = code.name, code.name.upper()
+    first = code.functions[0]
     head = [
         *code.head,
         "",
-        f"To try it: c++ -std=c++11 -O2 -D{up}_MAIN -x c++ {name}.hpp && ./a.out",
-        f"In float:  add -D{up}_REAL=float",
-        f"CMake:     add_library({name} INTERFACE)",
-        f"           target_include_directories({name} INTERFACE ${{CMAKE_CURRENT_SOURCE_DIR}})",
+        f"To try it:  c++ -std=c++11 -O2 -D{up}_MAIN -x c++ {name}.hpp && ./a.out",
+        f"In float:   add -D{up}_REAL=float",
+        f"To call it: {name}_kinematics::{first.name}({', '.join(first.inputs)}, out);",
+        f"CMake:      add_library({name} INTERFACE)",
+        f"            target_include_directories({name} INTERFACE ${{CMAKE_CURRENT_SOURCE_DIR}})",
     ]
     return framed(
         "file.hpp",

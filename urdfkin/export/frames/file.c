@@ -4,7 +4,13 @@
 #ifndef @UP@_REAL
 #define @UP@_REAL double
 #endif
+#ifdef __cplusplus
+extern "C" {
+#endif
 @declarations@
+#ifdef __cplusplus
+}
+#endif
 #ifndef @UP@_DECLARATIONS
 #include <float.h>
 #include <tgmath.h>
