@@ -6,7 +6,6 @@ import errno
 import os
 import pickle
 import resource
-import shutil
 import signal
 import stat
 import subprocess
@@ -19,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.cli.running import process
+from tests.cli.running import Done, process
 from tests.reading import records
 from urdfkin.compiled import compiling
 from urdfkin.compiled.compiling import NUMBERS, Kernel
@@ -196,9 +195,7 @@ def test_a_command_on_a_full_disc_gives_its_result_and_says_so(tmp_path: Path) -
     assert "Traceback" not in done.err
 
 
-def limited(*words: str, **env: str) -> Any:
-    from tests.cli.running import Done  # noqa: PLC0415
-
+def limited(*words: str, **env: str) -> Done:
     def limit() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
@@ -212,28 +209,20 @@ def limited(*words: str, **env: str) -> Any:
 
 @pytest.mark.slow
 def test_a_command_with_a_damaged_cache_says_so_in_a_line_and_mends_it(tmp_path: Path) -> None:
-    home: dict[str, Any] = {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": ""}
-    shutil.copytree(compiled_for_placements(), tmp_path / "urdfkin" / compiled_for_placements().name)
-    (tmp_path / "urdfkin").chmod(0o700)
-    process("placement", "ur5", **home)
-    files = [path for path in tmp_path.rglob("*.*.kernel") if "cores.placements" in path.name]
-    for path in files:
-        path.write_bytes(flipped(path.read_bytes()))
-    done = process("placement", "ur5", **home)
+    """What is damaged is a tree, which needs nothing compiled; of a kernel the same is said."""
+
+    def info() -> Done:
+        return process("info", "ur5", XDG_CACHE_HOME=str(tmp_path), NUMBA_CACHE_DIR="")
+
+    info()
+    (tree,) = (path for path in tmp_path.glob("urdfkin/trees-*/[!.]*"))
+    tree.write_bytes(flipped(tree.read_bytes()))
+    done = info()
     assert done.code == 0
     lines = [line for line in done.err.splitlines() if "damaged" in line]
     assert len(lines) == 1
     assert lines[0].startswith("urdfkin: warning: ")
-    assert process("placement", "ur5", **home).err == ""
-
-
-def compiled_for_placements() -> Path:
-    import urdfkin  # noqa: PLC0415
-
-    urdfkin.load("ur5").placement(np.zeros(6), "tool0")
-    folder = compiling.cache_folder()
-    assert folder is not None
-    return folder
+    assert info().err == ""
 
 
 # -- whose folder ------------------------------------------------------------------------------------------

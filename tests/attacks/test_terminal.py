@@ -42,7 +42,7 @@ ROBOT = {
     "dh": [
         *(["--format", form, "--no-mimic"] for form in (*FORMATS, "urdf", "svg")),
         *(["--tree", "--format", form] for form in ("terminal", "markdown", "csv", "json")),
-        ["--flip", FILE], ["--near-parallel", "strict"], ["--compare", "TABLE"],
+        ["--flip", FILE], ["--near-parallel", "strict"],
     ],
     "screws": [["--no-mimic", "--format", form] for form in SCREWS] + [["--base", FILE]],
     "calibrate": [[], ["--fit", FILE], ["--poses", FILE], ["--ur", FILE], ["--tip", FILE]],
@@ -82,16 +82,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder.mkdir()
     made = {name: str(folder / f"{FILE}{ending}") for name, ending in ENDINGS.items()}
     Path(made["ROBOT"]).write_text(chain_of_all(), encoding="utf-8")
-    names = [NAMES["colours"], *list(IN_XML.values())[1:]]
-    rows = ", ".join(
-        f"{{joint = {_toml(name)}, kind = 'revolute', a = 0.1, alpha = 0, d = 0, theta = 0}}"
-        for name in names
-    )
-    Path(made["TABLE"]).write_text(
-        "convention = 'standard'\nangles = 'radians'\nlengths = 'metres'\n"
-        f"robot = {_toml(NAMES['colours'])}\nrows = [{rows}]\n",
-        encoding="utf-8",
-    )
     done = urdfkin("validate", made["ROBOT"], "--samples", "1", "--json", made["REPORT"])
     assert done.code == 0, done.err
     report = json.loads(Path(made["REPORT"]).read_text())
@@ -112,11 +102,22 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return made | {"FRAME": NAMES["line"]}
 
 
+def table_of(names: list[str]) -> str:
+    rows = ", ".join(
+        f"{{joint = {_toml(name)}, kind = 'revolute', a = 0.1, alpha = 0, d = 0, theta = 0}}"
+        for name in names
+    )
+    return (
+        "convention = 'standard'\nangles = 'radians'\nlengths = 'metres'\n"
+        f"robot = {_toml(NAMES['colours'])}\nrows = [{rows}]\n"
+    )
+
+
 def _toml(name: str) -> str:
     return '"' + "".join(f"\\U{ord(c):08x}" for c in name) + '"'
 
 
-ENDINGS = {"ROBOT": ".urdf", "TABLE": ".toml", "REPORT": ".json", "PICTURE": ".svg"}
+ENDINGS = {"ROBOT": ".urdf", "REPORT": ".json", "PICTURE": ".svg"}
 
 
 def acts(text: str, *, commands: bool = False) -> list[str]:
@@ -150,6 +151,19 @@ def test_every_command_is_tried() -> None:
 )
 def test_no_name_acts_on_the_terminal(words: list[str], files: dict[str, str]) -> None:
     harmless(run(files, words), words)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(5))
+def test_no_name_of_a_table_or_of_what_it_is_held_against_acts(part: int, tmp_path: Path) -> None:
+    """All names, a few at a time: what a comparison tries grows with the cube of a table's length."""
+    names = list(IN_XML.values())[part::5]
+    robot, table = tmp_path / f"{FILE}.urdf".replace("/", ""), tmp_path / f"{FILE}.toml".replace("/", "")
+    robot.write_text(chain_of_all(names), encoding="utf-8")
+    table.write_text(table_of([NAMES["colours"], *names[1:]]), encoding="utf-8")
+    done = urdfkin("dh", str(robot), "--compare", str(table))
+    harmless(done, [])
+    assert "DIFFERS" in done.text
 
 
 @pytest.mark.slow

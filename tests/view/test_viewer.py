@@ -196,7 +196,7 @@ def test_a_browser_draws_it_without_errors_and_without_asking_elsewhere(
     viewer.ellipsoid.value, viewer.columns.value = "linear", "linear"
     viewer.update()
     address = f"http://127.0.0.1:{viewer.server.get_port()}"
-    with opened(tmp_path) as browser:
+    with opened(tmp_path, width=640, height=400) as browser:  # drawn by software, pixel by pixel
         browser.requests()
         browser.chrome.get(viewer.server.address)
         for _ in range(60):

@@ -172,13 +172,15 @@ class Inputs:
 
 def load_robot(source: str, *, verify: bool = True, oracle: WitnessName = "pinocchio", **how: Any) -> Robot:
     """The robot of a command, loaded as its options say or `how` does; warnings go to stderr, a line each."""
+    from urdfkin.lint.finding import UrdfWarning  # noqa: PLC0415
     from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         robot = load(source, **how_to_load() | how, verify=verify, oracle=oracle)
     for warning in caught:
-        say(str(warning.message), err=True)
+        of_the_file = issubclass(warning.category, UrdfWarning)
+        say(f"{'' if of_the_file else 'urdfkin: warning: '}{warning.message}", err=True)
     return robot
 
 
