@@ -18,14 +18,14 @@ from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError,
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rules.axes import tilts
 from urdfkin.lint.rules.dialect import NEWER_VERSION
-from urdfkin.lint.rules.left_out import LEFT_OUT, LEFT_OUT_MOTION
+from urdfkin.lint.rules.left_out import left_out
 from urdfkin.lint.rules.mimic import MIMIC_CONTINUOUS
 from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home
 from urdfkin.urdf.descriptions import described
-from urdfkin.urdf.mjcf import Listed, is_mjcf, name_of, read_mjcf
+from urdfkin.urdf.mjcf import is_mjcf, name_of, read_mjcf
 from urdfkin.urdf.origin import Origin
 from urdfkin.urdf.pinocchio_model import is_model, tree_of_model
 from urdfkin.urdf.reader import read_tree
@@ -160,7 +160,7 @@ def _load_mjcf(
     path = None if isinstance(source, bytes) or read.is_text else at_home(source)
     name = as_word(path) if path is not None else streamed.source if streamed else name_of(source)
     text = Text(write_urdf(read.tree).encode(), f"{name} (as a URDF)", name)
-    listed = tuple(_listed(one, name) for one in read.listed)
+    listed = tuple(left_out(one, name) for one in read.listed)
     robot = robot_of(
         text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, listed=listed, made=True
     )
@@ -194,13 +194,6 @@ def _load_model(
 def _refuse_arguments(xacro_args: Mapping[str, object] | None, found: str) -> None:
     if xacro_args:
         raise InputError("xacro_args go with the path of a .xacro file", found=found)
-
-
-def _listed(one: Listed, file: str) -> Finding:
-    """What an MJCF says that the tree does not hold, as a finding: a warning where motion depends on it."""
-    rule = LEFT_OUT_MOTION if one.moves else LEFT_OUT
-    message = one.what if one.where is None else f"{one.where}: {one.what}"
-    return Finding(rule.id, rule.severity, message, file=file)
 
 
 def robot_of(

@@ -1,0 +1,109 @@
+"""What an MJCF file says beside its joints: each thing alone, and every word that must be said of it."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Mjcf:
+    """A robot of MJCF, and the findings it must have and no others: (code, message)."""
+
+    name: str
+    text: str
+    findings: tuple[tuple[str, str], ...] = ()
+
+
+_LIMITED = 'limited="true" range="-1 1"'
+
+
+def _two(
+    *,
+    joint: str = f'type="slide" {_LIMITED}',
+    inside: str = "",
+    body: str = "",
+    world: str = "",
+    more: str = "",
+) -> str:
+    """Two bodies on the world, each with one joint, and one thing that can be put in."""
+    mass = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    return f"""<mujoco>
+  <worldbody>
+    <body name="one">{mass}<joint name="a" axis="0 0 1"/>{inside}</body>
+    <body name="two" {body}>{mass}<joint name="b" {joint}/></body>{world}
+  </worldbody>{more}
+</mujoco>"""
+
+
+def _held(*equalities: str) -> str:
+    return _two(more=f"<equality>{''.join(equalities)}</equality>")
+
+
+_USELESS = "left out, since kinematics does not use them: "
+_SPATIAL = '<tendon><spatial name="t"><site site="s"/><site site="r"/></spatial></tendon>'
+
+CASES = [
+    Mjcf("nothing", _two()),
+    Mjcf("a-line-between-two-joints", _held('<joint joint1="b" joint2="a" polycoef="0.1 2 0 0 0"/>')),
+    Mjcf(
+        "a-weld",
+        _held('<weld name="glue" body1="one" body2="two"/>'),
+        (("MJCF101", "equality glue: a constraint (weld) that a tree cannot hold"),),
+    ),
+    Mjcf(
+        "a-connection",
+        _held('<connect name="pin" body1="one" body2="two" anchor="0 0 0"/>'),
+        (("MJCF101", "equality pin: a constraint (connect) that a tree cannot hold"),),
+    ),
+    Mjcf(
+        "a-curve-between-two-joints",
+        _held('<joint name="bent" joint1="b" joint2="a" polycoef="0 0 1 0 0"/>'),
+        (("MJCF101", "equality bent: a constraint that is no line between two joints"),),
+    ),
+    Mjcf(
+        "a-joint-held-twice",
+        _held('<joint name="x" joint1="b" joint2="a"/>', '<joint name="y" joint1="b" joint2="a"/>'),
+        (("MJCF101", "equality y: joint b is held twice, or in a circle"),),
+    ),
+    Mjcf(
+        "two-joints-that-hold-each-other",
+        _held('<joint name="x" joint1="b" joint2="a"/>', '<joint name="y" joint1="a" joint2="b"/>'),
+        (("MJCF101", "equality y: joint a is held twice, or in a circle"),),
+    ),
+    Mjcf(
+        "a-constraint-that-is-off",
+        _held('<joint name="x" joint1="b" joint2="a" active="false"/>'),
+        (("MJCF102", "equality x: a constraint that is not active"),),
+    ),
+    Mjcf(
+        "a-tendon",
+        _two(inside='<site name="s"/>', world='<site name="r"/>', more=_SPATIAL),
+        (("MJCF101", "tendons: tendons move nothing here"), ("MJCF102", f"{_USELESS}1 tendons")),
+    ),
+    Mjcf(
+        "a-mocap-body",
+        _two(world='<body name="hand" mocap="true"/>'),
+        (("MJCF101", "body hand: a mocap body stands where the file puts it"),),
+    ),
+    Mjcf(
+        "a-slide-without-limits",
+        _two(joint='type="slide"'),
+        (("MJCF102", "joint b: a slide without limits: a URDF must have some, 1000 m either way"),),
+    ),
+    Mjcf(
+        "a-free-body-that-stands-elsewhere",
+        _two(joint='type="free"', body='pos="0 0 1"'),
+        (
+            (
+                "MJCF102",
+                "joint b: qpos0 places it at (0, 0, 1); the neutral configuration has it at the origin",
+            ),
+        ),
+    ),
+    Mjcf(
+        "shapes-lights-and-motors",
+        _two(
+            inside='<geom size="0.1"/><geom size="0.2"/><light/><camera/>',
+            more='<actuator><motor joint="a"/></actuator>',
+        ),
+        (("MJCF102", f"{_USELESS}1 actuators, 2 geoms, 1 cameras, 1 lights"),),
+    ),
+]
