@@ -164,11 +164,11 @@ class Judge:
     def as_written(self, found: Alignment) -> Alignment:
         """The same joints and links laid on each other with nothing put right."""
         written = replace(AS_WRITTEN, orders=found.b.orders)
-        return align(*self.mechanisms, self._map(found), written)
+        return align(*self.mechanisms, found.names, written)
 
     def _demand_the_map(self, found: Alignment) -> None:
         """Raise InputError for a pair that was given and cannot be."""
-        made = self._map(found)
+        made = found.names
         for ours, theirs in self.given.items():
             if made.get(ours) != theirs:
                 raise InputError(
@@ -181,9 +181,6 @@ class Judge:
     def search(self, found: Alignment, variables: Variables) -> Search:
         """What looks for the largest distances."""
         return Search(self.robots, found, variables)
-
-    def _map(self, found: Alignment) -> dict[str, str]:
-        return {self.trees[0].joints[s.a].name: self.trees[1].joints[s.b].name for s in found.steps}
 
     def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
         """What everything that was taken for rounding can do together: each step's share, in turn.

@@ -23,7 +23,7 @@ import numpy as np
 from urdfkin.model.chain import inverse
 from urdfkin.model.mechanisms.conversion import Conversion, onto_plane, undoing
 from urdfkin.model.mechanisms.guesses import behind, laid, zeros
-from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, tolerance_of
+from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, Tolerance, tolerance_of
 from urdfkin.model.mechanisms.pairing import Pairing, family
 from urdfkin.model.mechanisms.rigid import along, apart, between, turn_about
 from urdfkin.model.tree import FloatArray
@@ -32,6 +32,10 @@ from urdfkin.model.tree import FloatArray
 MOST_ORDERS = 120
 #: What the next axis leaves open, so many joints ahead decide; so many steps ahead are taken in all.
 AHEAD, MOST_AHEAD = 6, 600
+#: What is off by so little (rad, and as a share of the size) is taken for nothing where nothing else helps.
+NEARLY = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
+#: So many times joints that are called otherwise are taken for each other.
+MOST_EXCHANGED = 12
 IDENTITY = np.eye(4)
 IDENTITY.setflags(write=False)
 
@@ -147,6 +151,48 @@ class Alignment:
         alike = not any(step.unlike for step in self.steps)
         return alike and not (self.worst or self.only_a or self.only_b)
 
+    @property
+    def size(self) -> float:
+        """Metres: what angles are counted with."""
+        return max(self.a.size, self.b.size, 1e-9)
+
+    @property
+    def inner_off(self) -> float:
+        """Metres: the largest disagreement of two axes, or of two links that carry something: no tools."""
+        carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
+        links = [one for one in self.frames if one.a in carry[0] or one.b in carry[1]]
+        off = [(step.tilt, step.shift) for step in self.steps] + [(link.tilt, link.shift) for link in links]
+        return max((tilt * self.size + shift for tilt, shift in off), default=0.0)
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Joints of A and what they are in B."""
+        joints = self.a.tree.joints, self.b.tree.joints
+        return {joints[0][step.a].name: joints[1][step.b].name for step in self.steps}
+
+    @property
+    def gauge(self) -> Gauge:
+        """What was free, as it was found; the order of joints is that of `b` already."""
+        joints = self.a.tree.joints
+        return Gauge(
+            (self.a.tree.links[self.base[0]], self.b.tree.links[self.base[1]]),
+            self.X,
+            {joints[step.a].name: (step.sense, step.offset) for step in self.steps},
+            {joints[step.a].name: step.conversion for step in self.steps if step.conversion is not None},
+        )
+
+    def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
+        """Two joints of A on one body, with B's, that lead to what differs and whose names say nothing."""
+        told = {joint.name for joint in self.b.tree.joints} | set(given)
+        ends = [i for i, step in enumerate(self.steps) if step.differs]
+        ends += [frame.previous for frame in self.frames if frame.differs]
+        lead = sorted({i for end in ends for i in self.indices(end)})
+        some = [self.steps[i] for i in lead if self.a.tree.joints[self.steps[i].a].name not in told]
+        for k, one in enumerate(some):
+            for other in some[k + 1 :]:
+                if other.previous == one.previous and other.kind == one.kind:
+                    yield frozenset(((one.a, one.b), (other.a, other.b)))
+
     def indices(self, previous: int) -> list[int]:
         """The steps from the base to one of them, itself too."""
         found = []
@@ -223,17 +269,60 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
             found = _laid(a, other, given, None)
             if _better((found.matched, found.worst), (best.matched, best.worst)):
                 best = found
+    return _nearly(_exchanged(best, given), given)
+
+
+def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
+    """Joints on one body that share no name taken for each other: arms that mirror each other, say."""
+    tried = set[frozenset[tuple[int, int]]]()
+    while (two := next((two for two in best.exchangeable(given) if two not in tried), None)) is not None:
+        tried.add(two)
+        if len(tried) > MOST_EXCHANGED:
+            break
+        joints = best.a.tree.joints, best.b.tree.joints
+        (a, b), (c, d) = two
+        other = {joints[0][a].name: joints[1][d].name, joints[0][c].name: joints[1][b].name}
+        found = _laid(best.a, best.b, {**given, **other}, None, MOST_AHEAD, base=best.base)
+        if _better((found.matched, found.worst), (best.matched, best.worst)):
+            best, given = found, {**given, **other}
+    return best
+
+
+def _nearly(best: Alignment, given: Mapping[str, str]) -> Alignment:
+    """Another way to lay them on each other, which agrees by far more; the same where none is.
+
+    Where each axis is off by a little, none says which of two ways is meant, as one that agrees would. So
+    what is little is taken for nothing, more and more of it, until all agree; with what was free set as that
+    search found it, they are laid on each other once more and all that is little is told.
+    """
+    a, b, off = best.a, best.b, best.inner_off
+    for angle in NEARLY if off else ():
+        if angle * best.size > 0.5 * off:
+            break
+        tolerance = Tolerance(angle, angle * best.size)
+        rough = _laid(a, b, given, None, MOST_AHEAD, tolerance, best.base)
+        if rough.inner_off or (len(rough.only_a), len(rough.only_b)) != (len(best.only_a), len(best.only_b)):
+            continue
+        exact = _laid(a, b, rough.names, rough.gauge)
+        return exact if exact.inner_off < 0.5 * off else best
     return best
 
 
 def _laid(
-    a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | None, ahead: int = 0
+    a: Mechanism,
+    b: Mechanism,
+    given: Mapping[str, str],
+    gauge: Gauge | None,
+    ahead: int = 0,
+    tolerance: Tolerance | None = None,
+    base: tuple[int, int] | None = None,
 ) -> Alignment:
-    """The best of all bodies to begin at, with so many steps ahead."""
-    walk = _Walk(a, b, Pairing(a, b, given), gauge, ahead)
+    """The best of all bodies to begin at, or of the one of two links, with so many steps ahead."""
+    tolerance = tolerance or tolerance_of(a, b)
+    walk = _Walk(a, b, Pairing(a, b, given, tolerance), gauge, ahead, tolerance, base)
     best: Alignment | None = None
-    for base, X in walk.beginnings():
-        found = walk.run(base, X)
+    for bodies, X in walk.beginnings():
+        found = walk.run(bodies, X)
         if best is None or _better((found.matched, found.worst), (best.matched, best.worst)):
             best = found
         if not best.worst and not (best.only_a and best.only_b):
@@ -243,9 +332,18 @@ def _laid(
 
 
 class _Walk:
-    def __init__(self, a: Mechanism, b: Mechanism, pairing: Pairing, gauge: Gauge | None, ahead: int) -> None:
+    def __init__(
+        self,
+        a: Mechanism,
+        b: Mechanism,
+        pairing: Pairing,
+        gauge: Gauge | None,
+        ahead: int,
+        tolerance: Tolerance,
+        base: tuple[int, int] | None,
+    ) -> None:
         self.a, self.b, self.pairing, self.gauge, self.ahead = a, b, pairing, gauge, ahead
-        self.tolerance = tolerance_of(a, b)
+        self.tolerance, self.base = tolerance, base
         self.size = max(a.size, b.size, 1e-9)
 
     # -- where to begin ------------------------------------------------------------------------------
@@ -282,6 +380,9 @@ class _Walk:
         Where those share no name, B's root body too, with the one of A: what carries A's root, a floating
         joint say, may be A's alone.
         """
+        if self.base is not None:
+            yield self.a.body_of[self.base[0]], self.b.body_of[self.base[1]]
+            return
         theirs = _most_shared(self.a, self.b)
         if theirs is not None:
             yield 0, theirs

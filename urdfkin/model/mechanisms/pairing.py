@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, between_lines, tolerance_of
+from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, Tolerance, between_lines
 from urdfkin.model.mechanisms.rigid import apart
 from urdfkin.model.tree import FloatArray, JointKind
 
@@ -23,11 +23,11 @@ class Pairing:
         a: One.
         b: The other.
         given: Joint names of `a` and the names that they have in `b`.
+        tolerance: Within which axes agree.
     """
 
-    def __init__(self, a: Mechanism, b: Mechanism, given: Mapping[str, str]) -> None:
-        self.a, self.b, self.given = a, b, given
-        self._rounding = tolerance_of(a, b)
+    def __init__(self, a: Mechanism, b: Mechanism, given: Mapping[str, str], tolerance: Tolerance) -> None:
+        self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
         self._signatures: dict[tuple[int, int, int], str] = {}
 
     def links(self, body_a: int, body_b: int) -> list[tuple[int, int]]:
@@ -96,7 +96,7 @@ class Pairing:
         """Of shape, then of axes, then, where axes lie on one line, of where they point and stand on it."""
         other_shape = self._signature(0, bodies[0], e) != self._signature(1, bodies[1], f)
         angle, way = self.mismatch(e, f, G, XC)
-        off = 0.0 if self._rounding.holds(angle, way) else angle * max(self.a.size, 1e-9) + way
+        off = 0.0 if self._tolerance.holds(angle, way) else angle * max(self.a.size, 1e-9) + way
         _, place = apart(G @ self.a.homes[e.joint + 1], XC @ self.b.homes[f.joint + 1])
         s, t = self.a.screw(e).moved(G), self.b.screw(f).moved(XC)
         return other_shape, off, place + self.a.size * bool(s.direction @ t.direction < 0.0)
