@@ -9,6 +9,7 @@ from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.door import say
 from urdfkin.cli.output import check_line, console, hand_out, npy
 from urdfkin.errors.printable import csv_cell, csv_text, json_text
+from urdfkin.errors.showing import NOISE, six_digits
 from urdfkin.report.listing import print_named
 from urdfkin.verify.quantities import SIX
 
@@ -43,7 +44,7 @@ def _print(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> None
     for k in range(min(len(parts.base), _SHOWN)):
         if len(parts.base) > 1:
             out.print(f"sample {k}")
-        noise = 1e-15 * float(abs(parts.terms[k]).max(initial=0.0))
+        noise = NOISE * float(abs(parts.terms[k]).max(initial=0.0))
         rows = [*parts.contributions((k,)), ("sum", "", parts.total[k])]
         cells = ((joint, kind, *_cells(six, noise)) for joint, kind, six in rows)
         print_named(out, _COLUMNS, cells, left=range(2))
@@ -54,7 +55,7 @@ def _print(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> None
 
 def _cells(six: FloatArray, noise: float) -> list[str]:
     """Four digits: enough to compare parts, and they fit beside each other."""
-    return ["0" if abs(x) <= noise else f"{x:.4g}" for x in six.tolist()]
+    return [six_digits(x, noise, digits=4) for x in six.tolist()]
 
 
 def _as_json(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> bytes:

@@ -21,6 +21,7 @@ from urdfkin.cli.endings import form_of
 from urdfkin.cli.output import console, end_of_path, hand_out, output_option
 from urdfkin.errors import InputError
 from urdfkin.errors.printable import csv_cell, csv_text, json_text
+from urdfkin.errors.showing import six_digits
 
 if TYPE_CHECKING:
     from urdfkin.model.chain import FrameChain
@@ -102,7 +103,7 @@ def _kind(joint: Any) -> str:
 
 def _vector(numbers: FloatArray) -> str:
     """Six digits, and what is rounding of a metre as 0."""
-    return " ".join("0" if abs(x) < 1e-15 else f"{x:.6g}" for x in numbers.tolist())
+    return " ".join(six_digits(x) for x in numbers.tolist())
 
 
 def _as_json(robot: Robot, path: FrameChain, q: FloatArray, line: str | None) -> str:

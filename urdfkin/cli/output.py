@@ -16,7 +16,8 @@ from urdfkin.cli.arguments import Inputs
 from urdfkin.cli.door import say
 from urdfkin.errors.numerals import whole
 from urdfkin.errors.printable import csv_cell, csv_text, json_text
-from urdfkin.report.listing import NOISE, make_table, print_named
+from urdfkin.errors.showing import NOISE
+from urdfkin.report.listing import make_table, print_named
 from urdfkin.system.files import write_file
 
 __all__ = ["write_file"]

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import math
 
+from urdfkin.dh.elements import looks_round
 from urdfkin.dh.table import DHTable
 
 #: Metres: a row of an arm is not longer, nor is a thousandth of it shorter than a millimetre.
 _LONGEST, _SHORTEST = 20.0, 1e-3
-#: A multiple of 15 degrees, as far as people write them.
-_ROUND = 1e-3
 
 
 def doubts(table: DHTable) -> list[str]:
@@ -38,7 +37,7 @@ def doubts(table: DHTable) -> list[str]:
             " write lengths = 'metres' if they are"
         )
     angles = [cell for row in table.rows for cell in (row.alpha, row.theta) if cell]
-    if angles and all(_is_round(math.degrees(cell)) for cell in angles):
+    if angles and all(looks_round(math.degrees(cell)) for cell in angles):
         found.append("angles of 1.57 degrees look like radians: write angles = 'radians' if they are")
     for length, angle in (("a", "alpha"), ("d", "theta")):
         called_lengths, called_angles = (
@@ -47,15 +46,10 @@ def doubts(table: DHTable) -> list[str]:
         if (
             len(called_lengths) > 1
             and called_angles
-            and all(map(_is_round, called_lengths))
-            and not any(map(_is_round, called_angles))
+            and all(map(looks_round, called_lengths))
+            and not any(map(looks_round, called_angles))
         ):
             found.append(
                 f"the columns {length} and {angle} look exchanged: the round angles stand in {length}"
             )
     return found
-
-
-def _is_round(angle: float) -> bool:
-    twelfth = math.pi / 12.0
-    return abs(angle) > 0.5 * twelfth and abs(math.remainder(angle, twelfth)) <= _ROUND * twelfth

@@ -18,6 +18,9 @@ from numpy.typing import ArrayLike
 from urdfkin.kinematics.roundings import ANGLE, EPS
 from urdfkin.model.tree import FloatArray
 
+#: How far from a multiple of 15 degrees people write one, as a share of 15 degrees.
+_WRITTEN = 1e-3
+
 
 def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:
     """(..., 4, 4) S = Rz(theta) Tz(d), radians and metres; the arguments are broadcast."""
@@ -68,6 +71,15 @@ def wrapped(angle: float) -> float:
     """
     turned = math.remainder(angle, 2.0 * math.pi)
     return math.pi if turned <= -math.pi * (1.0 - EPS) else turned
+
+
+def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
+    """Whether an angle is a multiple of 15 degrees, and not 0, as far as people write them: 1.571 is.
+
+    >>> looks_round(1.571), looks_round(0.0), looks_round(0.25), looks_round(90.0, twelfth=15.0)
+    (True, False, False, True)
+    """
+    return abs(angle) > 0.5 * twelfth and abs(math.remainder(angle, twelfth)) <= _WRITTEN * twelfth
 
 
 def nearest_twelfth(angle: float) -> float:

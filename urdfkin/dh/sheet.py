@@ -22,7 +22,10 @@ from urdfkin.dh.written_row import ORDER
 from urdfkin.errors import InputError
 from urdfkin.errors.measured import UNITS
 from urdfkin.errors.printable import from_csv_cell
+from urdfkin.errors.showing import NOISE
 
+#: How far a rotation that was printed with six digits is from one; what is farther was meant otherwise.
+_PRINTED = 1e-5
 #: What may be said in a line of its own, `convention: modified`, with or without a comment mark.
 _SAID = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
 #: In a file of separated values each `# key: value` is meant; a key that is none is refused with the others.
@@ -279,7 +282,7 @@ def _rigid(rows: list[list[float]]) -> list[list[float]]:
     pose = np.array(rows)
     U, _, Vt = np.linalg.svd(pose[:3, :3])
     off = U @ Vt - pose[:3, :3]
-    if 1e-15 < np.abs(off).max() < 1e-5:
+    if NOISE < np.abs(off).max() < _PRINTED:
         pose[:3, :3] += off
     return [[float(number) for number in row] for row in pose]
 

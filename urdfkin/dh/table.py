@@ -30,6 +30,9 @@ from urdfkin.model.given import Given
 from urdfkin.model.tree import FloatArray, frozen
 from urdfkin.system.asking import ask
 
+#: How far the rotation of a pose may be from one: people type seven digits.
+_TYPED = 1e-6
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DHTable(Shown):
@@ -205,7 +208,7 @@ class DHTable(Shown):
 
 
 def _rigid(T: ArrayLike, where: str) -> FloatArray:
-    """A read-only (4, 4) rigid transform; rejects what is none to within 1e-6."""
+    """A read-only (4, 4) rigid transform; rejects what is none."""
     pose = frozen(T)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise InputError(
@@ -213,6 +216,6 @@ def _rigid(T: ArrayLike, where: str) -> FloatArray:
         )
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is no rotation
         off = np.abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max()
-    if off > 1e-6 or np.linalg.det(pose[:3, :3]) < 0.0 or pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
+    if off > _TYPED or np.linalg.det(pose[:3, :3]) < 0.0 or pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
         raise InputError("a pose must be a rotation and a translation", where=where, found=str(pose.tolist()))
     return pose

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from urdfkin.dh.elements import looks_round
 from urdfkin.dh.expression import Cell, NoCellError, cell_of
 from urdfkin.dh.row import DHRow
 from urdfkin.dh.units import Angles, Units, cell_in_si, read_number, units_of
@@ -100,10 +101,7 @@ def _is_round(value: Any) -> bool:
         return "pi" in value
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         return False
-    return any(
-        abs(math.remainder(value, twelfth)) <= 1e-3 * twelfth and abs(value) > 0.5 * twelfth
-        for twelfth in (math.pi / 12.0, 15.0)
-    )
+    return looks_round(value) or looks_round(value, twelfth=15.0)
 
 
 def _of_list(row: Any, where: str) -> dict[str, Any]:

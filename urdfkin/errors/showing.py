@@ -15,8 +15,9 @@ from urdfkin.errors.printable import latex_text, markdown_text, printable
 #: What a tree is drawn with before its parts, and in ASCII.
 LINES = "├│└ "
 ASCII = str.maketrans("├│└", "+|`")
-#: What is less than this share of a table's largest number is rounding, and shown as 0.
-_NOISE = 1e-15
+#: What is less than this share of a table's largest number is rounding, and shown as 0. For the eye alone:
+#: what is written for machines has every digit, and no verdict asks.
+NOISE = 1e-15
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,9 @@ class Table:
 
     def _cells(self) -> list[list[str]]:
         largest = max((abs(x) for row in self.rows for x in row if not isinstance(x, str)), default=0.0)
-        return [[x if isinstance(x, str) else _number(x, _NOISE * largest) for x in row] for row in self.rows]
+        return [
+            [x if isinstance(x, str) else six_digits(x, NOISE * largest) for x in row] for row in self.rows
+        ]
 
     def _drawn(self) -> list[list[tuple[str, str]]]:
         """Each cell, the heads' too, as the lines of a tree before it and its words."""
@@ -171,5 +174,10 @@ def _html(words: str) -> str:
     return escape(printable(words))
 
 
-def _number(value: float, noise: float) -> str:
-    return "0" if abs(value) <= noise else f"{value:.6g}"
+def six_digits(value: float, noise: float = NOISE, digits: int = 6) -> str:
+    """A number for people, at six digits or so many; what is no more than noise as 0.
+
+    >>> six_digits(0.1 + 0.2), six_digits(1e-16), six_digits(1e-16, noise=0.0)
+    ('0.3', '0', '1e-16')
+    """
+    return "0" if abs(value) <= noise else f"{value:.{digits}g}"

@@ -6,13 +6,11 @@ from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING, Literal
 
 from urdfkin.errors.printable import printable
+from urdfkin.errors.showing import NOISE, six_digits
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
-
-#: What is less than this share of a table's largest number is rounding, and shown as 0.
-NOISE = 1e-15
 
 
 def make_table(
@@ -89,10 +87,6 @@ def _texts(rows: Iterable[Sequence[str | float]]) -> list[list[str]]:
     cells = [list(row) for row in rows]
     largest = max((abs(cell) for row in cells for cell in row if not isinstance(cell, str)), default=0.0)
     return [
-        [printable(cell) if isinstance(cell, str) else _number(cell, NOISE * largest) for cell in row]
+        [printable(cell) if isinstance(cell, str) else six_digits(cell, NOISE * largest) for cell in row]
         for row in cells
     ]
-
-
-def _number(value: float, noise: float) -> str:
-    return "0" if abs(value) <= noise else f"{value:.6g}"

@@ -13,6 +13,7 @@ from urdfkin.dh.export.terminal import aligned
 from urdfkin.dh.screws import Screws
 from urdfkin.dh.subproblems import axes_and_steps
 from urdfkin.errors.printable import latex_text, printable
+from urdfkin.errors.showing import six_digits
 
 FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -28,7 +29,7 @@ def _terminal(screws: Screws, digits: int) -> str:
     for what, rows in (("space screws S", screws.space), ("body screws B", screws.body)):
         body = [["i", "joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z"]]
         body += [
-            [str(i), joint.name, *(f"{_clean(x):.{digits}g}" for x in row)]
+            [str(i), joint.name, *(six_digits(x, digits=digits) for x in row)]
             for i, (joint, row) in enumerate(zip(screws.joints, rows, strict=True), 1)
         ]
         lines += ["", what, *aligned(body)]
@@ -37,16 +38,12 @@ def _terminal(screws: Screws, digits: int) -> str:
     return "\n".join(map(printable, lines)) + "\n"
 
 
-def _clean(x: float) -> float:
-    return 0.0 if abs(x) < 1e-15 else float(x)
-
-
 def _latex(screws: Screws, digits: int) -> str:
     names = f"{latex_text(screws.robot)}, {latex_text(screws.base_frame)} to {latex_text(screws.tip_frame)}"
     heads = r"$i$ & joint & $\omega_x$ & $\omega_y$ & $\omega_z$ & $v_x$ & $v_y$ & $v_z$ \\"
     rows = []
     for i, (joint, row) in enumerate(zip(screws.joints, screws.space, strict=True), 1):
-        numbers = " & ".join(maths(f"{_clean(x):.{min(digits, 6)}g}") for x in row)
+        numbers = " & ".join(maths(six_digits(x, digits=min(digits, 6))) for x in row)
         rows.append(rf"  {i} & {latex_text(joint.name)} & {numbers} \\")
     frame = [r"\begin{tabular}{rlrrrrrr}", r"  \toprule", f"  {heads}", r"  \midrule"]
     lines = [r"\begin{table}", r"  \centering", rf"  \caption{{Space screws of {names}, metres.}}"]
