@@ -19,6 +19,8 @@ from urdfkin.model.tree import FloatArray
 
 #: Radians and metres up to which a kind is said, with its distance; and up to which it is exact.
 NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
+#: Singular values below this are freedoms that a path does not have: far above rounding, far below a lever.
+_RANK = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +108,7 @@ def structure(screws: Screws, samples: int = 2000) -> Structure:
         screws.base_frame,
         screws.tip_frame,
         letters,
-        int(np.linalg.matrix_rank(jacobian, tol=1e-6)) if letters else 0,
+        int(np.linalg.matrix_rank(jacobian, tol=_RANK)) if letters else 0,
         pairs,
         tuple(kinds),
         _longest(screws, origin),
@@ -145,7 +147,7 @@ def meeting(screws: Screws, at: tuple[int, ...]) -> tuple[FloatArray, float]:
     for i in at:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
         A, b = A + across, b + across @ screws.points[i]
-    point = np.asarray(np.linalg.lstsq(A, b, rcond=1e-6)[0], np.float64)
+    point = np.asarray(np.linalg.lstsq(A, b, rcond=_RANK)[0], np.float64)
     off = [np.linalg.norm(np.cross(_axis(screws, i), point - screws.points[i])) for i in at]
     return point, float(max(off))
 

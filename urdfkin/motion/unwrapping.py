@@ -20,6 +20,9 @@ _ONE_TURN = math.tau + 0.02
 #: From here on, the other way round is less than twice as far: who can tell which way the joint went?
 _UNSURE = math.tau / 3.0
 
+#: Radians or metres: a follower that moves less beyond a whole turn of its leader stands where it stood.
+_STANDS = 1e-9
+
 
 @dataclass(frozen=True, slots=True)
 class Unwrapped:
@@ -127,8 +130,8 @@ def _followers(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[
         moved = rule.multiplier * (new[:, at] - q[:, at])
         if joint.kind.turns:
             moved = np.remainder(moved + math.pi, math.tau) - math.pi
-        if np.abs(moved).max() > 1e-9 * max(1.0, abs(rule.multiplier)):
-            k = int(np.flatnonzero(np.abs(moved) > 1e-9)[0])
+        if np.abs(moved).max() > _STANDS * max(1.0, abs(rule.multiplier)):
+            k = int(np.flatnonzero(np.abs(moved) > _STANDS)[0])
             yield (
                 f"joint {joint.name} follows {rule.leader} {rule.multiplier:g}-fold on beyond a whole turn:"
                 f" from sample {k} on it stands at {rule.multiplier * new[k, at] + rule.offset:.4g}, not at"

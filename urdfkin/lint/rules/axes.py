@@ -24,6 +24,12 @@ SHORTEST, LONGEST = 1e-150, 1e150
 #: A length that differs from one by less is rounding of the last digits and worth a note at most.
 ROUNDING = 2e-4
 
+#: A length that is one as far as normalised doubles tell, as `kinematics.inputs` has it.
+_ONE = 1e-12
+
+#: How far a planar joint's axis may lean from z, as a share of it, and be meant as z.
+_LEAN = 1e-9
+
 #: What Pinocchio takes for a coordinate axis: Eigen's isApprox compares squares with the square of this.
 _SNAPPED = 1e-12
 
@@ -60,7 +66,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
             found=_written(joint),
             remedy='write a unit vector, such as xyz="0 0 1"',
         )
-    elif abs(length - 1.0) > 1e-12:
+    elif abs(length - 1.0) > _ONE:
         unit = unit_vector(joint.axis)
         written = " ".join(repr(x).removesuffix(".0") for x in unit)
         element = joint.axis_element
@@ -131,7 +137,7 @@ def _is_approx(axis: Sequence[float], unit: Sequence[float]) -> bool:
 
 def _check_planar(report: Reporter, joint: JointRecord) -> None:
     x, y, z = joint.axis or (0.0, 0.0, 0.0)
-    if z > 0.0 and math.hypot(x, y) <= 1e-9 * z:
+    if z > 0.0 and math.hypot(x, y) <= _LEAN * z:
         return
     at = joint.axis_element or joint.element
     report.add(

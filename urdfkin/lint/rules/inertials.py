@@ -25,6 +25,9 @@ NEGLIGIBLE = 1e-3
 #: Moments of inertia for each kg, in m^2, that are nothing but rounding: a body of 0.03 mm.
 ROUNDING = 1e-9
 
+#: Digits that exporters write: moments off by this share of the largest are not impossible but rounded.
+_WRITTEN = 1e-6
+
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -102,7 +105,7 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
     if 0.0 < kilograms < NEGLIGIBLE:
         return
     small, middle, large = principal_moments(moments)
-    slack = 1e-6 * max(abs(small), abs(large)) + ROUNDING * kilograms
+    slack = _WRITTEN * max(abs(small), abs(large)) + ROUNDING * kilograms
     if small < -slack:
         what, found = "a principal moment of inertia is negative", f"{small:.3g}"
     elif large > middle + small + slack:
