@@ -20,7 +20,9 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.to_tree import UNBOUNDED_SLIDE
 from urdfkin.errors import InputError
+from urdfkin.errors.showing import NOISE
 from urdfkin.kinematics.rotation import exp_rotation
+from urdfkin.kinematics.rotation.nearest import polar_factor
 from urdfkin.kinematics.roundings import EPS, ROW
 from urdfkin.model.chain import FrameChain, motion_about_z
 from urdfkin.model.coupling import Coupling, coupling_of
@@ -171,6 +173,19 @@ def screws_of(path: FrameChain) -> Screws:
     return Screws(joints, frozen(T @ path.T_last_tip), frozen(np.array(rows).reshape(-1, 6)), *ends)
 
 
+def _rigid(M: FloatArray) -> FloatArray:
+    """The rigid transform that a written home pose means; one that is exact to rounding stays as it is."""
+    T = np.eye(4)
+    T[:3] = M[:3]
+    R = T[:3, :3]
+    if np.abs(R.T @ R - np.eye(3)).max() > _WRITTEN or np.linalg.det(R) < 0:
+        raise InputError("M must be a rotation and a translation", where="M", found=str(R.tolist()))
+    nearest = polar_factor(R)
+    if np.abs(nearest - R).max() > NOISE:
+        T[:3, :3] = nearest
+    return T
+
+
 def screws_from(
     screws: ArrayLike,
     M: ArrayLike,
@@ -195,7 +210,7 @@ def screws_from(
     Raises:
         InputError: a shape; an axis that has not length 1; a pitch (w . v is not 0), which no URDF has.
     """
-    S, pose = np.array(screws, dtype=np.float64), np.eye(4)
+    S = np.array(screws, dtype=np.float64)
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S
     home = np.asarray(M, dtype=np.float64)
     if S.ndim != 2 or S.shape[1] != 6 or home.shape not in ((4, 4), (3, 4)) or frame not in ("space", "body"):
@@ -205,13 +220,7 @@ def screws_from(
         )
     if not (np.isfinite(S).all() and np.isfinite(home).all()):
         raise InputError("screws and M are finite numbers", found="nan or inf")
-    pose[:3] = home[:3]
-    if np.abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max() > _WRITTEN or np.linalg.det(pose[:3, :3]) < 0:
-        raise InputError(
-            "M must be a rotation and a translation", where="M", found=str(pose[:3, :3].tolist())
-        )
-    U, _, Vt = np.linalg.svd(pose[:3, :3])
-    pose[:3, :3] = U @ Vt if np.abs(U @ Vt - pose[:3, :3]).max() > 1e-15 else pose[:3, :3]
+    pose = _rigid(home)
     if frame == "body":
         w = S[:, :3] @ pose[:3, :3].T
         S = np.hstack([w, S[:, 3:] @ pose[:3, :3].T + np.cross(pose[:3, 3], w)])

@@ -34,3 +34,17 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
     nearest: FloatArray = M - M @ (0.5 * defect)
     return nearest
+
+
+def polar_factor(M: FloatArray) -> FloatArray:
+    """The same for matrices that are farther from a rotation: as printed with a few digits, or measured.
+
+    Args:
+        M: (3, 3), of positive determinant.
+
+    Example:
+        >>> polar_factor(np.diag([1.0, 1.001, 0.999])).tolist()
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    U, _, Vt = np.linalg.svd(M)
+    return np.asarray(U @ Vt)
