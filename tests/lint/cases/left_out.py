@@ -46,17 +46,17 @@ CASES = [
     Mjcf(
         "a-weld",
         _held('<weld name="glue" body1="one" body2="two"/>'),
-        (("MJCF101", "equality glue: a constraint (weld) that a tree cannot hold"),),
+        (("MJCF101", "equality glue: a constraint (weld of one and two) that a tree cannot hold"),),
     ),
     Mjcf(
         "a-connection",
         _held('<connect name="pin" body1="one" body2="two" anchor="0 0 0"/>'),
-        (("MJCF101", "equality pin: a constraint (connect) that a tree cannot hold"),),
+        (("MJCF101", "equality pin: a constraint (connect of one and two) that a tree cannot hold"),),
     ),
     Mjcf(
         "a-curve-between-two-joints",
         _held('<joint name="bent" joint1="b" joint2="a" polycoef="0 0 1 0 0"/>'),
-        (("MJCF101", "equality bent: a constraint that is no line between two joints"),),
+        (("MJCF101", "equality bent: a constraint (b and a) that is no line between two joints"),),
     ),
     Mjcf(
         "a-joint-held-twice",
