@@ -96,11 +96,15 @@ DIALECTS = {
         values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
-        about="One configuration, arrays q ({nq},), v and a ({nv},), of any precision; for jit, vmap, grad.",
+        about="One configuration, arrays q ({nq},), v and a ({nv},), of any precision; for jit, vmap, grad.\n"
+        "XLA's fusion compiles for minutes where a chain is long; this leaves it out:\n"
+        'jax.jit(jax.vmap(function), compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
         entering=lambda inputs: [f"{x} = jnp.asarray({x})" for x in inputs],
         result=_nested("jnp.array([", "], dtype=q.dtype)", deeper=".reshape({})"),
-        values="found = jax.vmap(jax.jit(function))(*map(jnp.array, inputs))\n"
+        values='unfused = {"xla_disable_hlo_passes": "fusion"}\n'
+        "    compiled = jax.jit(jax.vmap(function), compiler_options=unfused)\n"
+        "    found = compiled(*map(jnp.array, inputs))\n"
         "    return found.reshape(len(inputs[0]), -1).tolist()",
         before='jax.config.update("jax_enable_x64", True)',
     ),
