@@ -73,7 +73,7 @@ def test_a_follower_that_moves_by_a_tenth_more_is_found_out(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ur5", "panda", "xarm7", "kinova", "go2", "laikago"])
+@pytest.mark.parametrize("name", ["ur5", "panda", "xarm7", "kinova", "go2", "laikago", "iris"])
 def test_a_robot_is_found_again_though_no_name_zero_sense_and_base_is_left(name: str) -> None:
     a = robot(name)
     b = urdfkin.load(to_urdf(pairs.renamed(pairs.everything(a.tree))), verify=False)

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Lines of a kind that are shown unless all are asked for.
 SHOWN = 12
+#: Where models differ and names did not say which joints are each other's.
+GUESSED = "by how joints lie, since names do not tell; if other pairs are meant, --map says so"
 HEADS = ("frame", "at least", "at most", "turned at most")
 
 
@@ -73,6 +75,8 @@ def renamed(found: Sameness) -> list[str]:
         f"joints of B stand in another order, which their axes allow; taken as {', '.join(names)}"
         for names in found.orders
     ]
+    if joints and not found:
+        joints = [GUESSED, *joints]
     return joints + [f"link {ours} is {theirs}" for ours, theirs in found.links if ours != theirs]
 
 

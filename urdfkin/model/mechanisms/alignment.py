@@ -157,12 +157,16 @@ class Alignment:
         return max(self.a.size, self.b.size, 1e-9)
 
     @property
-    def inner_off(self) -> float:
-        """Metres: the largest disagreement of two axes, or of two links that carry something: no tools."""
+    def inner_off(self) -> tuple[float, float]:
+        """Metres: the least and the largest that two axes are off, or two links that are no tools.
+
+        Of those that are off; 0 where none is.
+        """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         links = [one for one in self.frames if one.a in carry[0] or one.b in carry[1]]
         off = [(step.tilt, step.shift) for step in self.steps] + [(link.tilt, link.shift) for link in links]
-        return max((tilt * self.size + shift for tilt, shift in off), default=0.0)
+        some = [tilt * self.size + shift for tilt, shift in off if tilt or shift]
+        return min(some, default=0.0), max(some, default=0.0)
 
     @property
     def names(self) -> dict[str, str]:
@@ -293,18 +297,22 @@ def _nearly(best: Alignment, given: Mapping[str, str]) -> Alignment:
 
     Where each axis is off by a little, none says which of two ways is meant, as one that agrees would. So
     what is little is taken for nothing, more and more of it, until all agree; with what was free set as that
-    search found it, they are laid on each other once more and all that is little is told.
+    search found it, they are laid on each other once more and all that is little is told. What is off by more
+    is no way chosen wrongly unless something before it is off by less.
     """
-    a, b, off = best.a, best.b, best.inner_off
-    for angle in NEARLY if off else ():
-        if angle * best.size > 0.5 * off:
-            break
+    a, b, (least, most) = best.a, best.b, best.inner_off
+    for angle in NEARLY:
+        if not least < angle * best.size < 0.5 * most:
+            continue
         tolerance = Tolerance(angle, angle * best.size)
         rough = _laid(a, b, given, None, MOST_AHEAD, tolerance, best.base)
-        if rough.inner_off or (len(rough.only_a), len(rough.only_b)) != (len(best.only_a), len(best.only_b)):
+        if rough.inner_off[1] or (len(rough.only_a), len(rough.only_b)) != (
+            len(best.only_a),
+            len(best.only_b),
+        ):
             continue
         exact = _laid(a, b, rough.names, rough.gauge)
-        return exact if exact.inner_off < 0.5 * off else best
+        return exact if exact.inner_off[1] < 0.5 * most else best
     return best
 
 
@@ -398,9 +406,8 @@ class _Walk:
         for X in laid(self.a, self.b, base):
             place = _Place(base, (None, None), -1, IDENTITY, X)
             scored.append((0.0, place, self._score(place)))
-        for _, place, score in scored:
-            if not _better(_best_of(scored)[2], score):
-                yield place.XC
+        best = _best_of(scored)[2] if scored else (0, 0.0)
+        yield from (place.XC for _, place, score in scored if not _better(best, score))
 
     # -- the walk ------------------------------------------------------------------------------------
 

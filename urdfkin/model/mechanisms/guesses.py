@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import pi, remainder
 from typing import TypeVar
@@ -85,14 +85,19 @@ def behind(
 def laid(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
     """Where B's root may stand for its axes to lie on A's: first axis on first, then by those behind it.
 
-    What is left free is a turn about the first axis and a slide along it.
+    What is left free is a turn about the first axis and a slide along it. Where nothing is behind, as of a
+    rotor, those beside it tell.
     """
-    for (ours, theirs), near, far in _firsts((a, b), (None, None), bodies, ()):
+    firsts = _firsts((a, b), (None, None), bodies, ())
+    for (ours, theirs), near, far in firsts:
+        seen = far or [
+            (replace(one, seen=ours.screw), replace(other, seen=theirs.screw)) for (one, other), *_ in firsts
+        ]
         for start in (theirs.screw, theirs.screw.reversed()):
             K = between(start, ours.screw, turns=True)[0]
-            for turn in _guesses(ours.screw, [*near, *far], K, turns=True):
+            for turn in _guesses(ours.screw, [*near, *seen], K, turns=True):
                 X = along(ours.screw, turn, turns=True) @ K
-                for way in _guesses(ours.screw, far, X, turns=False):
+                for way in _guesses(ours.screw, seen, X, turns=False):
                     yield along(ours.screw, way, turns=False) @ X
 
 
