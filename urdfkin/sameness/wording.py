@@ -10,7 +10,7 @@ from urdfkin.dh.units import units_of
 from urdfkin.kinematics.rotation.euler import rpy_of
 from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step
 from urdfkin.model.mechanisms.conversion import Conversion
-from urdfkin.model.mechanisms.mechanism import Tolerance
+from urdfkin.model.mechanisms.mechanism import Tolerance, tolerance_of
 from urdfkin.model.mechanisms.variables import Variables, limits
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
 from urdfkin.sameness.result import Difference, angle, length
@@ -96,7 +96,7 @@ def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...
         (len(found.path(i)), _of_step(found, variables, i)) for i in range(len(found.steps))
     ]
     placed += [
-        (len(found.path(frame.previous)) + 0.5, [_of_frame(tree_a, frame)])
+        (len(found.path(frame.previous)) + 0.5, [_of_frame(found, frame)])
         for frame in found.frames
         if frame.differs
     ]
@@ -154,7 +154,8 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
         return [Difference(place, "fixed", f"{place} moves in {moves} and is fixed in {fixed}")]
     some = []
     if step.differs:
-        some.append(Difference(place, *_axis_words(place, step), step.tilt, step.shift))
+        what, said = _axis_words(place, step, tolerance_of(found.a, found.b))
+        some.append(Difference(place, what, said, step.tilt, step.shift))
     for steps, words in (
         (variables.freer_a, "{0} is free in A and follows in B: {2}"),
         (variables.freer_b, "{0} follows in A and is free in B: {1}"),
@@ -171,20 +172,20 @@ def _rule(joint: Joint) -> str:
     return f"{rule.multiplier!r} {rule.leader} {rule.offset:+.17g}" if rule else "free"
 
 
-def _axis_words(place: str, step: Step) -> tuple[str, str]:
-    """The parameter, and the line."""
+def _axis_words(place: str, step: Step, rounding: Tolerance) -> tuple[str, str]:
+    """The parameter, and the line: what of it is more than rounding."""
     if step.kind in ("planar", "floating"):
         return "frame", f"{place}: its plane is tilted by {angle(step.tilt)}"
-    parts = [f"tilted by {angle(step.tilt)}"] if step.tilt > 1e-15 else []
-    parts += [f"{length(step.shift)} off"] if step.shift > 1e-15 else []
+    parts = [f"tilted by {angle(step.tilt)}"] if step.tilt > rounding.angle else []
+    parts += [f"{length(step.shift)} off"] if step.shift > rounding.way else []
     alone = " (what hangs on it is not)" if step.other is not step.axis else ""
     return "axis", f"{place}: its axis is {' and '.join(parts)}{alone}"
 
 
-def _of_frame(tree: KinematicTree, frame: FramePair) -> Difference:
-    place = f"link {tree.links[frame.a]}"
-    parts = [f"{length(frame.shift)} off"] if frame.shift > 1e-15 else []
-    parts += [f"turned by {angle(frame.tilt)}"] if frame.tilt > 1e-15 else []
+def _of_frame(found: Alignment, frame: FramePair) -> Difference:
+    place, rounding = f"link {found.a.tree.links[frame.a]}", tolerance_of(found.a, found.b)
+    parts = [f"{length(frame.shift)} off"] if frame.shift > rounding.way else []
+    parts += [f"turned by {angle(frame.tilt)}"] if frame.tilt > rounding.angle else []
     return Difference(
         place, "place", f"{place} is {' and '.join(parts)} on its body", frame.tilt, frame.shift
     )
