@@ -278,6 +278,8 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
 
 def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
     """Joints on one body that share no name taken for each other: arms that mirror each other, say."""
+    if best.only_a or best.only_b:  # two robots, which no exchange makes one
+        return best
     tried = set[frozenset[tuple[int, int]]]()
     while (two := next((two for two in best.exchangeable(given) if two not in tried), None)) is not None:
         tried.add(two)
