@@ -7,7 +7,8 @@ import pytest
 
 import urdfkin
 from tests.sameness.pairs import changed, robot
-from urdfkin.model.mechanisms.alignment import FramePair, align
+from urdfkin.model.mechanisms.aligning import align
+from urdfkin.model.mechanisms.alignment import FramePair
 from urdfkin.model.mechanisms.upper import FINE, behind_first, upper_bounds
 from urdfkin.model.mechanisms.variables import variables_of
 from urdfkin.sameness.boxes import Boxes, tightened

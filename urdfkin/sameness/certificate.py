@@ -10,7 +10,8 @@ import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.mechanisms.alignment import Alignment, FramePair, Gauge, align
+from urdfkin.model.mechanisms.aligning import align
+from urdfkin.model.mechanisms.alignment import Alignment, FramePair, Gauge
 from urdfkin.model.mechanisms.conversion import Conversion, is_pose
 from urdfkin.model.mechanisms.rigid import apart
 from urdfkin.model.mechanisms.upper import COARSE, FINE, upper_bounds

@@ -15,7 +15,8 @@ from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.demands import whole_number
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.loading import load
-from urdfkin.model.mechanisms.alignment import AS_WRITTEN, Alignment, FramePair, align
+from urdfkin.model.mechanisms.aligning import align
+from urdfkin.model.mechanisms.alignment import AS_WRITTEN, Alignment, FramePair
 from urdfkin.model.mechanisms.mechanism import Mechanism, Tolerance, tolerance_of
 from urdfkin.model.mechanisms.rigid import apart
 from urdfkin.model.mechanisms.upper import FINE, upper_bounds

@@ -16,7 +16,8 @@ import numpy as np
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.to_tree import free_tree, link_names
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.mechanisms.alignment import AS_WRITTEN, align
+from urdfkin.model.mechanisms.aligning import align
+from urdfkin.model.mechanisms.alignment import AS_WRITTEN
 from urdfkin.model.mechanisms.mechanism import Mechanism, tolerance_of
 from urdfkin.model.mechanisms.upper import FINE, upper_bounds
 from urdfkin.model.mechanisms.variables import variables_of

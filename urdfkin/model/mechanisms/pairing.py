@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, Tolerance, between_lines
-from urdfkin.model.mechanisms.rigid import apart
 from urdfkin.model.tree import FloatArray, JointKind
 
 Pair = tuple[Edge, Edge]
@@ -28,7 +29,8 @@ class Pairing:
 
     def __init__(self, a: Mechanism, b: Mechanism, given: Mapping[str, str], tolerance: Tolerance) -> None:
         self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
-        self._signatures: dict[tuple[int, int, int], str] = {}
+        self._named = {name for pair in given.items() for name in pair}
+        self._signatures: dict[tuple[bool, int, int], str] = {}
 
     def links(self, body_a: int, body_b: int) -> list[tuple[int, int]]:
         """Links of one name on two bodies."""
@@ -58,13 +60,11 @@ class Pairing:
                 pairs.append((e, f))
                 left_a.remove(e)
                 left_b.remove(f)
-        named = {name for pair in self.given.items() for name in pair}
         rest = sorted(
-            (self._unlikeness(bodies, e, f, G, XC), i, j)
-            for i, e in enumerate(left_a)
-            for j, f in enumerate(left_b)
-            if family(self.a.joint(e).kind) == family(self.b.joint(f).kind)
-            and not {self.a.joint(e).name, self.b.joint(f).name} & named
+            (self._unlikeness(one, other), i, j)
+            for i, one in self._standing(self.a, bodies[0], left_a, G)
+            for j, other in self._standing(self.b, bodies[1], left_b, XC)
+            if one.kind == other.kind
         )
         taken_a, taken_b = set[int](), set[int]()
         for _, i, j in rest:
@@ -90,40 +90,66 @@ class Pairing:
                 if links & {self.b.tree.links[k] for k in self.b.bodies[f.beyond(bodies[1])]}:
                     yield e, f
 
-    def _unlikeness(
-        self, bodies: tuple[int, int], e: Edge, f: Edge, G: FloatArray, XC: FloatArray
-    ) -> tuple[bool, float, float]:
-        """Of shape, then of axes, then, where axes lie on one line, of where they point and stand on it."""
-        other_shape = self._signature(0, bodies[0], e) != self._signature(1, bodies[1], f)
-        angle, way = self.mismatch(e, f, G, XC)
-        off = 0.0 if self._tolerance.holds(angle, way) else angle * max(self.a.size, 1e-9) + way
-        _, place = apart(G @ self.a.homes[e.joint + 1], XC @ self.b.homes[f.joint + 1])
-        s, t = self.a.screw(e).moved(G), self.b.screw(f).moved(XC)
-        return other_shape, off, place + self.a.size * bool(s.direction @ t.direction < 0.0)
+    def _standing(
+        self, mechanism: Mechanism, body: int, edges: list[Edge], T: FloatArray
+    ) -> list[tuple[int, _Standing]]:
+        """The joints that no given name tells about, moved by T."""
+        return [
+            (i, _Standing.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
+            for i, edge in enumerate(edges)
+            if mechanism.joint(edge).name not in self._named
+        ]
 
-    def _signature(self, which: int, body: int, edge: Edge) -> str:
+    def _unlikeness(self, one: _Standing, other: _Standing) -> tuple[bool, float, float]:
+        """Of shape, then of axes, then, where axes lie on one line, of where they point and stand on it."""
+        angle, way = one.mismatch(other)
+        off = 0.0 if self._tolerance.holds(angle, way) else angle * max(self.a.size, 1e-9) + way
+        place = math.dist(one.place, other.place)
+        points_back = bool(one.screw.direction @ other.screw.direction < 0.0)
+        return one.shape != other.shape, off, place + self.a.size * points_back
+
+    def _signature(self, mechanism: Mechanism, body: int, edge: Edge) -> str:
         """What hangs on a joint, joints' kinds alone."""
-        mechanism = (self.a, self.b)[which]
-        if (known := self._signatures.get((which, body, edge.joint))) is None:
+        key = mechanism is self.a, body, edge.joint
+        if (known := self._signatures.get(key)) is None:
             beyond = edge.beyond(body)
             below = sorted(
-                self._signature(which, beyond, other)
+                self._signature(mechanism, beyond, other)
                 for other in mechanism.edges_of[beyond]
                 if other is not edge
             )
             known = f"({family(mechanism.joint(edge).kind)}{''.join(below)})"
-            self._signatures[which, body, edge.joint] = known
+            self._signatures[key] = known
         return known
 
     def mismatch(self, e: Edge, f: Edge, G: FloatArray, XC: FloatArray) -> tuple[float, float]:
         """How far (rad, m) the axes of two joints lie apart as lines, whichever way they point."""
-        kind = family(self.a.joint(e).kind)
-        if kind != family(self.b.joint(f).kind):
+        ours, theirs = _Standing.of(self.a, e, G), _Standing.of(self.b, f, XC)
+        return ours.mismatch(theirs) if ours.kind == theirs.kind else (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Standing:
+    """A joint where it stands: how it moves, what hangs on it, its axis, its frame's place, and Z axis."""
+
+    kind: str
+    shape: str
+    screw: Screw
+    place: list[float]
+    normal: FloatArray
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, shape: str = "") -> _Standing:
+        """The joint of an edge, moved by T."""
+        pose = T @ mechanism.homes[edge.joint + 1]
+        screw = mechanism.screw(edge).moved(T)
+        return cls(family(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
+
+    def mismatch(self, other: _Standing) -> tuple[float, float]:
+        """How far (rad, m) its axis lies from that of a joint of its kind."""
+        if self.kind == "floating":  # goes anywhere, wherever it counts from
             return 0.0, 0.0
-        if kind == "floating":  # goes anywhere, wherever it counts from
-            return 0.0, 0.0
-        if kind == "planar":
-            normals = (T[:3, 2] for T in (G @ self.a.homes[e.joint + 1], XC @ self.b.homes[f.joint + 1]))
-            return between_lines(*(Screw(normal, normal) for normal in normals), placed=False)
-        s, t = self.a.screw(e).moved(G), self.b.screw(f).moved(XC)
-        return between_lines(s, t, placed=kind == "turns")
+        if self.kind == "planar":
+            normals = (Screw(one.normal, one.normal) for one in (self, other))
+            return between_lines(*normals, placed=False)
+        return between_lines(self.screw, other.screw, placed=self.kind == "turns")
