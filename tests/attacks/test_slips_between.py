@@ -75,6 +75,8 @@ FRAGMENTS = [
      "order = sorted(range(len(links)), key=lambda place: -anchors[links[place]].step)"),
     ("kinematics.rotation.aligning", "return", "return -"),
     # a table's URDF
+    ("model.tree", "return self in (JointKind.REVOLUTE, JointKind.CONTINUOUS)",
+     "return self not in (JointKind.REVOLUTE, JointKind.CONTINUOUS)"),
     ("dh.to_tree", "ways = [s @ x for s, x", "ways = [x @ s for s, x"),
     ("dh.to_tree", "poses[-1] @ table.tool\n", "table.tool @ poses[-1]\n"),
     ("urdf.writer", "numbers(rpy_of(T[:3, :3]))", "numbers(rpy_of(T[:3, :3])[::-1])"),

@@ -275,7 +275,7 @@ def test_without_descriptors_a_robot_is_verified_or_said_not_to_be(descriptors: 
         "validate", "double_pendulum", "ur5", "--isolate", "--jobs", "2", "--samples", "2",
         preexec_fn=_limited(descriptors),
     )  # fmt: skip
-    verified = sum(line.endswith("verified ") and "not" not in line for line in done.stdout.splitlines())
+    verified = sum(line.endswith("verified") and "not" not in line for line in done.stdout.splitlines())
     assert (done.returncode == 0) == (verified == 2), done.stdout + done.stderr
     assert done.returncode in (0, 2, 3, 70)
 

@@ -103,13 +103,9 @@ def _is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 
 
 def _kind(row: DHRow) -> JointKind:
-    if not row.kind.turns:
-        return JointKind.PRISMATIC
-    return (
-        JointKind.REVOLUTE
-        if _is_bounded(row.limit) and row.kind is JointKind.REVOLUTE
-        else JointKind.CONTINUOUS
-    )
+    """By the row's own word, not by whether it turns: that the table's matrices ask, which check the URDF."""
+    unbounded = row.kind is JointKind.REVOLUTE and not _is_bounded(row.limit)
+    return JointKind.CONTINUOUS if unbounded else row.kind
 
 
 def _limit(row: DHRow) -> Limit | None:
