@@ -56,6 +56,17 @@ def test_a_table_like_another_is_the_urdf_to_rounding(tree: KinematicTree, seed:
         assert apart <= 20 * float(table.rounding(q)) + 1e-13
 
 
+def test_a_slides_zero_may_stand_in_the_d_of_a_joint_that_turns_about_its_axis() -> None:
+    rows = [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, "P"], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]]
+    tree = load(table_from_rows(rows, "standard")).tree
+    tip = tree.links[-1]
+    reference = disguised(dh_table(tree, tip), 0)
+    table = dh_table(tree, tip, like=reference)
+    assert [row.alpha for row in table.rows] == pytest.approx([row.alpha for row in reference.rows])
+    q = configurations(4)
+    np.testing.assert_allclose(table.placement(q), chain(tree, tip).placement(q), atol=1e-14)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(references()) - {"kinova"}))
 def test_a_vendors_table_comes_out_in_every_cell(name: str) -> None:

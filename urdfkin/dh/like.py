@@ -9,6 +9,7 @@ way, and its frame 0 stands upright as on the sheet.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from urdfkin.dh.compare.agreement import check_joints
 from urdfkin.dh.compare.align import align
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.derive import Choices, derive
-from urdfkin.dh.row import Convention
+from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.errors.questions import Question
@@ -77,7 +78,7 @@ def _unlike(found: DHTable, there: DHTable, reach: float) -> tuple[float, float,
         if i < n - 1:  # base and tool take up what leads to the first axis and away from the last
             placed = row.kind.turns and found.rows[i + 1].kind.turns
             cells = max(cells, abs(_angle(row.alpha, other.alpha)), abs(row.a - other.a) / reach * placed)
-        if 0 < i < n - 1 and row.kind.turns:
+        if 0 < i < n - 1 and row.kind.turns and not _slides_along(found.rows, i):
             cells = max(cells, abs(row.d - other.d) / reach)
         zeros += abs(_angle(row.theta, other.theta)) > _OTHER
         zeros += row.d * other.d < 0.0
@@ -86,6 +87,12 @@ def _unlike(found: DHTable, there: DHTable, reach: float) -> tuple[float, float,
         for mine, theirs in ((found.base, there.base), (found.tool, there.tool))
     )
     return round(cells, 2), zeros, ends, sum(row.sense < 0 for row in found.rows)
+
+
+def _slides_along(rows: Sequence[DHRow], i: int) -> bool:
+    """Whether the joint before or after slides along a joint's axis: then d is a matter of its zero."""
+    beside = [(i - 1, i - 1), (i + 1, i)]
+    return any(not rows[k].kind.turns and abs(math.sin(rows[twist].alpha)) <= _OTHER for k, twist in beside)
 
 
 def _angle(one: float, other: float) -> float:
