@@ -20,9 +20,8 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.to_tree import UNBOUNDED_SLIDE
 from urdfkin.errors import InputError
-from urdfkin.errors.showing import NOISE
 from urdfkin.kinematics.rotation import exp_rotation
-from urdfkin.kinematics.rotation.nearest import polar_factor
+from urdfkin.kinematics.rotation.nearest import ROUNDED, polar_factor
 from urdfkin.kinematics.roundings import EPS, ROW
 from urdfkin.model.chain import FrameChain, motion_about_z
 from urdfkin.model.coupling import Coupling, coupling_of
@@ -181,7 +180,7 @@ def _rigid(M: FloatArray) -> FloatArray:
     if np.abs(R.T @ R - np.eye(3)).max() > _WRITTEN or np.linalg.det(R) < 0:
         raise InputError("M must be a rotation and a translation", where="M", found=str(R.tolist()))
     nearest = polar_factor(R)
-    if np.abs(nearest - R).max() > NOISE:
+    if np.abs(nearest - R).max() > ROUNDED:
         T[:3, :3] = nearest
     return T
 

@@ -22,8 +22,7 @@ from urdfkin.dh.written_row import ORDER
 from urdfkin.errors import InputError
 from urdfkin.errors.measured import UNITS
 from urdfkin.errors.printable import from_csv_cell
-from urdfkin.errors.showing import NOISE
-from urdfkin.kinematics.rotation.nearest import polar_factor
+from urdfkin.kinematics.rotation.nearest import ROUNDED, polar_factor
 
 #: How far a rotation that was printed with six digits is from one; what is farther was meant otherwise.
 _PRINTED = 1e-5
@@ -282,7 +281,7 @@ def _rigid(rows: list[list[float]]) -> list[list[float]]:
     """A pose that was printed with some digits: its rotation is the nearest one."""
     pose = np.array(rows)
     off = polar_factor(pose[:3, :3]) - pose[:3, :3]
-    if NOISE < np.abs(off).max() < _PRINTED:
+    if ROUNDED < np.abs(off).max() < _PRINTED:
         pose[:3, :3] += off
     return [[float(number) for number in row] for row in pose]
 

@@ -13,6 +13,9 @@ from numpy.typing import ArrayLike
 
 from urdfkin.kinematics.inputs import FloatArray, rotations
 
+#: A matrix whose entries are no farther than this from a rotation's is one to rounding, and stays as it is.
+ROUNDED = 1e-15
+
 
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     """The nearest rotation, to rounding.
