@@ -35,6 +35,7 @@ typedef @UP@_REAL real;
 
 /* Eight numbers at once: from eight rows of memory to eight columns, and back. */
 #if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12)) && !defined(@UP@_PORTABLE)
+#ifdef __AVX512F__
 typedef real eight __attribute__((vector_size(8 * sizeof(real))));
 typedef real anywhere __attribute__((vector_size(8 * sizeof(real)), aligned(sizeof(real)), may_alias));
 INLINE void get(eight *x, const real *from) { *x = *(const anywhere *)from; }
@@ -58,6 +59,42 @@ INLINE void exchange_4(eight *x, eight *y)
     *x = __builtin_shufflevector(one, other, 0, 1, 2, 3, 8, 9, 10, 11);
     *y = __builtin_shufflevector(one, other, 4, 5, 6, 7, 12, 13, 14, 15);
 }
+#else
+/* Where a register holds four at the most, fours change places by their names alone. */
+typedef real four __attribute__((vector_size(4 * sizeof(real))));
+typedef real anywhere __attribute__((vector_size(4 * sizeof(real)), aligned(sizeof(real)), may_alias));
+typedef struct { four half[2]; } eight;
+INLINE void get(eight *x, const real *from)
+{
+    for (int h = 0; h < 2; ++h) x->half[h] = *(const anywhere *)(from + 4 * h);
+}
+INLINE void put(real *to, const eight *x)
+{
+    for (int h = 0; h < 2; ++h) *(anywhere *)(to + 4 * h) = x->half[h];
+}
+INLINE void exchange_1(eight *x, eight *y)
+{
+    for (int h = 0; h < 2; ++h) {
+        const four one = x->half[h], other = y->half[h];
+        x->half[h] = __builtin_shufflevector(one, other, 0, 4, 2, 6);
+        y->half[h] = __builtin_shufflevector(one, other, 1, 5, 3, 7);
+    }
+}
+INLINE void exchange_2(eight *x, eight *y)
+{
+    for (int h = 0; h < 2; ++h) {
+        const four one = x->half[h], other = y->half[h];
+        x->half[h] = __builtin_shufflevector(one, other, 0, 1, 4, 5);
+        y->half[h] = __builtin_shufflevector(one, other, 2, 3, 6, 7);
+    }
+}
+INLINE void exchange_4(eight *x, eight *y)
+{
+    const four low = y->half[0];
+    y->half[0] = x->half[1];
+    x->half[1] = low;
+}
+#endif
 /* Loops that compilers unroll, so that x lies in registers. */
 INLINE void transpose(eight *x)
 {

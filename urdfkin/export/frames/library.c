@@ -1,5 +1,5 @@
 #include <stdint.h>
-#ifdef __AVX512F__
+#ifdef __SSE2__
 #include <immintrin.h>
 #endif
 
@@ -7,25 +7,42 @@
    together on their way past the caches (0: they go at once), stand in a row of whole numbers. 0, or 1 where an
    input is not finite. */
 
-/* Of so many times eight numbers: 0 x is 0, or no number. Four sums, of which none waits for another. It brings
+/* What one register holds, and how it goes past the caches. */
+#if defined(__AVX512F__)
+#define PIECE 8
+#define LOAD _mm512_loadu_pd
+#define STREAM _mm512_stream_pd
+#elif defined(__AVX__)
+#define PIECE 4
+#define LOAD _mm256_loadu_pd
+#define STREAM _mm256_stream_pd
+#else
+#define PIECE 2
+#define LOAD _mm_loadu_pd
+#define STREAM _mm_stream_pd
+#endif
+
+/* Of so many times LANES numbers: 0 x is 0, or no number. Four sums, of which none waits for another. It brings
    near what is computed with next. */
 #define SUMS 4
-typedef double numbers __attribute__((vector_size(8 * sizeof(double)), aligned(sizeof(double)), may_alias));
+typedef double numbers __attribute__((vector_size(PIECE * sizeof(double)), aligned(sizeof(double)), may_alias));
 INLINE void look(size_t count, const double *x, numbers *bad)
 {
     const numbers *at = (const numbers *)x;
-    for (; count >= SUMS; count -= SUMS, at += SUMS)
+    count *= LANES / PIECE;
+    for (size_t i = 0; i < count / SUMS; ++i, at += SUMS)
         for (int k = 0; k < SUMS; ++k) bad[k] += 0.0 * at[k];
-    for (size_t k = 0; k < count; ++k) bad[k] += 0.0 * at[k];
+    for (size_t k = 0; k < count % SUMS; ++k) bad[k] += 0.0 * at[k];
 }
 
-/* Past the caches: a line that is written whole is not read before. */
+/* A line that is written whole is not read before. */
 INLINE void stream(const double *x, size_t count, double *out)
 {
     size_t i = 0;
-#ifdef __AVX512F__
+#ifdef __SSE2__
     for (; i < count && (uintptr_t)(out + i) % 64; ++i) out[i] = x[i];
-    for (; i + 8 <= count; i += 8) _mm512_stream_pd(out + i, _mm512_loadu_pd(x + i));
+    for (; i + 8 <= count; i += 8)
+        for (size_t k = i; k < i + 8; k += PIECE) STREAM(out + k, LOAD(x + k));
 #endif
     for (; i < count; ++i) out[i] = x[i];
 }
@@ -56,11 +73,11 @@ int64_t task(const int64_t *places)
         one(@passed@, out);
     else
         @title@_@name@_batch(n, @passed@, out);
-#ifdef __AVX512F__
+#ifdef __SSE2__
     _mm_sfence();
 #endif
     int64_t found = 0;
     for (int i = 0; i < SUMS; ++i)
-        for (int k = 0; k < LANES; ++k) found |= bad[i][k] != 0.0;
+        for (int k = 0; k < PIECE; ++k) found |= bad[i][k] != 0.0;
     return found;
 }
