@@ -2,10 +2,10 @@
 
 The chapter's equations run once on CasADi's symbols, so that the robot's constants are folded in and
 products with 0 and 1 are gone. CasADi writes what is left as straight-line C, which the system's compiler
-makes machine code of, a number being eight doubles in one register (`generated.c`). It reads and writes the
-arrays that everyone reads and writes: turning them over is included, sine and cosine too. What it leaves out
-is looking at its inputs, so that a number that is not finite, or an angle of a million turns, gives nonsense,
-and what urdfkin does for a sine's and a cosine's last digit.
+makes machine code of, a number being as many doubles as one register holds (`generated.c`). It reads and
+writes the arrays that everyone reads and writes: turning them over is included, sine and cosine too. What it
+leaves out is looking at its inputs, so that a number that is not finite, or an angle of a million turns,
+gives nonsense, and what urdfkin does for a sine's and a cosine's last digit.
 """
 
 from __future__ import annotations

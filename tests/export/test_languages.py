@@ -71,6 +71,8 @@ def test_a_small_robots_file_does_so_in_every_reference(to: str, tmp_path: Path)
     [
         ("gcc", ["-std=c99", "-O1"]),
         ("clang", ["-std=c99", "-O1"]),
+        # What it is where a register holds eight: the compiler makes do with smaller ones here.
+        ("gcc", ["-std=c99", "-O1", "-D__AVX512F__", "-Wno-psabi"]),
         ("gcc", ["-std=c11", "-O3", "-march=native", "-ffp-contract=fast"]),
     ],
 )
