@@ -281,7 +281,7 @@ def test_the_command_serves_until_it_is_interrupted(tmp_path: Path) -> None:
         try:
             assert process.stdout is not None
             line = next(line for line in process.stdout if "planar_two_link: http" in line)
-            with urlopen(line.split(": ", 1)[1].strip()) as answer:
+            with urlopen(line.split(": ", 1)[1].strip(), timeout=60) as answer:
                 assert answer.status == 200
             process.send_signal(signal.SIGINT)
             assert process.wait(timeout=30) == 0
