@@ -137,6 +137,9 @@ def main() -> None:
     """
     streams.prepare()
     guard()
+    # The matrices are small here: a thread for each processor costs more than it brings. NumPy's OpenBLAS
+    # reads this when it is imported.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if os.environ.get("_URDFKIN_COMPLETE"):  # while a key is pressed, nothing that fails is worth a line
         sys.stderr = io.StringIO()
     # The line under a result says that it was not verified, and why; once is enough.
