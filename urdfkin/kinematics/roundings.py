@@ -119,6 +119,8 @@ EPS = sys.float_info.epsilon
 SMALLEST = sys.float_info.min
 #: The smallest unit: eps times the smallest normal number, which is the smallest number of all.
 LEAST_UNIT = EPS * SMALLEST
+#: Divides in the place of a 0, where 0 is divided too: less than anything that is measured.
+NOT_ZERO = 1e-300
 
 #: For each joint and each factor, both computations together; derived above.
 ROUNDINGS = 24.0

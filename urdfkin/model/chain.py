@@ -21,6 +21,9 @@ from urdfkin.model.coupling import Coupling, coupling_of
 from urdfkin.model.given import Given
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, frozen
 
+#: Metres that a robot counts as large at least: what stands on one spot has a size to divide by, too.
+LEAST_SIZE = 1e-9
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainJoint:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.chain import inverse
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import FloatArray
@@ -89,6 +90,6 @@ def _drawn(
     flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.ones(2))
-    scale = 2.0 * HALF * FILLED / max(float((high - low).max()), 1e-300)
+    scale = 2.0 * HALF * FILLED / max(float((high - low).max()), NOT_ZERO)
     placed = [np.round((x - (low + high) / 2.0) * scale, 1).reshape(-1, 4).tolist() for x in flat]
     return {"title": title, "a": placed[0], "b": placed[1], "gap": placed[2], "half": HALF}

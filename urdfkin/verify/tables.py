@@ -32,7 +32,7 @@ from urdfkin.dh.noise import left_out
 from urdfkin.dh.snapping import LARGEST_TOLERANCE, rotation_angle
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
-from urdfkin.kinematics.roundings import EPS, of_joints, of_rows
+from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints, of_rows
 from urdfkin.model.chain import chain
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -192,7 +192,7 @@ def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, floa
 
 def _worst(found: FloatArray, unit: FloatArray | float) -> float:
     """The largest ratio; nothing over nothing is zero."""
-    return float((found / np.maximum(unit, 1e-300)).max(initial=0.0))
+    return float((found / np.maximum(unit, NOT_ZERO)).max(initial=0.0))
 
 
 @dataclass(frozen=True, slots=True)

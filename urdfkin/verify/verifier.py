@@ -17,7 +17,7 @@ from urdfkin.compiled.plan import IntArray
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.tree_parameters import TreeParameters
 from urdfkin.errors import RangeError
-from urdfkin.kinematics.roundings import EPS, of_joints
+from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.versions import own_version
@@ -266,7 +266,7 @@ class Verifier:
         error = np.abs(ours - theirs)[..., :3, :]
         reach = parameters.reach(q)
         units = max(
-            float((error[..., 3].max(axis=-1) / np.maximum(EPS * reach, 1e-300)).max(initial=0.0)),
+            float((error[..., 3].max(axis=-1) / np.maximum(EPS * reach, NOT_ZERO)).max(initial=0.0)),
             float(error[..., :3].max(initial=0.0)) / EPS,
         )
         line = (

@@ -12,7 +12,7 @@ from urdfkin.dh.compare.align import Alignment, align
 from urdfkin.dh.compare.fit import CELLS, Model, columns, fit_cells, hidden_cells
 from urdfkin.dh.compare.freedoms import fit_freedoms
 from urdfkin.dh.compare.proof import most_apart
-from urdfkin.dh.compare.result import CellDifference, Comparison, TakenUp
+from urdfkin.dh.compare.result import EXPLAINED, CellDifference, Comparison, TakenUp
 from urdfkin.dh.convert import to_standard
 from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.dh.row import Convention
@@ -20,14 +20,26 @@ from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import EPS, of_a_fit
-from urdfkin.model.chain import FrameChain
-from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.model.chain import LEAST_SIZE, FrameChain
+from urdfkin.model.tree import FloatArray, JointKind, Limit
 
 #: Metres at the tip up to which a table agrees: half as much again as rounding to 0.1 mm in a cell or two.
 TOLERANCE = 2e-4
+#: How many configurations a fit is made on, how many it is judged on, and their seeds: never the same ones.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
+_FIT_SEED, _CHECK_SEED = 1, 2
 #: Patterns of signs that are fitted, and kept at each joint, where a size will do.
 _HASTY = (3, 16)
+#: Of what the tip is off: cells, or another pattern of signs, that leave more explain nothing.
+_EXPLAINS = 0.5
+#: Metres for each metre of reach: a fit that is off by less is at rounding, and nothing better is looked for.
+_AT_ROUNDING = 1e-12
+#: Likewise: a cell that moved by less did not, being a tenth of what `EXPLAINED` leaves.
+_MOVED = 1e-10
+#: Of the way along a robot's links: a tip that goes no farther stands still, and says nothing of how far.
+_STANDS = 1e-6
+#: Metres between which a slide without limits is tried.
+_SLIDE = (-0.5, 0.5)
 #: Of each row, half a unit of the last digit with which its cells were written, metres and radians.
 Digits = Sequence[Mapping[str, float]]
 
@@ -55,12 +67,12 @@ def compare(
     """
     check_joints(chain, reference)
     standard = to_standard(reference) if reference.convention is Convention.MODIFIED else reference
-    tried, wanted = _samples(chain, FIT_SAMPLES, 1)
+    tried, wanted = _samples(chain, FIT_SAMPLES, _FIT_SEED)
     scale = _reach(chain, wanted)
     written = _written(standard)
     fitted = _best_fit(chain, standard, written, tried, wanted, scale) if fit else written
     complete = fit_cells(fitted, tried, wanted, scale, _cells_of(reference), free=fit)
-    values, there = _samples(chain, CHECK_SAMPLES, 2)
+    values, there = _samples(chain, CHECK_SAMPLES, _CHECK_SEED)
     off, residual = _off(fitted, written, values, there), _apart(complete, values, there)[0]
     cells = _differences(chain, reference, fitted, complete, values, scale, digits, fit)
     table = _fitted_table(chain, standard, fitted)
@@ -73,8 +85,7 @@ def compare(
         offsets=_offsets(standard, fitted),
         base=_taken_up(written.base, fitted.base),
         tool=_taken_up(written.tool, fitted.tool),
-        # Cells that leave half of it explain nothing, and are not blamed.
-        differences=cells if residual <= max(0.5 * off["metres"], 1e-9 * scale) else (),
+        differences=cells if residual <= max(_EXPLAINS * off["metres"], EXPLAINED * scale) else (),
         instead=(),
         hidden=_hidden(reference, fitted, values, scale) if fit else (),
         residual=residual,
@@ -104,11 +115,11 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
     """
     check_joints(chain, reference)
     standard = to_standard(reference) if reference.convention is Convention.MODIFIED else reference
-    tried, wanted = _samples(chain, FIT_SAMPLES, 1)
+    tried, wanted = _samples(chain, FIT_SAMPLES, _FIT_SEED)
     model = _best_fit(
         chain, standard, _written(standard), tried, wanted, _reach(chain, wanted), enough, hasty=True
     )
-    return _apart(model, *_samples(chain, CHECK_SAMPLES, 2))
+    return _apart(model, *_samples(chain, CHECK_SAMPLES, _CHECK_SEED))
 
 
 def _off(fitted: Model, written: Model, values: FloatArray, there: FloatArray) -> dict[str, float]:
@@ -125,7 +136,7 @@ def _reach(chain: FrameChain, wanted: FloatArray) -> float:
     """
     tips = wanted[:, :3, 3]
     across = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
-    return max(min(chain.reach, across) if across > 1e-6 * chain.reach else chain.reach, 1e-9)
+    return max(min(chain.reach, across) if across > _STANDS * chain.reach else chain.reach, LEAST_SIZE)
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
@@ -179,10 +190,10 @@ def _best_fit(
     for start in _starts(chain, standard, written, *(_HASTY if hasty else ())):
         # Least squares make the sum small. The worst sample is what counts: there the start may be better.
         model = min(fit_freedoms(start, values, wanted, scale, turns=not hasty), start, key=size)
-        needed = 1.0 if start is written else 0.5
+        needed = 1.0 if start is written else _EXPLAINS
         if (its_size := size(model)) < needed * best_size:
             best, best_size = model, its_size
-        if best_size <= max(enough, 1e-12 * scale):
+        if best_size <= max(enough, _AT_ROUNDING * scale):
             break
     return _ends_gathered(best, written)
 
@@ -245,9 +256,9 @@ def _slides(chain: FrameChain) -> dict[str, tuple[float, float]]:
     return {joint.name: _slide(joint.limit) for joint in chain.joints if not joint.kind.turns}
 
 
-def _slide(limit: object) -> tuple[float, float]:
-    lower, upper = getattr(limit, "lower", -0.5), getattr(limit, "upper", 0.5)
-    return (lower, upper) if math.isfinite(lower) and math.isfinite(upper) and lower < upper else (-0.5, 0.5)
+def _slide(limit: Limit | None) -> tuple[float, float]:
+    lower, upper = (limit.lower, limit.upper) if limit else _SLIDE
+    return (lower, upper) if math.isfinite(lower) and math.isfinite(upper) and lower < upper else _SLIDE
 
 
 def _apart(model: Model, values: FloatArray, wanted: FloatArray) -> tuple[float, float]:
@@ -316,7 +327,7 @@ def _differences(
             change = float(complete.cells[i, k] - row[k])
             size = abs(change) * (1.0 if cell in "da" else scale)
             at = _cell_at(reference, i, cell)
-            if (free and k == _own(fitted, i)) or size <= 1e-10 * scale or at >= len(reference.rows):
+            if (free and k == _own(fitted, i)) or size <= _MOVED * scale or at >= len(reference.rows):
                 continue
             value = getattr(reference.rows[at], cell)
             effect = float(linear[5 * i + k] * size)
@@ -330,11 +341,11 @@ def _instead(
     chain: FrameChain, reference: DHTable, written: Model, found: Comparison, digits: Digits
 ) -> tuple[CellDifference, ...]:
     """The cells that would have to change if nothing were fitted, where that is an explanation."""
-    tried, wanted = _samples(chain, FIT_SAMPLES, 1)
-    values, there = _samples(chain, CHECK_SAMPLES, 2)
+    tried, wanted = _samples(chain, FIT_SAMPLES, _FIT_SEED)
+    values, there = _samples(chain, CHECK_SAMPLES, _CHECK_SEED)
     complete = fit_cells(written, tried, wanted, found.reach, _cells_of(reference), free=False)
     metres, radians = _apart(complete, values, there)
-    if metres > 1e-9 * found.reach or radians > 1e-9:
+    if metres > EXPLAINED * found.reach or radians > EXPLAINED:
         return ()
     cells = _differences(chain, reference, written, complete, values, found.reach, digits, False)
     return cells if len(cells) <= len(found.differences) + 2 else ()

@@ -18,13 +18,17 @@ from urdfkin.dh.elements import along_axis
 from urdfkin.dh.normals import FAR_FEET, NEARLY_PARALLEL, NearParallel, Step, step_between
 from urdfkin.dh.row import DHRow
 from urdfkin.dh.table import DHTable
-from urdfkin.model.chain import FrameChain
+from urdfkin.model.chain import LEAST_SIZE, FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Sign patterns that are kept at each joint.
-BEAM = 128
+#: Sign patterns that are handed out, and that are kept at each joint.
+PATTERNS, BEAM = 12, 128
 #: Each reversed joint costs this much (metres), so that equal fits keep the URDF's senses.
 REVERSAL = 1e-9
+#: What is left of a difference where an axis slides, and where it is drawn counts only between equals.
+_SLIDING = 1e-3
+#: Metres: an offset between axes that is smaller counts as none, and leaves x free.
+_NO_OFFSET = 1e-5
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
 
@@ -65,12 +69,12 @@ class _Partial:
     absorber: tuple[int, float] | None = None
 
 
-def align(chain: FrameChain, reference: DHTable, count: int = 12, beam: int = BEAM) -> list[Alignment]:
+def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[Alignment]:
     """The sign patterns closest to a standard reference table with as many joints of the same kinds.
 
     Sliding joints leave patterns that cells cannot tell apart; the fit can, so up to `count` are returned.
     """
-    reach = max(chain.reach, reference.span, 1e-9)
+    reach = max(chain.reach, reference.span, LEAST_SIZE)
     n = len(reference.rows)
     partials = [_first(sense) for sense in (1, -1)]
     for i in range(n - 1):
@@ -113,10 +117,9 @@ def _extend(
         theta, d = candidate.phi_in + step.phi, candidate.carry + step.delta
         cost = candidate.cost + REVERSAL * (sense < 0)
         cost += reach * (_apart(step.alpha, row.alpha) + abs(step.beta - row.beta))
-        # A sliding axis has no place of its own: where it is drawn counts only between equals.
-        cost += abs(step.a - row.a) * (1.0 if turns[i] and turns[i + 1] else 1e-3)
+        cost += abs(step.a - row.a) * (1.0 if turns[i] and turns[i + 1] else _SLIDING)
         if i > 0 and turns[i]:
-            cost += abs(d - row.d) * (1.0 if turns[i - 1] and turns[i + 1] else 1e-3)
+            cost += abs(d - row.d) * (1.0 if turns[i - 1] and turns[i + 1] else _SLIDING)
         if not turns[i] and i > 0:
             cost += reach * _apart(theta, row.theta)
         offset = math.remainder(theta - row.theta, 2.0 * math.pi) if turns[i] else d - row.d
@@ -167,7 +170,7 @@ def _steps(
     """A pair taken apart in the ways the reference's may be, with both directions of x.
 
     Axes that are nearly parallel in both are cut by the normal plane too, at the reference's own d. An offset
-    below a hundredth of a millimetre, or of an axis that slides and has no place (not `placed`), counts as
+    of nearly nothing, or of an axis that slides and has no place (not `placed`), counts as
     none: x is free there.
     """
     steps = []
@@ -178,7 +181,7 @@ def _steps(
     if near:
         lifted = A.copy()
         lifted[2, 3] -= delta
-        if math.hypot(lifted[0, 3], lifted[1, 3]) < 1e-5 or not placed:
+        if math.hypot(lifted[0, 3], lifted[1, 3]) < _NO_OFFSET or not placed:
             lifted[:2, 3] = 0.0
         # Without a reach every foot is far, and a pair that is not exactly parallel is cut by the plane.
         cut = step_between(lifted, reach if sine < NEARLY_PARALLEL else 0.0, NearParallel.HAYATI, phi_free)

@@ -15,11 +15,25 @@ import numpy as np
 
 from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
+from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 
 #: Cells in the order in which they act: theta, d, a, alpha, beta.
 CELLS = ("theta", "d", "a", "alpha", "beta")
-_ROUNDS = 40
+#: Radians, and metres for each metre of reach, that one step goes at most.
+LONGEST_STEP = 0.5
+#: Steps at most; by which share one must be better, and by how much all are off when nothing is left.
+_ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
+#: Of the largest singular value: below it freedoms undo each other, and cells what other cells do.
+_FREE, _CELLS = 1e-8, 1e-9
+#: Rounds in which cells are made few, and how small (of the reach) one stays within reach of the next.
+_SPARSER, _STAYS = 25, 1e-9
+#: How much more willingly the last cell changes than the first, of two equally good ones: one is to win.
+_LAST_WINS = 1.2
+#: How willingly beta changes at first, and again in each round: only where alpha will not do.
+_BETA, _BETA_AGAIN = 0.3, 0.5
+#: Of a cell's effect: what freedoms that stand in for it may leave.
+_HIDDEN = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,16 +170,16 @@ def fit_cells(
         poses, freedoms, cells = columns(model, values, scale)
         error = errors(poses, wanted, scale)
         size = float(np.linalg.norm(error))
-        if size < best_size * (1.0 - 1e-9):
+        if size < best_size * (1.0 - _BETTER):
             best, best_size = model, size
-        elif size > 2.0 * best_size or size <= 1e-14 * scale * len(error):
+        elif size > 2.0 * best_size or size <= _SOLVED * scale * len(error):
             break
         cells = cells * cells_of.ravel()
         freedoms = freedoms if free else np.zeros_like(freedoms)
         change = _sparse(model, start, freedoms, cells, error, scale)
         # Axes that nearly coincide let two offsets grow against each other for nothing: cut those off.
-        given = np.linalg.lstsq(freedoms, error - cells @ change, rcond=1e-8)[0]
-        shorten = min(1.0, 0.5 * scale / max(float(np.abs(given).max()), 1e-300))
+        given = np.linalg.lstsq(freedoms, error - cells @ change, rcond=_FREE)[0]
+        shorten = min(1.0, LONGEST_STEP * scale / max(float(np.abs(given).max()), NOT_ZERO))
         model = moved(model, np.asarray(given * shorten, np.float64), scale, change * shorten)
     return best
 
@@ -181,13 +195,14 @@ def _sparse(
     # The freedoms took each row's own variable; a cell that moves nothing else is not asked for anything.
     target = error - Q @ (Q.T @ error) + cells_left @ so_far
     total = np.zeros(cells.shape[1])
-    weights = np.linspace(1.0, 1.2, cells.shape[1])  # of two equally good cells, one is to win
-    weights[4::5] = 0.3  # beta only where alpha will not do
+    weights = np.linspace(1.0, _LAST_WINS, cells.shape[1])
+    betas = slice(CELLS.index("beta"), None, len(CELLS))
+    weights[betas] = _BETA
     turned, square = np.linalg.qr(cells_left)
-    for _ in range(25):
-        total = weights * np.linalg.lstsq(square * weights, turned.T @ target, rcond=1e-9)[0]
-        weights = np.abs(total) + 1e-9 * scale
-        weights[4::5] *= 0.5
+    for _ in range(_SPARSER):
+        total = weights * np.linalg.lstsq(square * weights, turned.T @ target, rcond=_CELLS)[0]
+        weights = np.abs(total) + _STAYS * scale
+        weights[betas] *= _BETA_AGAIN
     return np.asarray(total - so_far, np.float64)
 
 
@@ -197,11 +212,11 @@ def _span(freedoms: FloatArray) -> FloatArray:
 
 
 def hidden_cells(model: Model, values: FloatArray, scale: float) -> list[tuple[int, int]]:
-    """(row, number of the cell) for which the freedoms can stand in, to a millionth of the cell's effect."""
+    """(row, number of the cell) for which the freedoms can stand in, to a share of the cell's effect."""
     _, freedoms, cells = columns(model, values, scale)
     Q = _span(freedoms)
     left = np.linalg.norm(cells - Q @ (Q.T @ cells), axis=0)
-    seen = np.flatnonzero(left <= 1e-6 * np.linalg.norm(cells, axis=0))
+    seen = np.flatnonzero(left <= _HIDDEN * np.linalg.norm(cells, axis=0))
     return [(int(one) // len(CELLS), int(one) % len(CELLS)) for one in seen]
 
 

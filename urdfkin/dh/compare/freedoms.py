@@ -13,14 +13,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.compare.fit import Model, columns, errors, moved
+from urdfkin.dh.compare.fit import LONGEST_STEP, Model, columns, errors, moved
 from urdfkin.model.tree import FloatArray
 
 _ROUNDS = 60
-#: Of the largest singular value: where damping starts, what a success leaves of it, and where it ends.
-_DAMPING, _EASING, _LEAST, _MOST = 1e-3, 0.03, 1e-14, 1e2
-#: Radians, and metres for each metre of reach, that one step goes at most.
-_LONGEST = 0.5
+#: Of the largest singular value: where damping starts, and between what it stays.
+_DAMPING, _LEAST, _MOST = 1e-3, 1e-14, 1e2
+#: What a success leaves of the damping, and how much more of it there is after a failure.
+_EASING, _HARDER = 0.03, 10.0
+#: A step that leaves more than this is slow; after so many of them in turn a descent ends.
+_SLOW, _PATIENCE = 0.99, 4
 #: Fit up to which nothing better is looked for, metres for each metre of reach.
 _ROUNDING = 1e-13
 #: Turns that are tried of one offset against the next.
@@ -63,14 +65,14 @@ def _descended(model: Model, values: FloatArray, wanted: FloatArray, scale: floa
         before = size
         while damping <= _MOST:
             free = Vt.T @ (S / (S**2 + (damping * S[0]) ** 2) * along)
-            if np.abs(free).max() <= _LONGEST * scale:
+            if np.abs(free).max() <= LONGEST_STEP * scale:
                 trial = moved(model, free, scale)
                 if (trial_size := _size(trial, values, wanted, scale)) < size:
                     model, size = trial, trial_size
                     break
-            damping *= 10.0
-        slow = slow + 1 if size > 0.99 * before else 0
-        if size == before or slow == 4:
+            damping *= _HARDER
+        slow = slow + 1 if size > _SLOW * before else 0
+        if size == before or slow == _PATIENCE:
             break
         damping = max(_EASING * damping, _LEAST)
     return model, size

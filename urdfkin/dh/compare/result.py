@@ -7,6 +7,12 @@ from dataclasses import dataclass
 from urdfkin.dh.table import DHTable
 from urdfkin.kinematics.roundings import EPS, of_a_fit
 
+#: Metres for each metre of reach, and radians, that changed cells may leave and explain all of a difference:
+#: far above what a fit rounds, far below the last digit of any sheet.
+EXPLAINED = 1e-9
+#: By how much more than half a digit a half may be, a decimal that was read as a double and subtracted.
+_HALF = 1.0 + 1e-6
+
 
 @dataclass(frozen=True, slots=True)
 class CellDifference:
@@ -39,7 +45,7 @@ class CellDifference:
     @property
     def is_rounding(self) -> bool:
         """Whether the table could not have said it better with the digits that it gives."""
-        return abs(self.difference) <= self.last_digit * (1.0 + 1e-6)
+        return abs(self.difference) <= self.last_digit * _HALF
 
 
 @dataclass(frozen=True, slots=True)

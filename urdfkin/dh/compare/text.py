@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from urdfkin.dh.compare.result import CellDifference, Comparison, TakenUp
+from urdfkin.dh.compare.result import EXPLAINED, CellDifference, Comparison, TakenUp
 from urdfkin.dh.elements import nearest_twelfth
 from urdfkin.dh.export.cells import added, pose_lines
 from urdfkin.dh.export.terminal import aligned
@@ -16,11 +16,14 @@ from urdfkin.dh.units import Units
 from urdfkin.errors.printable import printable
 from urdfkin.errors.questions import Question
 
+#: Radians, or of the reach: fitted numbers are shown no finer, however well the table fits.
+_FINEST = 1e-12
+
 
 def comparison_text(found: Comparison, units: Units) -> str:
     """Lines for a terminal, the last one ended."""
     lines = [*_verdict(found), *_cells(found, units)]
-    if found.residual > 1e-9 * found.reach:
+    if found.residual > EXPLAINED * found.reach:
         lines.append(f"No change of cells explains the URDF: {found.residual * 1e3:.3g} mm are left.")
         if not found.fitted:
             lines.append("Its frames may stand elsewhere: without --no-fit, base and tool are fitted.")
@@ -130,7 +133,7 @@ def _table(cells: Sequence[CellDifference], units: Units) -> list[str]:
 
 def resolution(found: Comparison) -> float:
     """A power of ten below which fitted numbers only reflect how well the table fits."""
-    error = max(found.metres / found.reach, found.radians, 1e-12)
+    error = max(found.metres / found.reach, found.radians, _FINEST)
     return float(10.0 ** math.ceil(math.log10(2.0 * error)))
 
 
