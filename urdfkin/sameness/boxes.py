@@ -17,6 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.chain import inverse
 from urdfkin.model.mechanisms.alignment import FramePair
 from urdfkin.model.mechanisms.upper import behind_first
@@ -62,7 +63,7 @@ class Boxes:
         """(n,) the largest |D + sum_i D_i x_i| over |x_i| <= h_i, at middles (n, variables)."""
         D, G = self.at_middles(c)
         size = np.sqrt((D * D).sum(axis=1))
-        along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, 1e-300)[:, np.newaxis]
+        along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, NOT_ZERO)[:, np.newaxis]
         across = np.sqrt(np.maximum((G * G).sum(axis=1) - along * along, 0.0))
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 

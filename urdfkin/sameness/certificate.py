@@ -25,6 +25,10 @@ from urdfkin.sameness.result import Difference, Interval, JointMap, Sameness
 
 #: How many boxes there may be at a time to prove a bound that is claimed.
 MOST_AGAIN = 2**22
+#: Up to what share numbers of a document are the same on any machine; m or rad that are 0 beside 0.
+_ALIKE, _ZERO = 1e-9, 1e-15
+#: By how many eps of it a bound that is proven again may be larger: its sums may round otherwise elsewhere.
+_LAST_BITS = 64.0
 #: The layout of the document, and its version.
 LAYOUT = "urdfkin-same-1"
 #: Parts that follow from how the models are laid on each other.
@@ -184,7 +188,7 @@ def _alike(claimed: Any, said: Any) -> bool:
     if isinstance(said, list):
         return len(claimed) == len(said) and all(map(_alike, claimed, said))
     if isinstance(said, float) and isinstance(claimed, float | int):
-        return math.isclose(claimed, said, rel_tol=1e-9, abs_tol=1e-15)
+        return math.isclose(claimed, said, rel_tol=_ALIKE, abs_tol=_ZERO)
     return bool(claimed == said)
 
 
@@ -244,4 +248,4 @@ def _not_attained(
 
 def _within(proven: float, claimed: float, rounding: float) -> bool:
     """Whether a bound that is proven allows the one that is claimed: both round, the same way or not."""
-    return proven <= claimed + rounding + 64.0 * EPS * abs(claimed) if math.isfinite(claimed) else True
+    return proven <= claimed + rounding + _LAST_BITS * EPS * abs(claimed) if math.isfinite(claimed) else True

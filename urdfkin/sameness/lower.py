@@ -22,7 +22,10 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.sampling import sample
 
-SAMPLES, STARTS, ALONG = 512, 4, 13
+#: Random configurations that a search begins with, and those of them that are corners of all ranges.
+SAMPLES, CORNERS = 512, 128
+#: How many of the worst are climbed from, and values that are tried along a coordinate.
+STARTS, ALONG = 4, 13
 #: Frames that climb in one batch.
 TOGETHER = 24
 #: By which part of its range a coordinate is moved, round by round.
@@ -155,7 +158,7 @@ class Search:
         """(n, frames) distances at random values and corners of the ranges; the values (n, variables)."""
         low, high = self.ends.T
         z = self.random(SAMPLES)
-        corners = np.where(self.rng.random((SAMPLES // 4, len(self.names))) < 0.5, low, high)
+        corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)
         z = np.concatenate((np.clip(np.zeros((1, len(self.names))), low, high), corners, z))
         return self.metres(z, frames), z
 

@@ -14,6 +14,9 @@ from urdfkin.model.configuration import checked, neutral
 from urdfkin.model.mechanisms.conversion import Conversion
 from urdfkin.model.tree import FloatArray, KinematicTree
 
+#: A tenth, as four digits round to it: from there on a prefix serves; none does from nine of them on.
+_TENTH, _NINE = 0.09995, 9.0
+
 
 class Verdict(Enum):
     """How two models move."""
@@ -233,7 +236,7 @@ def _with_prefix(value: float, unit: str) -> str:
     if value == 0.0:
         return f"0 {unit}"
     for prefix, factor in (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9), ("p", 1e12)):
-        if abs(value) * factor >= 0.9995e-1 * (1.0 if prefix else 9.0):
+        if abs(value) * factor >= _TENTH * (1.0 if prefix else _NINE):
             return f"{value * factor:.4g} {prefix}{unit}"
     return f"{value:.2g} {unit}"
 

@@ -8,7 +8,7 @@ from itertools import islice
 from urdfkin.model.mechanisms.alignment import Alignment, Gauge
 from urdfkin.model.mechanisms.mechanism import Mechanism, Tolerance, tolerance_of
 from urdfkin.model.mechanisms.pairing import Pairing
-from urdfkin.model.mechanisms.walk import Ahead, Walk, better
+from urdfkin.model.mechanisms.walk import TWICE_AS_WELL, Ahead, Walk, better
 
 #: Of joints whose order does not matter, so many orders are tried: all of five slides.
 MOST_ORDERS = 120
@@ -75,7 +75,7 @@ def _nearly(best: Alignment, given: Mapping[str, str]) -> Alignment:
     """
     a, b, (least, most), ahead = best.a, best.b, best.inner_off, Ahead(MOST_AHEAD)
     for angle in NEARLY:
-        if not least < angle * best.size < 0.5 * most:
+        if not least < angle * best.size < TWICE_AS_WELL * most:
             continue
         tolerance = Tolerance(angle, angle * best.size)
         rough = _laid(a, b, given, None, ahead, tolerance, best.base)
@@ -85,7 +85,7 @@ def _nearly(best: Alignment, given: Mapping[str, str]) -> Alignment:
         ):
             continue
         exact = _laid(a, b, rough.names, rough.gauge)
-        return exact if exact.inner_off[1] < 0.5 * most else best
+        return exact if exact.inner_off[1] < TWICE_AS_WELL * most else best
     return best
 
 

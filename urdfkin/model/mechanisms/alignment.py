@@ -20,7 +20,7 @@ import numpy as np
 
 from urdfkin.model.chain import inverse
 from urdfkin.model.mechanisms.conversion import Conversion
-from urdfkin.model.mechanisms.mechanism import Mechanism, Screw
+from urdfkin.model.mechanisms.mechanism import Mechanism, Screw, size_of
 from urdfkin.model.tree import FloatArray
 
 IDENTITY = np.eye(4)
@@ -140,7 +140,7 @@ class Alignment:
     @property
     def size(self) -> float:
         """Metres: what angles are counted with."""
-        return max(self.a.size, self.b.size, 1e-9)
+        return size_of(self.a, self.b)
 
     @property
     def inner_off(self) -> tuple[float, float]:

@@ -21,6 +21,8 @@ from urdfkin.model.tree import FloatArray, JointKind
 
 #: What the entries of a pose that was computed may be off by, as a share of their size.
 NEARLY = 1e-9
+#: A place in the plane that is none of the special ones: moved along both axes, and turned.
+_AWAY = np.array([1.0, 2.0, 3.0])
 _Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -47,7 +49,7 @@ class Conversion:
         """Whether M and N are rigid, and M P N one of the joint's poses at home and turned and moved away."""
         if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
-        away = pose_of(JointKind.PLANAR, np.array([1.0, 2.0, 3.0]))
+        away = pose_of(JointKind.PLANAR, _AWAY)
         return all(is_pose(kind, self.before @ P @ self.behind) for P in (np.eye(4), away))
 
 

@@ -11,11 +11,9 @@ from typing import TypeVar
 import numpy as np
 
 from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw
-from urdfkin.model.mechanisms.rigid import along, angle_from_to, between
+from urdfkin.model.mechanisms.rigid import ALONG, along, angle_from_to, between
 from urdfkin.model.tree import FloatArray
 
-#: Radians of tilt below which an axis says nothing of a slide along another one.
-_NOTHING = 1e-12
 _Some = TypeVar("_Some")
 #: One of A and one of B.
 Both = tuple[_Some, _Some]
@@ -43,7 +41,7 @@ class Axis:
         """How far along u (m) the nearest point of the line that it is seen from is; None where any is."""
         s, start = self.screw, self.seen
         along_s = float(start.direction @ s.direction)
-        if not self.turns or 1.0 - along_s**2 < _NOTHING**2:
+        if not self.turns or 1.0 - along_s**2 < ALONG**2:
             return None
         way = s.point - start.point
         foot = float(way @ start.direction - along_s * (way @ s.direction)) / (1.0 - along_s**2)
@@ -77,7 +75,7 @@ def behind(
         axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])
         yield axes
         screws = axes[0].screw, axes[1].screw
-        if np.linalg.norm(np.cross(screws[0].direction, seen[0].direction)) < _NOTHING:
+        if np.linalg.norm(np.cross(screws[0].direction, seen[0].direction)) < ALONG:
             beyond = e.beyond(bodies[0]), f.beyond(bodies[1])
             yield from behind(mechanisms, (e, f), beyond, screws if axes[0].turns else seen)
 

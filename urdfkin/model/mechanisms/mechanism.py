@@ -18,6 +18,7 @@ from itertools import pairwise
 import numpy as np
 
 from urdfkin.kinematics.roundings import EPS, of_two_texts
+from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
 
 
@@ -201,7 +202,12 @@ class Tolerance:
 def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
     """What two texts of one robot may differ by."""
     k = a.rounding + b.rounding
-    return Tolerance(k, k * max(a.size, b.size, 1e-9))
+    return Tolerance(k, k * size_of(a, b))
+
+
+def size_of(a: Mechanism, b: Mechanism) -> float:
+    """Metres: what angles are counted with where both are compared."""
+    return max(a.size, b.size, LEAST_SIZE)
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:

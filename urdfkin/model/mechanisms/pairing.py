@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, Tolerance, between_lines
 from urdfkin.model.tree import FloatArray, JointKind
 
@@ -103,7 +104,7 @@ class Pairing:
     def _unlikeness(self, one: _Standing, other: _Standing) -> tuple[bool, float, float]:
         """Of shape, then of axes, then, where axes lie on one line, of where they point and stand on it."""
         angle, way = one.mismatch(other)
-        off = 0.0 if self._tolerance.holds(angle, way) else angle * max(self.a.size, 1e-9) + way
+        off = 0.0 if self._tolerance.holds(angle, way) else angle * max(self.a.size, LEAST_SIZE) + way
         place = math.dist(one.place, other.place)
         points_back = bool(one.screw.direction @ other.screw.direction < 0.0)
         return one.shape != other.shape, off, place + self.a.size * points_back

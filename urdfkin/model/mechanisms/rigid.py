@@ -11,6 +11,9 @@ from urdfkin.kinematics.rotation.axis_angle import exp_rotation, rotation_about
 from urdfkin.model.mechanisms.mechanism import Screw
 from urdfkin.model.tree import FloatArray
 
+#: What lies across an axis by less, a unit vector or metres, lies along it, and has no direction there.
+ALONG = 1e-12
+
 
 def along(screw: Screw, value: float, *, turns: bool) -> FloatArray:
     """(4, 4) exp(S t): a turn about a screw by radians, or a slide along it by metres."""
@@ -68,6 +71,6 @@ def turn_about(u: FloatArray, R: FloatArray) -> float:
 def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
     """The angle about u from x to y, seen along u; None where one of them is along u."""
     x, y = x - u * (u @ x), y - u * (u @ y)
-    if min(np.linalg.norm(x), np.linalg.norm(y)) < 1e-12:
+    if min(np.linalg.norm(x), np.linalg.norm(y)) < ALONG:
         return None
     return math.atan2(float(u @ np.cross(x, y)), float(x @ y))

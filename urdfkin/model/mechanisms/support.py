@@ -26,6 +26,8 @@ from urdfkin.model.mechanisms.mechanism import Screw
 from urdfkin.model.tree import FloatArray
 
 _WHOLE = 2.0 * math.pi
+#: Corners of the polygon about a circle: they lie farther out by a thousandth.
+_AROUND = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +131,9 @@ class Support:
     def radius(self, screw: Screw) -> float:
         """How far from a screw's line the set comes at most, metres."""
         x, y, _ = axis_aligning(screw.direction).T
-        corners = [factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in _corners(0.0, _WHOLE, 64)]
+        corners = [
+            factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in _corners(0.0, _WHOLE, _AROUND)
+        ]
         u = np.array(corners)
         return float(max((self.at(u) - u @ screw.point).max(), 0.0))
 
@@ -159,7 +163,7 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
         return [(2.0 * half * k, 1.0 / math.cos(half)) for k in range(segments)]
     if high == low:
         return [(low, 1.0)]
-    count = max(1, math.ceil((high - low) / (2.0 * math.pi) * segments))
+    count = max(1, math.ceil((high - low) / _WHOLE * segments))
     half = (high - low) / (2.0 * count)
     middles = [(low + (2 * k + 1) * half, 1.0 / math.cos(half)) for k in range(count)]
     return [(low, 1.0), *middles, (high, 1.0)]

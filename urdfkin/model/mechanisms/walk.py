@@ -10,13 +10,15 @@ from urdfkin.model.chain import inverse
 from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Gauge, Step
 from urdfkin.model.mechanisms.conversion import Conversion, onto_plane, undoing
 from urdfkin.model.mechanisms.guesses import behind, laid, zeros
-from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, Tolerance
+from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, Tolerance, size_of
 from urdfkin.model.mechanisms.pairing import Pairing, family
 from urdfkin.model.mechanisms.rigid import along, apart, between, turn_about
 from urdfkin.model.tree import FloatArray
 
 #: What the next axis leaves open, so many joints ahead decide.
 AHEAD = 6
+#: What is off by less than this of what something else is fits twice as well: only that is better.
+TWICE_AS_WELL = 0.5
 
 #: What a joint is free in: an offset, or a pose.
 _Free = TypeVar("_Free", float, FloatArray)
@@ -67,7 +69,7 @@ class Walk:
     ) -> None:
         self.a, self.b, self.pairing, self.gauge, self.ahead = a, b, pairing, gauge, ahead
         self.tolerance, self.base = tolerance, base
-        self.size = max(a.size, b.size, 1e-9)
+        self.size = size_of(a, b)
 
     # -- where to begin ------------------------------------------------------------------------------
 
@@ -390,7 +392,7 @@ def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place
 
 def better(score: Score, than: Score) -> bool:
     """Whether more agrees, or as much and the rest twice as well."""
-    return score[0] > than[0] or (score[0] == than[0] and score[1] < 0.5 * than[1])
+    return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
 
 def _outwards(screw: Screw, backwards: bool) -> Screw:

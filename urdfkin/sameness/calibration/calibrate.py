@@ -34,6 +34,14 @@ _GENERAL = 40
 _UNLIKELY = 4.0
 #: How many times as uncertain as general configurations leave a parameter: less is no reason to warn.
 _WEAK = 10.0
+#: Seed of the general configurations that a parameter's certainty is held against: not those of `general`.
+_OTHERS = 1
+#: Of the largest entry of R: a column whose own is no larger is one of those before it.
+_DEPENDENT = 1e-12
+#: By what a robot's size is divided for the x, y and z of a target that is at no special place.
+_ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
+#: Times `Way.rounding`: Pinocchio goes to the base and to the tip, through origins that were written anew.
+_READ_BACK = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +193,7 @@ def _somewhere(model: Model) -> FloatArray:
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
-            at[k] = model.way.size / (5.0 + "xyz".index(parameter.what))
+            at[k] = model.way.size / _ASIDE[parameter.what]
     return at
 
 
@@ -271,12 +279,12 @@ def _weak(
     robot: Robot, model: Model, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
     """Kept parameters that as many general configurations would tell much better."""
-    general = _values(model, robot, robot.sample(len(measured), seed=1))
+    general = _values(model, robot, robot.sample(len(measured), seed=_OTHERS))
     sizes = []
     for values in (measured.values, general):
         J = stacked(model, values, complete=measured.complete, at=at)[:, list(kept)]
         _, R = np.linalg.qr(J)
-        if (np.abs(np.diag(R)) <= 1e-12 * np.abs(R).max(initial=0.0)).any() or len(R) < len(kept):
+        if (np.abs(np.diag(R)) <= _DEPENDENT * np.abs(R).max(initial=0.0)).any() or len(R) < len(kept):
             return {}
         sizes.append(np.linalg.norm(np.linalg.solve(R, np.eye(len(R))), axis=1))
     ratios = sizes[0] / sizes[1]
@@ -302,7 +310,7 @@ def _held(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate |
         T = found.written.loaded.placement(q, [model.base, model.tip])
     theirs = np.linalg.solve(T[:, 0], T[:, 1])
     away = np.abs(theirs - model.way.poses(measured.values, at))
-    bound = 4.0 * model.way.rounding(measured.values)
+    bound = _READ_BACK * model.way.rounding(measured.values)
     if away[:, :3, 3].max() > bound or away[:, :3, :3].max() > bound / model.way.size:
         raise UrdfkinError(
             "the URDF that was written is not what was fitted",
@@ -335,7 +343,7 @@ def _doubts(found: Calibration) -> Iterator[str]:
             + _listed(f"{name[k]} ({ratio:.0f} times as uncertain)" for k, ratio in worst)
             + "; in brackets: as general configurations of their number would leave it"
         )
-    if fitted.freedom < 0.5:
+    if not fitted.is_judged:
         yield "no number is left to judge by: there are as many parameters as measured numbers"
     elif fitted.freedom < len(found.identification.kept):
         yield f"{fitted.freedom:.0f} numbers are left to judge {len(found.identification.kept)} parameters by"

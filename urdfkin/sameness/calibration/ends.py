@@ -16,8 +16,10 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.sameness.calibration.fit import Measured
 from urdfkin.sameness.calibration.models import Model
 
-#: Turns that base and target take at most.
-_TURNS = 200
+#: Turns that base and target take at most, and by what share of its way the target may still move.
+_TURNS, _STAYS = 200, 1e-9
+#: How many times as far as the robot's tip goes measured positions may be spread: millimetres are a thousand.
+_FARTHER = 100.0
 
 
 def starting(model: Model, measured: Measured) -> FloatArray:
@@ -62,7 +64,7 @@ def _seen(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatAr
             B[:3, :3] = _rotation((p - p.mean(axis=0)).T @ (points - points.mean(axis=0)))
         before = X[:3, 3].copy()
         B[:3, 3], X[:3, 3] = _shifts(T, p, B[:3, :3], base, tool)
-        if np.linalg.norm(X[:3, 3] - before) <= 1e-9 * np.linalg.norm(X[:3, 3]):
+        if np.linalg.norm(X[:3, 3] - before) <= _STAYS * np.linalg.norm(X[:3, 3]):
             break
     return B, X
 
@@ -102,7 +104,7 @@ def _shifts(
 
 
 def demand_plausible(model: Model, measured: Measured) -> None:
-    """Raise InputError where positions can be no metres: they spread a hundred times as far as the robot's.
+    """Raise InputError where positions can be no metres: they spread much farther than the robot's.
 
     Raises:
         InputError: as said.
@@ -111,7 +113,7 @@ def demand_plausible(model: Model, measured: Measured) -> None:
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measured.p)
     )
-    if ours > 0.0 and theirs > 100.0 * ours:
+    if ours > 0.0 and theirs > _FARTHER * ours:
         raise InputError(
             "measured positions spread farther than the robot's",
             found=f"{theirs:.4g} m, where the robot's tip goes {ours:.4g} m",

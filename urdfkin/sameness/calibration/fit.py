@@ -30,10 +30,20 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.sameness.calibration.models import Model
 
 _ROUNDS = 100
-#: Where damping starts, of the largest singular value; what a success leaves of it, and where it ends.
-_DAMPING, _EASING, _MOST = 1e-4, 0.03, 1e3
+#: Of the largest singular value: where damping starts, and ends.
+_DAMPING, _MOST = 1e-4, 1e3
+#: Below what there is none, and where it starts again then.
+_UNDAMPED, _AGAIN = _DAMPING**3, _DAMPING**2
+#: What a success leaves of the damping, and how much more of it there is after a failure.
+_EASING, _HARDER = 0.03, 10.0
 #: Of the squared errors: what is no gain any more.
 _NOTHING = 1e-13
+#: For each measured number, in eps: what of their sum of squares changes by rounding alone.
+_ROUNDED = 4.0
+#: Counted numbers: fewer than half of one is none.
+_ONE_OR_MORE = 0.5
+#: Of a pose's largest share that is left to judge by: a direction with less is followed by the fit.
+_FOLLOWED = 1e-9
 #: How often noise is estimated, and by what share it may still change.
 _ESTIMATES, _STAYS = 20, 1e-3
 #: In how many campaigns without an odd pose one is called so.
@@ -112,9 +122,14 @@ class Fit:
         return float(self.left.sum())
 
     @property
+    def is_judged(self) -> bool:
+        """Whether there are numbers to judge by."""
+        return self.freedom >= _ONE_OR_MORE
+
+    @property
     def ratio(self) -> float:
         """The noise that is left by that which was stated: 1 but for 1/sqrt(2 freedom) or so."""
-        if self.freedom < 0.5:
+        if not self.is_judged:
             return math.nan
         whitened = self.errors / self.noise.of(self.errors.shape[1] == 6)
         return math.sqrt(float((whitened**2).sum()) / self.freedom)
@@ -122,7 +137,7 @@ class Fit:
     @property
     def spread(self) -> float:
         """The standard deviation of that ratio."""
-        return 1.0 / math.sqrt(2.0 * max(self.freedom, 0.5))
+        return 1.0 / math.sqrt(2.0 * max(self.freedom, _ONE_OR_MORE))
 
     def rms(self) -> tuple[float, float | None]:
         """Of positions (the vector's length, m) and of turns (rad)."""
@@ -155,7 +170,7 @@ def best_fit(
     for _ in range(1 if noise else _ESTIMATES):
         at = _descended(model, measured, kept, weights, at)
         found = _ended(model, measured, kept, weights, at)
-        if noise or found.freedom < 0.5:
+        if noise or not found.is_judged:
             break
         estimated = _estimated(found, model, measured)
         stays = abs(estimated.metres - weights.metres) <= _STAYS * weights.metres and (
@@ -165,7 +180,7 @@ def best_fit(
         if stays:
             break
     found = _ended(model, measured, kept, weights, at)
-    if noise is None and found.freedom < 0.5:
+    if noise is None and not found.is_judged:
         found = replace(found, covariance=np.full_like(found.covariance, np.inf))
     return found
 
@@ -177,7 +192,7 @@ def _estimated(found: Fit, model: Model, measured: Measured) -> Noise:
     def of(part: slice, least: float, former: float) -> float:
         left = float(found.left[:, part].sum())
         size = float((found.errors[:, part] ** 2).sum())
-        return max(math.sqrt(size / left), least) if left > 0.5 else former
+        return max(math.sqrt(size / left), least) if left > _ONE_OR_MORE else former
 
     return Noise(
         of(slice(0, 3), rounding, found.noise.metres),
@@ -220,11 +235,10 @@ def _descended(
             if (after := size(trial)) < now:
                 at, now, damping = trial, after, _EASING * damping
                 break
-            damping = max(10.0 * damping, _DAMPING**2)
-        # What is left changes by rounding alone.
-        if now >= before * (1.0 - 4.0 * EPS * len(r)):
+            damping = max(_HARDER * damping, _AGAIN)
+        if now >= before * (1.0 - _ROUNDED * EPS * len(r)):
             break
-        damping = 0.0 if damping < _DAMPING**3 else damping
+        damping = 0.0 if damping < _UNDAMPED else damping
     return at
 
 
@@ -238,7 +252,7 @@ def _ended(model: Model, measured: Measured, kept: Sequence[int], noise: Noise, 
     blocks = Q.reshape(len(measured), k, len(kept))
     judged = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)
     own = r.reshape(-1, k)
-    odd = np.einsum("si,sij,sj->s", own, np.linalg.pinv(judged, rcond=1e-9, hermitian=True), own)
+    odd = np.einsum("si,sij,sj->s", own, np.linalg.pinv(judged, rcond=_FOLLOWED, hermitian=True), own)
     left = np.clip(np.einsum("sii->si", judged), 0.0, 1.0)
     return Fit(at, errors(model, measured, at), noise, half @ half.T, left, odd)
 

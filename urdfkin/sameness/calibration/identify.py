@@ -29,8 +29,8 @@ from urdfkin.verify.singular_values import singular_values
 
 #: Of the most independent column: what is as good.
 _AS_GOOD = 0.5
-#: How many parameters a reason names.
-_NAMED = 3
+#: How many parameters a reason names, and which share of what stands still one does at least.
+_NAMED, _SHARE = 3, 1e-6
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
         J[:, list(kept)], axis=0
     )
     shares = np.abs(shares) / np.linalg.norm(column)
-    order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > 1e-6]
+    order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > _SHARE]
     names = [str(model.way.parameters[kept[i]]) for i in order[:_NAMED]]
     more = f" and {len(order) - _NAMED} more" if len(order) > _NAMED else ""
     return f"does what {', '.join(names)}{more} {'do together' if len(order) > 1 else 'does'}"
