@@ -20,8 +20,11 @@ from urdfkin.model.given import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
+#: How many tables' plans are kept at a time.
+_TABLES = 64
 
-@lru_cache(maxsize=64)
+
+@lru_cache(_TABLES)
 def plan_of(table: DHTable) -> Plan:
     """The walk over a table's frames to its tip."""
     tree = free_tree(table)

@@ -18,7 +18,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from urdfkin.dh.elements import between_axes, wrapped
+from urdfkin.dh.elements import between_axes, nearest_twelfth, wrapped
 from urdfkin.dh.noise import Noise, noise_of, tilt_of
 from urdfkin.kinematics.roundings import ANGLE, DIGITS, EPS, SUMMED
 from urdfkin.model.tree import FloatArray
@@ -166,5 +166,5 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
 def cleaned_angle(angle: float) -> float:
     """An angle in (-pi, pi]; one that differs from a multiple of pi/12 by rounding only becomes it."""
     angle = wrapped(angle)
-    twelfth = round(angle * 12.0 / math.pi) * math.pi / 12.0
+    twelfth = nearest_twelfth(angle)
     return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle

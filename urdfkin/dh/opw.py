@@ -27,6 +27,8 @@ from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain, motion_about_z
 from urdfkin.model.tree import FloatArray, JointKind
 
+#: Metres and radians that what a solver needs may be off by; configurations on which that is measured.
+TOLERANCE, SAMPLES = 1e-6, 200
 _H = math.pi / 2.0
 _ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
 
@@ -76,12 +78,12 @@ class Opw:
         }
 
 
-def opw_of(path: FrameChain, tolerance: float = 1e-6) -> Opw:
+def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
     """The OPW parameters of a path of six turning joints.
 
     Args:
         path: The path, base to tip.
-        tolerance: Metres, and radians, that the tip may be off by, at worst of 200 samples.
+        tolerance: Metres, and radians, that the tip may be off by, at worst of `SAMPLES`.
 
     Raises:
         InputError: other joints, or an arm that is not of the kind, with how far its tip would be off.
@@ -90,7 +92,7 @@ def opw_of(path: FrameChain, tolerance: float = 1e-6) -> Opw:
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
         raise InputError("an OPW arm has six turning joints", where=where, found=str(len(path.joints)))
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
-    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (200, 6))
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (SAMPLES, len(path.joints)))
     wanted, best, refused = free.placement(q), None, ""
     for guide in _guides(path):
         try:

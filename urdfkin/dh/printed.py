@@ -14,13 +14,11 @@ import numpy as np
 
 from urdfkin.dh.export.cells import at_most, constant_of
 from urdfkin.dh.row import DHRow
-from urdfkin.dh.snapping import range_of, travel, values_within
+from urdfkin.dh.snapping import SAMPLES, range_of, travel, values_within
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, TreeRow
 from urdfkin.dh.units import Units, cell_in_si, read_number
 from urdfkin.model.tree import FloatArray
-
-SAMPLES = 500
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units, read_number, units_of
 from urdfkin.dh.written_row import name_of, refuse_other_order, written_row
 from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.errors.demands import shown
 from urdfkin.errors.questions import Question
 from urdfkin.model.tree import FloatArray
 
@@ -80,7 +81,7 @@ def table_from_rows(
     units = units_of(angles, lengths)
     rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
     if not isinstance(rows, Sequence) or isinstance(rows, (str, bytes)):
-        raise InputError("a table needs a list of rows", where="rows", found=repr(rows)[:60])
+        raise InputError("a table needs a list of rows", where="rows", found=shown(rows))
     if len(rows) == 0 and base is None and tool is None:
         raise InputError(
             "a table without rows, base and tool says nothing",
@@ -152,9 +153,7 @@ def _pose(value: ArrayLike | None, what: str, units: Units) -> FloatArray:
         value = value.tolist()
     rows = value if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) else ()
     if len(rows) not in (3, 4) or not all(isinstance(row, Sequence) and len(row) == 4 for row in rows):
-        raise InputError(
-            f"the {what} is a matrix of numbers, 4 x 4 or 3 x 4", where=what, found=repr(value)[:60]
-        )
+        raise InputError(f"the {what} is a matrix of numbers, 4 x 4 or 3 x 4", where=what, found=shown(value))
     pose = np.eye(4)
     for i, row in enumerate(rows):
         pose[i] = [

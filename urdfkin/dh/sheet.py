@@ -20,12 +20,15 @@ import numpy as np
 from urdfkin.dh.expression import Cell, NoCellError, cell_of, spelled
 from urdfkin.dh.written_row import ORDER
 from urdfkin.errors import InputError
+from urdfkin.errors.demands import shown
 from urdfkin.errors.measured import UNITS
 from urdfkin.errors.printable import from_csv_cell
 from urdfkin.kinematics.rotation.nearest import ROUNDED, polar_factor
 
 #: How far a rotation that was printed with six digits is from one; what is farther was meant otherwise.
 _PRINTED = 1e-5
+#: In how many lines behind its heading the three rows of a pose stand, fences and blank lines among them.
+_POSE_LINES = 6
 #: What may be said in a line of its own, `convention: modified`, with or without a comment mark.
 _SAID = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
 #: In a file of separated values each `# key: value` is meant; a key that is none is refused with the others.
@@ -271,7 +274,7 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
         return _rigid([[cell_of(cell).number for cell in row.split("&")] for row in found[1].split(r"\\")])
     for k, line in enumerate(lines):
         if line.strip().lower().startswith(f"{end} (metres):"):
-            rows = [row.split() for row in lines[k + 1 : k + 7] if row.strip(" `")][:3]
+            rows = [row.split() for row in lines[k + 1 : k + 1 + _POSE_LINES] if row.strip(" `")][:3]
             if len(rows) == 3 and all(len(row) == 4 for row in rows):
                 return _rigid([[float(number) for number in row] for row in rows])
     return None
@@ -323,7 +326,7 @@ def _number(cell: str, column: _Column, where: str, commas: bool) -> str:
         raise InputError(
             "not a number",
             where=where,
-            found=repr(cell)[:60],
+            found=shown(cell),
             remedy=f"{decimal}: write 1.5708, pi/2 or 90 deg",
         ) from None
     plain = spelled(text)

@@ -27,6 +27,8 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 
 #: Half of 15 degrees is where the next multiple begins; a tolerance must stay clear of it.
 LARGEST_TOLERANCE = math.pi / 36.0
+#: Configurations on which a changed table is measured.
+SAMPLES = 500
 
 
 def checked_tolerance(snap: float) -> float:
@@ -74,7 +76,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
 
 
 def statement(
-    exact: FrameChain, table: DHTable, changes: Sequence[SnapChange], tolerance: float, samples: int = 500
+    exact: FrameChain, table: DHTable, changes: Sequence[SnapChange], tolerance: float
 ) -> SnapStatement:
     """Add the changes up, and measure them against the exact chain on samples within limits."""
     radians = sum((change.angle for change in changes), 0.0)
@@ -86,7 +88,7 @@ def statement(
     metres = sum((change.tip for change in changes), 0.0)
     metres += sum(rate * reached[name] for name, rate in per_metre.items())
     bounds = {joint.name: range_of(joint) for joint in exact.joints if joint.mimic is None}
-    q = values_within(bounds, exact.joint_names, samples)
+    q = values_within(bounds, exact.joint_names, SAMPLES)
     T_exact, T_table = exact.placement(q), table.placement(q)
     shift = np.linalg.norm(T_exact[:, :3, 3] - T_table[:, :3, 3], axis=-1)
     turn = rotation_angle(T_exact[:, :3, :3], T_table[:, :3, :3])
@@ -98,7 +100,7 @@ def statement(
         per_metre,
         float(shift.max(initial=0.0)),
         float(turn.max(initial=0.0)),
-        samples,
+        SAMPLES,
     )
 
 

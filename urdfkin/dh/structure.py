@@ -21,6 +21,8 @@ from urdfkin.model.tree import FloatArray
 NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
 #: Singular values below this are freedoms that a path does not have: far above rounding, far below a lever.
 _RANK = 1e-6
+#: Configurations on which the reach is looked for, each joint free within its limits.
+_SAMPLES = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,18 +92,17 @@ class Structure:
         return asdict(self)
 
 
-def structure(screws: Screws, samples: int = 2000) -> Structure:
+def structure(screws: Screws) -> Structure:
     """The structure of a path.
 
     Args:
         screws: The path as a product of exponentials.
-        samples: On how many configurations the reach is looked for, each joint free within its limits.
     """
     letters = "".join("R" if joint.kind.turns else "P" for joint in screws.joints)
     pairs = tuple(_pair(screws, i) for i in range(len(letters) - 1))
     kinds = [*_triples(screws, letters, pairs), *_whole(screws, letters, pairs)]
     kinds = sorted(kinds, key=lambda kind: (not kind.is_exact, kind.radians + kind.metres))
-    tips, jacobian = _sampled(screws, samples)
+    tips, jacobian = _sampled(screws)
     origin = _origin(screws)
     return Structure(
         screws.robot,
@@ -248,7 +249,7 @@ def _longest(screws: Screws, origin: FloatArray) -> float:
     return total + float(np.linalg.norm(screws.M[:3, 3] - here))
 
 
-def _sampled(screws: Screws, samples: int) -> tuple[FloatArray, FloatArray]:
+def _sampled(screws: Screws) -> tuple[FloatArray, FloatArray]:
     """Where the tip comes to, each joint within its limits, and the screws at one of these."""
     rng, bounds = np.random.default_rng(0), []
     for joint in screws.joints:
@@ -256,7 +257,7 @@ def _sampled(screws: Screws, samples: int) -> tuple[FloatArray, FloatArray]:
         known = limit is not None and math.isfinite(limit.lower) and math.isfinite(limit.upper)
         bounds.append((limit.lower, limit.upper) if known and limit else (-math.pi, math.pi))
     lower, upper = np.array(bounds).reshape(-1, 2).T
-    values = rng.uniform(lower, upper, (samples, len(bounds)))
+    values = rng.uniform(lower, upper, (_SAMPLES, len(bounds)))
     free = Screws(tuple(type(j)(j.name, j.kind) for j in screws.joints), screws.M, screws.space)
     tips = free.placement(values)[:, :3, 3]
     return tips, free.jacobian(values[0])

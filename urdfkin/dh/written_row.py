@@ -13,6 +13,7 @@ from urdfkin.dh.expression import Cell, NoCellError, cell_of
 from urdfkin.dh.row import DHRow
 from urdfkin.dh.units import Angles, Units, cell_in_si, read_number, units_of
 from urdfkin.errors import InputError
+from urdfkin.errors.demands import shown
 from urdfkin.model.tree import JointKind, Limit, Mimic
 
 #: What a list has in this order, with "R" or "P" behind it if it says so; beta has no place there.
@@ -178,7 +179,7 @@ def _read(text: str, where: str) -> Cell:
         raise InputError(
             "not a number",
             where=where,
-            found=repr(text)[:60],
+            found=shown(text),
             remedy=f"{error}: write 1.5708, pi/2 or 90 deg",
         ) from None
 

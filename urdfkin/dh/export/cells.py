@@ -25,6 +25,9 @@ HAYATI_FORMULA = {
     Convention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Ry(beta(i-1)) Rz(theta) Tz(d)",
 }
 
+#: Of a bound's last digit: what is beyond it by no more is rounding, and not rounded up.
+_ON_THE_DIGIT = 1.0 - 1e-12
+
 
 def formula(table: DHTable) -> str:
     """The product that a row stands for."""
@@ -114,7 +117,7 @@ def at_most(value: float) -> str:
     if value == 0.0:
         return "0"
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return f"{math.ceil(value / unit * (1.0 - 1e-12)) * unit:.2e}"
+    return f"{math.ceil(value / unit * _ON_THE_DIGIT) * unit:.2e}"
 
 
 def snap_lines(table: DHTable, bullet: str = "  ") -> list[str]:
