@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from urdfkin.dh.compare.align import Alignment, align
-from urdfkin.dh.compare.fit import CELLS, Model, columns, fit_cells, hidden_cells
+from urdfkin.dh.compare.fit import CELLS, Model, Wanted, columns, fit_cells, hidden_cells
 from urdfkin.dh.compare.freedoms import fit_freedoms
 from urdfkin.dh.compare.proof import most_apart
 from urdfkin.dh.compare.result import EXPLAINED, CellDifference, Comparison, TakenUp
-from urdfkin.dh.convert import to_standard
+from urdfkin.dh.convert import to_convention
 from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.dh.row import Convention
 from urdfkin.dh.snapping import rotation_angle
@@ -66,28 +66,26 @@ def compare(
         InputError: the table has another number or other kinds of joints than the path.
     """
     check_joints(chain, reference)
-    standard = to_standard(reference) if reference.convention is Convention.MODIFIED else reference
-    tried, wanted = _samples(chain, FIT_SAMPLES, _FIT_SEED)
-    scale = _reach(chain, wanted)
+    standard = to_convention(reference, Convention.STANDARD)
+    tried, judged = _wanted(chain)
     written = _written(standard)
-    fitted = _best_fit(chain, standard, written, tried, wanted, scale) if fit else written
-    complete = fit_cells(fitted, tried, wanted, scale, _cells_of(reference), free=fit)
-    values, there = _samples(chain, CHECK_SAMPLES, _CHECK_SEED)
-    off, residual = _off(fitted, written, values, there), _apart(complete, values, there)[0]
-    cells = _differences(chain, reference, fitted, complete, values, scale, digits, fit)
+    fitted = _best_fit(chain, standard, written, tried) if fit else written
+    complete = fit_cells(fitted, tried, _cells_of(reference), free=fit)
+    off, residual = _off(fitted, written, judged), _apart(complete, judged)[0]
+    cells = _differences(chain, reference, fitted, complete, judged, digits, fit)
     table = _fitted_table(chain, standard, fitted)
     most_metres, most_radians = most_apart(chain, table, _slides(chain))
     found = Comparison(
         reference=table,
-        reach=scale,
+        reach=tried.scale,
         fitted=fit,
         senses=tuple(int(s) * row.sense for s, row in zip(fitted.senses, standard.rows, strict=True)),
         offsets=_offsets(standard, fitted),
         base=_taken_up(written.base, fitted.base),
         tool=_taken_up(written.tool, fitted.tool),
-        differences=cells if residual <= max(_EXPLAINS * off["metres"], EXPLAINED * scale) else (),
+        differences=cells if residual <= max(_EXPLAINS * off["metres"], EXPLAINED * tried.scale) else (),
         instead=(),
-        hidden=_hidden(reference, fitted, values, scale) if fit else (),
+        hidden=_hidden(reference, fitted, judged) if fit else (),
         residual=residual,
         tolerance=tolerance,
         samples=CHECK_SAMPLES,
@@ -96,7 +94,7 @@ def compare(
         **off,
     )
     if fit and not found.as_written:
-        found = replace(found, instead=_instead(chain, reference, written, found, digits))
+        found = replace(found, instead=_instead(chain, reference, written, found, (tried, judged), digits))
     return found
 
 
@@ -114,18 +112,15 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
         InputError: the table has another number or other kinds of joints than the path.
     """
     check_joints(chain, reference)
-    standard = to_standard(reference) if reference.convention is Convention.MODIFIED else reference
-    tried, wanted = _samples(chain, FIT_SAMPLES, _FIT_SEED)
-    model = _best_fit(
-        chain, standard, _written(standard), tried, wanted, _reach(chain, wanted), enough, hasty=True
-    )
-    return _apart(model, *_samples(chain, CHECK_SAMPLES, _CHECK_SEED))
+    standard = to_convention(reference, Convention.STANDARD)
+    tried, judged = _wanted(chain)
+    return _apart(_best_fit(chain, standard, _written(standard), tried, enough, hasty=True), judged)
 
 
-def _off(fitted: Model, written: Model, values: FloatArray, there: FloatArray) -> dict[str, float]:
+def _off(fitted: Model, written: Model, judged: Wanted) -> dict[str, float]:
     """How far the tip is off, as fitted and as written."""
     names = ("metres", "radians", "written_metres", "written_radians")
-    return dict(zip(names, (*_apart(fitted, values, there), *_apart(written, values, there)), strict=True))
+    return dict(zip(names, (*_apart(fitted, judged), *_apart(written, judged)), strict=True))
 
 
 def _reach(chain: FrameChain, wanted: FloatArray) -> float:
@@ -168,9 +163,7 @@ def _best_fit(
     chain: FrameChain,
     standard: DHTable,
     written: Model,
-    values: FloatArray,
-    wanted: FloatArray,
-    scale: float,
+    wanted: Wanted,
     enough: float = 0.0,
     *,
     hasty: bool = False,
@@ -181,19 +174,19 @@ def _best_fit(
     """
 
     def size(model: Model) -> float:
-        metres, radians = _apart(model, values, wanted)
-        return metres + scale * radians
+        metres, radians = _apart(model, wanted)
+        return metres + wanted.scale * radians
 
-    if size(written) <= EPS * of_a_fit(0) * scale:
+    if size(written) <= EPS * of_a_fit(0) * wanted.scale:
         return written
     best, best_size = written, size(written)
     for start in _starts(chain, standard, written, *(_HASTY if hasty else ())):
         # Least squares make the sum small. The worst sample is what counts: there the start may be better.
-        model = min(fit_freedoms(start, values, wanted, scale, turns=not hasty), start, key=size)
+        model = min(fit_freedoms(start, wanted, turns=not hasty), start, key=size)
         needed = 1.0 if start is written else _EXPLAINS
         if (its_size := size(model)) < needed * best_size:
             best, best_size = model, its_size
-        if best_size <= max(enough, _AT_ROUNDING * scale):
+        if best_size <= max(enough, _AT_ROUNDING * wanted.scale):
             break
     return _ends_gathered(best, written)
 
@@ -205,7 +198,7 @@ def _ends_gathered(model: Model, written: Model) -> Model:
     step = between_axes(a, alpha, beta)
     base, tool = model.base, model.tool
     for i in dict.fromkeys((0, n - 1)):
-        k = _own(model, i)
+        k = model.own(i)
         change = cells[i, k] - written.cells[i, k]
         cells[i, k] = written.cells[i, k]
         S = along_axis(change, 0.0) if model.turns[i] else along_axis(0.0, change)
@@ -232,13 +225,15 @@ def _start(standard: DHTable, aligned: Alignment) -> Model:
         tool=aligned.tool,
     )
     for i, offset in enumerate(aligned.offsets):
-        start.cells[i, _own(start, i)] += offset
+        start.cells[i, start.own(i)] += offset
     return start
 
 
-def _own(model: Model, i: int) -> int:
-    """Which cell of row i the joint's variable is added to."""
-    return 0 if model.turns[i] else 1
+def _wanted(chain: FrameChain) -> tuple[Wanted, Wanted]:
+    """What a fit is made on, and what it is judged on."""
+    values, poses = _samples(chain, FIT_SAMPLES, _FIT_SEED)
+    scale = _reach(chain, poses)
+    return Wanted(values, poses, scale), Wanted(*_samples(chain, CHECK_SAMPLES, _CHECK_SEED), scale)
 
 
 def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -261,17 +256,17 @@ def _slide(limit: Limit | None) -> tuple[float, float]:
     return (lower, upper) if math.isfinite(lower) and math.isfinite(upper) and lower < upper else _SLIDE
 
 
-def _apart(model: Model, values: FloatArray, wanted: FloatArray) -> tuple[float, float]:
-    poses = model.poses(values)
-    metres = np.linalg.norm(poses[:, :3, 3] - wanted[:, :3, 3], axis=-1).max()
-    return float(metres), float(rotation_angle(poses[:, :3, :3], wanted[:, :3, :3]).max())
+def _apart(model: Model, wanted: Wanted) -> tuple[float, float]:
+    poses, there = model.poses(wanted.values), wanted.poses
+    metres = np.linalg.norm(poses[:, :3, 3] - there[:, :3, 3], axis=-1).max()
+    return float(metres), float(rotation_angle(poses[:, :3, :3], there[:, :3, :3]).max())
 
 
 def _offsets(standard: DHTable, fitted: Model) -> tuple[float, ...]:
     """What was added to each joint's variable."""
     offsets = []
     for i, row in enumerate(standard.rows):
-        k = _own(fitted, i)
+        k = fitted.own(i)
         offset = float(fitted.cells[i, k]) - (row.d if k else row.theta)
         offsets.append(row.sense * (offset if k else math.remainder(offset, 2.0 * math.pi)))
     return tuple(offsets)
@@ -296,14 +291,12 @@ def _cells_of(reference: DHTable) -> FloatArray:
     return np.array([[float(_cell_at(reference, i, cell) < n) for cell in CELLS] for i in range(n)])
 
 
-def _hidden(
-    reference: DHTable, fitted: Model, values: FloatArray, scale: float
-) -> tuple[tuple[int, str], ...]:
+def _hidden(reference: DHTable, fitted: Model, judged: Wanted) -> tuple[tuple[int, str], ...]:
     """Cells that base, tool and offsets stand in for; a beta of zero is none."""
     found = [
         (_cell_at(reference, i, CELLS[k]), CELLS[k])
-        for i, k in hidden_cells(fitted, values, scale)
-        if k != _own(fitted, i) and (CELLS[k] != "beta" or fitted.cells[i, k])
+        for i, k in hidden_cells(fitted, judged)
+        if k != fitted.own(i) and (CELLS[k] != "beta" or fitted.cells[i, k])
     ]
     return tuple(sorted(one for one in found if one[0] < len(reference.rows)))
 
@@ -313,21 +306,20 @@ def _differences(
     reference: DHTable,
     fitted: Model,
     complete: Model,
-    values: FloatArray,
-    scale: float,
+    judged: Wanted,
     digits: Digits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
     """The cells that moved by more than rounding, each with its own effect on the tip, the largest first."""
-    _, _, twists = columns(fitted, values, scale)
-    linear = np.linalg.norm(twists.reshape(len(values), 6, -1)[:, :3], axis=1).max(axis=0)
+    twists, scale = columns(fitted, judged)[2], judged.scale
+    linear = np.linalg.norm(twists.reshape(len(judged.values), 6, -1)[:, :3], axis=1).max(axis=0)
     found = []
     for i, row in enumerate(fitted.cells):
         for k, cell in enumerate(CELLS):
             change = float(complete.cells[i, k] - row[k])
             size = abs(change) * (1.0 if cell in "da" else scale)
             at = _cell_at(reference, i, cell)
-            if (free and k == _own(fitted, i)) or size <= _MOVED * scale or at >= len(reference.rows):
+            if (free and k == fitted.own(i)) or size <= _MOVED * scale or at >= len(reference.rows):
                 continue
             value = getattr(reference.rows[at], cell)
             effect = float(linear[5 * i + k] * size)
@@ -338,16 +330,20 @@ def _differences(
 
 
 def _instead(
-    chain: FrameChain, reference: DHTable, written: Model, found: Comparison, digits: Digits
+    chain: FrameChain,
+    reference: DHTable,
+    written: Model,
+    found: Comparison,
+    wanted: tuple[Wanted, Wanted],
+    digits: Digits,
 ) -> tuple[CellDifference, ...]:
     """The cells that would have to change if nothing were fitted, where that is an explanation."""
-    tried, wanted = _samples(chain, FIT_SAMPLES, _FIT_SEED)
-    values, there = _samples(chain, CHECK_SAMPLES, _CHECK_SEED)
-    complete = fit_cells(written, tried, wanted, found.reach, _cells_of(reference), free=False)
-    metres, radians = _apart(complete, values, there)
+    tried, judged = wanted
+    complete = fit_cells(written, tried, _cells_of(reference), free=False)
+    metres, radians = _apart(complete, judged)
     if metres > EXPLAINED * found.reach or radians > EXPLAINED:
         return ()
-    cells = _differences(chain, reference, written, complete, values, found.reach, digits, False)
+    cells = _differences(chain, reference, written, complete, judged, digits, False)
     return cells if len(cells) <= len(found.differences) + 2 else ()
 
 

@@ -69,6 +69,10 @@ class Model:
         step = between_axes(a, alpha) @ between_axes(0.0, 0.0, beta)
         return np.asarray(step @ self._rows(k + 1, n) @ self.tool)
 
+    def own(self, i: int) -> int:
+        """Which cell of row i the joint's variable is added to."""
+        return 0 if self.turns[i] else 1
+
     def _rows(self, begin: int, end: int) -> FloatArray:
         T = np.eye(4)
         for theta, d, a, alpha, beta in self.cells[begin:end]:
@@ -107,12 +111,33 @@ class Model:
         return T @ self.tool, origins, axes
 
 
-def columns(model: Model, values: FloatArray, scale: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Tip poses and the twists (6 s, parameters) of freedoms and of cells, angles times `scale`.
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Where a model's tip is to come.
+
+    Attributes:
+        values: (s, n) the URDF's joint values.
+        poses: (s, 4, 4) its tip there.
+        scale: Metres that a radian counts as much as.
+    """
+
+    values: FloatArray
+    poses: FloatArray
+    scale: float
+
+    def errors(self, poses: FloatArray) -> FloatArray:
+        """(6 s,) twists that would bring a model's poses to these, angles times `scale`."""
+        turn = log_rotation(self.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
+        return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
+
+
+def columns(model: Model, wanted: Wanted) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Tip poses and the twists (6 s, parameters) of freedoms and of cells, angles times the scale.
 
     Freedoms are the base's six, the tool's six and each row's own variable; cells are (n, 5) in order.
     """
-    poses, origins, axes = model.walk(values)
+    scale = wanted.scale
+    poses, origins, axes = model.walk(wanted.values)
     tip = poses[:, None, None, :3, 3]
     turning = np.array([True, False, False, True, True])
     linear = np.where(turning[:, None], np.cross(axes, tip - origins), axes)
@@ -121,8 +146,8 @@ def columns(model: Model, values: FloatArray, scale: float) -> tuple[FloatArray,
     per_cell = np.where(turning, 1.0 / scale, 1.0)[:, None]
     cells = np.concatenate([linear * per_cell, scale * angular * per_cell], axis=-1)
     n = len(model.cells)
-    cells = np.moveaxis(cells.reshape(len(values), 5 * n, 6), 1, 2).reshape(-1, 5 * n)
-    own = [5 * i + (0 if model.turns[i] else 1) for i in range(n)]
+    cells = np.moveaxis(cells.reshape(len(poses), 5 * n, 6), 1, 2).reshape(-1, 5 * n)
+    own = [5 * i + model.own(i) for i in range(n)]
     first = np.broadcast_to(model.base @ model.first, poses.shape)
     ends = [_end(poses, first, scale), _end(poses, poses @ np.linalg.inv(model.last), scale)]
     return poses, np.hstack([*ends, cells[:, own]]), cells
@@ -140,35 +165,19 @@ def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
     return out.reshape(-1, 6)
 
 
-def errors(poses: FloatArray, wanted: FloatArray, scale: float) -> FloatArray:
-    """(6 s,) twists that would bring the poses to the wanted ones, angles times `scale`."""
-    turn = log_rotation(wanted[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
-    return np.concatenate([wanted[:, :3, 3] - poses[:, :3, 3], scale * turn], axis=-1).ravel()
-
-
-def fit_cells(
-    model: Model,
-    values: FloatArray,
-    wanted: FloatArray,
-    scale: float,
-    cells_of: FloatArray,
-    *,
-    free: bool = True,
-) -> Model:
+def fit_cells(model: Model, wanted: Wanted, cells_of: FloatArray, *, free: bool) -> Model:
     """The smallest and fewest changes of cells with which the table is the URDF.
 
     Args:
         model: The table.
-        values: (s, n) the URDF's joint values.
-        wanted: (s, 4, 4) its tip there.
-        scale: Metres that a radian counts as much as.
+        wanted: What the URDF's tip does.
         cells_of: (n, 5) which cells may change: 1 or 0.
         free: Whether base, tool and offsets may, too.
     """
-    start, best, best_size = model, model, np.inf
+    start, best, best_size, scale = model, model, np.inf, wanted.scale
     for _ in range(_ROUNDS):
-        poses, freedoms, cells = columns(model, values, scale)
-        error = errors(poses, wanted, scale)
+        poses, freedoms, cells = columns(model, wanted)
+        error = wanted.errors(poses)
         size = float(np.linalg.norm(error))
         if size < best_size * (1.0 - _BETTER):
             best, best_size = model, size
@@ -211,9 +220,9 @@ def _span(freedoms: FloatArray) -> FloatArray:
     return np.linalg.qr(freedoms)[0] if freedoms.any() else np.zeros((len(freedoms), 0))
 
 
-def hidden_cells(model: Model, values: FloatArray, scale: float) -> list[tuple[int, int]]:
+def hidden_cells(model: Model, wanted: Wanted) -> list[tuple[int, int]]:
     """(row, number of the cell) for which the freedoms can stand in, to a share of the cell's effect."""
-    _, freedoms, cells = columns(model, values, scale)
+    _, freedoms, cells = columns(model, wanted)
     Q = _span(freedoms)
     left = np.linalg.norm(cells - Q @ (Q.T @ cells), axis=0)
     seen = np.flatnonzero(left <= _HIDDEN * np.linalg.norm(cells, axis=0))
@@ -225,7 +234,7 @@ def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | Non
     per_cell = np.array([1.0 / scale, 1.0, 1.0, 1.0 / scale, 1.0 / scale])
     cells = model.cells.copy() if change is None else model.cells + change.reshape(-1, 5) * per_cell
     for i, own in enumerate(free[12:]):
-        k = 0 if model.turns[i] else 1
+        k = model.own(i)
         cells[i, k] += own * per_cell[k]
     # Base and tool are pushed in the axes about which the joints next to them turn: a turn that they share
     # with these joints goes round in a circle then, and not off at a tangent.

@@ -13,8 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.compare.fit import LONGEST_STEP, Model, columns, errors, moved
-from urdfkin.model.tree import FloatArray
+from urdfkin.dh.compare.fit import LONGEST_STEP, Model, Wanted, columns, moved
 
 _ROUNDS = 60
 #: Of the largest singular value: where damping starts, and between what it stays.
@@ -29,45 +28,41 @@ _ROUNDING = 1e-13
 _TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 
 
-def fit_freedoms(
-    model: Model, values: FloatArray, wanted: FloatArray, scale: float, *, turns: bool = True
-) -> Model:
+def fit_freedoms(model: Model, wanted: Wanted, *, turns: bool) -> Model:
     """The table's best fit.
 
     Args:
         model: Where to begin.
-        values: (s, n) the URDF's joint values.
-        wanted: (s, 4, 4) its tip there.
-        scale: Metres that a radian counts as much as.
+        wanted: What the URDF's tip does.
         turns: Whether offsets of neighbours are turned against each other where a descent ends.
     """
     for _ in range(2 * len(model.cells)):
-        model, size = _descended(model, values, wanted, scale)
-        if not turns or size <= _ROUNDING * scale * math.sqrt(6 * len(values)):
+        model, size = _descended(model, wanted)
+        if not turns or size <= _ROUNDING * wanted.scale * math.sqrt(6 * len(wanted.values)):
             break
-        turned = min(_turned(model), key=lambda one: _size(one, values, wanted, scale), default=model)
-        if _size(turned, values, wanted, scale) >= size:
+        turned = min(_turned(model), key=lambda one: _size(one, wanted), default=model)
+        if _size(turned, wanted) >= size:
             break
         model = turned
     return model
 
 
-def _size(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> float:
-    return float(np.linalg.norm(errors(model.poses(values), wanted, scale)))
+def _size(model: Model, wanted: Wanted) -> float:
+    return float(np.linalg.norm(wanted.errors(model.poses(wanted.values))))
 
 
-def _descended(model: Model, values: FloatArray, wanted: FloatArray, scale: float) -> tuple[Model, float]:
-    size, damping, slow = _size(model, values, wanted, scale), _DAMPING, 0
+def _descended(model: Model, wanted: Wanted) -> tuple[Model, float]:
+    size, damping, slow = _size(model, wanted), _DAMPING, 0
     for _ in range(_ROUNDS):
-        poses, freedoms, _ = columns(model, values, scale)
+        poses, freedoms, _ = columns(model, wanted)
         U, S, Vt = np.linalg.svd(freedoms, full_matrices=False)
-        along = U.T @ errors(poses, wanted, scale)
+        along = U.T @ wanted.errors(poses)
         before = size
         while damping <= _MOST:
             free = Vt.T @ (S / (S**2 + (damping * S[0]) ** 2) * along)
-            if np.abs(free).max() <= LONGEST_STEP * scale:
-                trial = moved(model, free, scale)
-                if (trial_size := _size(trial, values, wanted, scale)) < size:
+            if np.abs(free).max() <= LONGEST_STEP * wanted.scale:
+                trial = moved(model, free, wanted.scale)
+                if (trial_size := _size(trial, wanted)) < size:
                     model, size = trial, trial_size
                     break
             damping *= _HARDER

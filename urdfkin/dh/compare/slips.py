@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.dh.compare.agreement import best_fit
-from urdfkin.dh.convert import to_standard
+from urdfkin.dh.convert import to_convention
 from urdfkin.dh.derive import Choices, Last, derive
 from urdfkin.dh.reading import Reading, as_said, other_readings
 from urdfkin.dh.row import Convention
@@ -110,7 +110,7 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     are not parallel the offset along it, gathered along parallel axes. A sliding axis has no place: distances
     from it and offsets beside it say nothing, nor do offsets along the first axis, which the base takes up.
     """
-    rows = (to_standard(table) if table.convention is Convention.MODIFIED else table).rows
+    rows = to_convention(table, Convention.STANDARD).rows
     numbers, offset, known = list[float](), 0.0, False
     for row, following in pairwise(rows):
         placed = row.kind.turns and following.kind.turns
