@@ -16,6 +16,7 @@ from tests.cli.running import urdfkin as command
 from tests.lint.cases.arm import arm
 from urdfkin.errors import InputError, OracleError
 from urdfkin.lint.pages import find_rule, page
+from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf import mjcf
 from urdfkin.urdf.mjcf import is_mjcf, read_mjcf
@@ -199,8 +200,11 @@ def test_an_equality_between_two_joints_is_obeyed() -> None:
 
 @pytest.mark.parametrize(
     "broken",
-    [("_moved", lambda p: np.eye(4)), ("_turned", lambda axis, angle: np.eye(4))],
-    ids=lambda x: x[0],
+    [
+        ("pose", lambda R=None, p=None: np.eye(4) if R is None else pose(R, p)),
+        ("rotation_about", lambda axis, angle: np.eye(3)),
+    ],
+    ids=["moved by nothing", "turned by nothing"],
 )
 def test_a_slip_in_the_reading_is_found_when_it_is_loaded(
     broken: tuple[str, object], monkeypatch: pytest.MonkeyPatch

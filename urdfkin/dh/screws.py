@@ -26,6 +26,7 @@ from urdfkin.kinematics.roundings import EPS, ROW
 from urdfkin.model.chain import FrameChain, motion_about_z
 from urdfkin.model.coupling import Coupling, coupling_of
 from urdfkin.model.given import Given
+from urdfkin.model.pose import pose
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -137,13 +138,13 @@ class Screws:
         for i, (joint, screw, point) in enumerate(zip(self.joints, self.space, self.points, strict=True)):
             limit = joint.limit if joint.kind.turns else joint.limit or UNBOUNDED_SLIDE
             axis = screw[:3] if joint.kind.turns else screw[3:]
-            T = _moved(point - here)
+            T = pose(p=point - here)
             joints.append(
                 (Joint(joint.name, joint.kind, 0, T, axis, limit, joint.mimic), links[i], links[i + 1])
             )
             here = point
         end = Joint(
-            f"{self.tip_frame}_fixed", JointKind.FIXED, 0, _moved(-here) @ self.M, np.array([1.0, 0, 0])
+            f"{self.tip_frame}_fixed", JointKind.FIXED, 0, pose(p=-here) @ self.M, np.array([1.0, 0, 0])
         )
         return build_tree(self.robot, self.base_frame, [*joints, (end, links[-1], self.tip_frame)])
 
@@ -281,10 +282,4 @@ def exp_screw(screw: FloatArray, values: ArrayLike) -> FloatArray:
     T[..., :3, :3] = exp_rotation(q[..., None] * w)
     p = np.cross(w, v)  # the axis' point nearest to the origin: a turn leaves it where it is
     T[..., :3, 3] = p - T[..., :3, :3] @ p + q[..., None] * (w @ v) * w
-    return T
-
-
-def _moved(p: FloatArray) -> FloatArray:
-    T = np.eye(4)
-    T[:3, 3] = p
     return T

@@ -21,13 +21,13 @@ from functools import cached_property
 
 import numpy as np
 
+from urdfkin.compiled.plan import turned
 from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
 from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.dh.lengths import demand_squares
 from urdfkin.dh.noise import Noise, noise_of, tilt_of
 from urdfkin.dh.normals import NearParallel, Step, cleaned_angle, cleaned_length, step_between
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.chain import motion_about_z
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
@@ -224,9 +224,7 @@ def _links(tree: KinematicTree) -> list[_Link]:
     carried = [(-1, np.eye(4), 0)]
     for j, (joint, way) in enumerate(zip(tree.joints, _ways(tree), strict=True)):
         antecedent, T, folded = carried[joint.parent]
-        align = np.eye(4)
-        if joint.kind.has_axis:
-            align[:3, :3] = axis_aligning(joint.axis)
+        align = turned(joint)
         here = T @ joint.T_parent_joint @ align
         noise, tilt = noise_of(folded + 1, 0.0, way), tilt_of(here)
         left_out = links[antecedent].left_out if antecedent >= 0 else 0.0

@@ -19,6 +19,7 @@ from urdfkin.errors.showing import Sheet, Shown, Table
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.model.coupling import Coupling, coupling_of
 from urdfkin.model.given import Given
+from urdfkin.model.pose import inverse, pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, frozen
 
 #: Metres that a robot counts as large at least: what stands on one spot has a size to divide by, too.
@@ -227,19 +228,10 @@ def _around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray]:
     """The constants before and after a joint's motion about its own z, in the path's direction."""
     if not joint.kind.has_axis:
         return (inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)
-    align = np.eye(4)
-    align[:3, :3] = axis_aligning(-joint.axis if backwards else joint.axis)
+    align = pose(axis_aligning(-joint.axis if backwards else joint.axis))
     if backwards:
         return align, align.T @ inverse(joint.T_parent_joint)
     return joint.T_parent_joint @ align, align.T
-
-
-def inverse(T: FloatArray) -> FloatArray:
-    """(4, 4) the pose of the outer frame in the inner one."""
-    back = np.eye(4)
-    back[:3, :3] = T[:3, :3].T
-    back[:3, 3] = -T[:3, :3].T @ T[:3, 3]
-    return back
 
 
 def _norm(joint: Joint) -> float:

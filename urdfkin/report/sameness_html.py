@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from urdfkin.kinematics.roundings import NOT_ZERO
-from urdfkin.model.chain import inverse
 from urdfkin.model.mechanisms.mechanism import Mechanism
+from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.document import asset
 from urdfkin.report.html import as_is, environment

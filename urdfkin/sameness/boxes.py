@@ -18,10 +18,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from urdfkin.kinematics.roundings import NOT_ZERO
-from urdfkin.model.chain import inverse
 from urdfkin.model.mechanisms.alignment import FramePair
 from urdfkin.model.mechanisms.upper import behind_first
 from urdfkin.model.mechanisms.variables import Line
+from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.sameness.curvature import curvature

@@ -22,6 +22,7 @@ from urdfkin.model.mechanisms.mechanism import Screw
 from urdfkin.model.mechanisms.support import Grid, Support, point
 from urdfkin.model.mechanisms.upper import COARSE, at_the_frame, before_it, difference, passed
 from urdfkin.model.mechanisms.variables import Pair, Variables
+from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 
 _ORIGIN = np.zeros(3)
@@ -106,8 +107,5 @@ def _without_place(step: Step) -> Step:
     """What a step does to vectors."""
     axis = Screw(step.axis.direction, _ORIGIN)
     other = axis if step.other is step.axis else Screw(step.other.direction, _ORIGIN)
-    before = IDENTITY
-    if step.before is not IDENTITY:
-        before = np.eye(4)
-        before[:3, :3] = step.before[:3, :3]
+    before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
     return replace(step, axis=axis, other=other, before=before)

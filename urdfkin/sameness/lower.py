@@ -13,10 +13,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from urdfkin.kinematics.roundings import EPS, FOLLOWER
-from urdfkin.model.chain import inverse
 from urdfkin.model.configuration import neutral
 from urdfkin.model.mechanisms.alignment import Alignment, FramePair
 from urdfkin.model.mechanisms.variables import Line, Variables
+from urdfkin.model.pose import inverse
 from urdfkin.model.ranges import WIDEST
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot

@@ -23,6 +23,7 @@ import numpy as np
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation.axis_angle import rotation_about
 from urdfkin.kinematics.rotation.quaternion import rotation_of
+from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree
 from urdfkin.system.files import at_home
 from urdfkin.urdf.mujoco import library
@@ -260,7 +261,7 @@ class _Reader:
             )
         first, count = int(m.body_jntadr[i]), int(m.body_jntnum[i])
         for j in range(first, first + count):
-            anchor, name = _moved(m.jnt_pos[j]), self._hinges[j]
+            anchor, name = pose(p=m.jnt_pos[j]), self._hinges[j]
             ends_here = j == first + count - 1 and not m.jnt_pos[j].any()
             child = link if ends_here else self._new("link", f"{name}_link")
             joint, back = self._joint(j, name, T @ anchor)
@@ -273,7 +274,7 @@ class _Reader:
     def _joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
         """A joint that stands at T, and the way from its frame back to the body's."""
         m, kinds = self.model, self.mujoco.mjtJoint
-        kind, axis, back = m.jnt_type[j], m.jnt_axis[j], _moved(-m.jnt_pos[j])
+        kind, axis, back = m.jnt_type[j], m.jnt_axis[j], pose(p=-m.jnt_pos[j])
         if kind == kinds.mjJNT_BALL:
             raise InputError(
                 "a ball joint cannot be held: urdfkin has no joint for it yet",
@@ -289,7 +290,7 @@ class _Reader:
             return Joint(name, JointKind.FLOATING, 0, np.eye(4), np.array([1.0, 0.0, 0.0])), np.eye(4)
         zero, turns = float(m.qpos0[at]), kind == kinds.mjJNT_HINGE
         if zero:
-            T = T @ (_turned(axis, -zero) if turns else _moved(-zero * axis))
+            T = T @ (pose(rotation_about(axis, -zero)) if turns else pose(p=-zero * axis))
         held_as, limit = self._range(j, name, turns=turns)
         return Joint(name, held_as, 0, T, axis, limit), back
 
@@ -359,19 +360,4 @@ def _resolved(rules: dict[str, Mimic], follower: str) -> Mimic:
 
 
 def _pose(p: FloatArray, quaternion: FloatArray) -> FloatArray:
-    T = np.eye(4)
-    unit = np.roll(quaternion, -1) / np.linalg.norm(quaternion)
-    T[:3, :3], T[:3, 3] = rotation_of(unit), p
-    return T
-
-
-def _moved(p: FloatArray) -> FloatArray:
-    T = np.eye(4)
-    T[:3, 3] = p
-    return T
-
-
-def _turned(axis: FloatArray, angle: float) -> FloatArray:
-    T = np.eye(4)
-    T[:3, :3] = rotation_about(axis, angle)
-    return T
+    return pose(rotation_of(np.roll(quaternion, -1) / np.linalg.norm(quaternion)), p)

@@ -15,7 +15,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.model.chain import inverse
+from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
 from urdfkin.urdf.mjcf import UNBOUNDED
 

@@ -9,9 +9,8 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
 
-import numpy as np
-
 from urdfkin.kinematics.rotation import rotation_from_rpy
+from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
@@ -113,13 +112,10 @@ def _numbers(words: str, count: int) -> tuple[float, ...] | None:
 
 
 def _pose(origin: Element | None) -> FloatArray | None:
-    T = np.eye(4)
-    if origin is not None:
-        xyz, rpy = (_numbers(origin.get(name, "0 0 0"), 3) for name in ("xyz", "rpy"))
-        if xyz is None or rpy is None:
-            return None
-        T[:3, :3], T[:3, 3] = rotation_from_rpy(rpy), xyz
-    return T
+    if origin is None:
+        return pose()
+    xyz, rpy = (_numbers(origin.get(name, "0 0 0"), 3) for name in ("xyz", "rpy"))
+    return None if xyz is None or rpy is None else pose(rotation_from_rpy(rpy), xyz)
 
 
 def _rgba(material: Element) -> tuple[float, float, float, float] | None:

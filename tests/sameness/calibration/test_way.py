@@ -14,7 +14,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.kinematics import equations as eq
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.loading import load
-from urdfkin.model.chain import inverse
+from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.sameness.calibration.models import Model, table_model, urdf_model
 from urdfkin.verify.exact.decimals import ExactJoint, read_exact

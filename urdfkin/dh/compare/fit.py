@@ -16,6 +16,7 @@ import numpy as np
 from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.kinematics.roundings import NOT_ZERO
+from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 
 #: Cells in the order in which they act: theta, d, a, alpha, beta.
@@ -245,7 +246,4 @@ def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | Non
 
 def _pushed(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
     """T followed by a small shift and turn in its own axes."""
-    push = np.eye(4)
-    push[:3, :3] = exp_rotation(twist[3:] / scale)
-    push[:3, 3] = twist[:3]
-    return np.asarray(T @ push)
+    return T @ pose(exp_rotation(twist[3:] / scale), twist[:3])

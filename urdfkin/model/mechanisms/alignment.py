@@ -18,9 +18,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from urdfkin.model.chain import inverse
 from urdfkin.model.mechanisms.conversion import Conversion
 from urdfkin.model.mechanisms.mechanism import Mechanism, Screw, size_of
+from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 
 IDENTITY = np.eye(4)

@@ -17,6 +17,7 @@ import numpy as np
 
 from urdfkin.kinematics.rotation.axis_angle import rotation_about
 from urdfkin.kinematics.rotation.quaternion import quaternion_of, rotation_of
+from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, JointKind
 
 #: What the entries of a pose that was computed may be off by, as a share of their size.
@@ -96,6 +97,4 @@ def undoing(M: FloatArray) -> FloatArray:
     M is a lift by h, a motion in the plane, and perhaps half a turn about x: N undoes the lift and the turn.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
-    lowered = np.eye(4)
-    lowered[2, 3] = -M[2, 3]
-    return over @ lowered
+    return over @ pose(p=(0.0, 0.0, -M[2, 3]))

@@ -9,6 +9,7 @@ import numpy as np
 from urdfkin.kinematics.rotation.aligning import axis_aligning
 from urdfkin.kinematics.rotation.axis_angle import exp_rotation, rotation_about
 from urdfkin.model.mechanisms.mechanism import Screw
+from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 
 #: What lies across an axis by less, a unit vector or metres, lies along it, and has no direction there.
@@ -17,13 +18,10 @@ ALONG = 1e-12
 
 def along(screw: Screw, value: float, *, turns: bool) -> FloatArray:
     """(4, 4) exp(S t): a turn about a screw by radians, or a slide along it by metres."""
-    T = np.eye(4)
-    if turns:
-        T[:3, :3] = rotation_about(screw.direction, value)
-        T[:3, 3] = screw.point - T[:3, :3] @ screw.point
-    else:
-        T[:3, 3] = screw.direction * value
-    return T
+    if not turns:
+        return pose(p=screw.direction * value)
+    R = rotation_about(screw.direction, value)
+    return pose(R, screw.point - R @ screw.point)
 
 
 def between(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
@@ -33,14 +31,11 @@ def between(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float
     axis and a way along it, is a joint's zero or nobody's business. A slide's axis has no place.
     """
     R, tilt = shortest_turn(start.direction, end.direction)
-    T = np.eye(4)
-    T[:3, :3] = R
     across = np.zeros(3)
     if turns:
         way = end.point - start.point
         across = way - end.direction * (end.direction @ way)
-    T[:3, 3] = start.point - R @ start.point + across
-    return T, tilt, float(np.linalg.norm(across))
+    return pose(R, start.point - R @ start.point + across), tilt, float(np.linalg.norm(across))
 
 
 def shortest_turn(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:

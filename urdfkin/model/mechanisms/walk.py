@@ -6,13 +6,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from urdfkin.model.chain import inverse
 from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Gauge, Step
 from urdfkin.model.mechanisms.conversion import Conversion, onto_plane, undoing
 from urdfkin.model.mechanisms.guesses import behind, laid, zeros
 from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, Tolerance, size_of
 from urdfkin.model.mechanisms.pairing import Pairing, family
 from urdfkin.model.mechanisms.rigid import along, apart, between, turn_about
+from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 
 #: What the next axis leaves open, so many joints ahead decide.

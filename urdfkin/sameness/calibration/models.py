@@ -18,13 +18,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from urdfkin.compiled.plan import turned
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.kinematics.rotation.euler import coordinate_rotation
-from urdfkin.model.chain import FrameChain, chain, inverse, steps_between
+from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.coupling import Coupling
+from urdfkin.model.pose import inverse, pose
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
 from urdfkin.sameness.calibration.way import Motion, Parameter, Way
 
@@ -79,7 +80,7 @@ class Model:
             push = self._push(name, at)
             if (push != np.eye(4)).any():
                 joint = self.source.joints[self.source.joint_index(name)]
-                A = _aligning(joint)
+                A = turned(joint)
                 found[name] = joint.T_parent_joint @ A @ push @ A.T
         return found
 
@@ -182,7 +183,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     last = max((i for i, (joint, _) in enumerate(steps) if joint.kind.has_axis), default=-1)
     ending = {len(steps) - 1} if last < len(steps) - 1 else set()
     for i, (joint, backwards) in enumerate(steps):
-        A = _aligning(joint)
+        A = turned(joint)
         wanted = _wanted(fit, joint, ending=i in ending)
         if backwards:
             maker.steps.append(A)
@@ -207,13 +208,6 @@ def _wanted(fit: Collection[str], joint: Joint, *, ending: bool) -> Collection[s
         return _ALL
     own = "rz" if joint.kind.turns else "z"
     return (own,) if "offsets" in fit and joint.kind.has_axis else ()
-
-
-def _aligning(joint: Joint) -> FloatArray:
-    A = np.eye(4)
-    if joint.kind.has_axis:
-        A[:3, :3] = axis_aligning(joint.axis)
-    return A
 
 
 def table_model(table: DHTable, fit: Collection[str]) -> Model:
@@ -250,9 +244,8 @@ def table_model(table: DHTable, fit: Collection[str]) -> Model:
 
 def elementary(turns: bool, axis: int, value: float) -> FloatArray:
     """(4, 4) a turn about, or a slide along, a coordinate axis."""
-    T = np.eye(4)
-    if turns:
-        T[:3, :3] = coordinate_rotation(axis, np.array(value))
-    else:
-        T[axis, 3] = value
-    return T
+    return (
+        pose(coordinate_rotation(axis, np.array(value)))
+        if turns
+        else pose(p=np.where(np.arange(3) == axis, value, 0.0))
+    )

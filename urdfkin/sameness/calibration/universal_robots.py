@@ -22,6 +22,7 @@ import yaml
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.numerals import decimal
 from urdfkin.kinematics.rotation import rotation_from_euler
+from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree
 from urdfkin.system.files import read_text
 
@@ -81,9 +82,7 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
             found = repr(value)[:60] if isinstance(value, float | str) else type(value).__name__
             raise InputError("not a finite number", where=f"{where}, {link} {name}", found=found)
         six.append(number)
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = rotation_from_euler(sequence, six[3:]), six[:3]
-    return T
+    return pose(rotation_from_euler(sequence, six[3:]), six[:3])
 
 
 def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
