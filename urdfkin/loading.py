@@ -6,7 +6,7 @@ import os
 import warnings
 from collections.abc import Mapping
 from types import ModuleType
-from typing import Any, cast
+from typing import Any, TypedDict, Unpack, cast
 
 from urdfkin.dh.doubts import doubts
 from urdfkin.dh.read import is_table_file, read_table_or_screws
@@ -42,6 +42,15 @@ from urdfkin.verify.witnesses import WitnessName, witness_of
 
 #: What concerns those who write a URDF, and nobody whose URDF was made of something else.
 _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
+
+
+class How(TypedDict):
+    """What a robot is loaded with, whatever it is made of: arguments of `load`."""
+
+    verify: Verify
+    mimic: bool | None
+    root_joint: str | None
+    oracle: WitnessName
 
 
 def load(
@@ -90,7 +99,7 @@ def load(
     >>> float(robot.placement([0.0, 0.0], "tip")[0, 3])
     0.7
     """
-    how: dict[str, Any] = {"verify": verify, "mimic": mimic, "root_joint": root_joint, "oracle": oracle}
+    how: How = {"verify": verify, "mimic": mimic, "root_joint": root_joint, "oracle": oracle}
     if (found := described(source)) is not None:
         source = found.path
         xacro_args = {**found.xacro_args, **(xacro_args or {})}
@@ -112,11 +121,7 @@ def load(
 def _load_table(
     source: DHTable | Screws | str | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,
-    *,
-    verify: Verify,
-    mimic: bool | None,
-    root_joint: str | None,
-    oracle: WitnessName,
+    **how: Unpack[How],
 ) -> Robot:
     _refuse_arguments(xacro_args, "a table")
     table: DHTable | Screws
@@ -132,11 +137,9 @@ def _load_table(
         for doubt in doubts(table):
             warnings.warn(f"{name}: {doubt}", UrdfWarning, stacklevel=3)
     text = Text(urdf.encode(), name, name)
-    robot = robot_of(
-        text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, made=True, table=True
-    )
-    if checked_choice(verify):
-        plain = mimic is not False and root_joint is None
+    robot = robot_of(text, **how, made=True, table=True)
+    if checked_choice(how["verify"]):
+        plain = how["mimic"] is not False and how["root_joint"] is None
         verifier = (robot if plain else robot_of(text)).verifier
         if isinstance(table, Screws):
             check_screws(verifier, table)
@@ -149,11 +152,7 @@ def _load_mjcf(
     source: str | bytes | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,
     streamed: Text | None,
-    *,
-    verify: Verify,
-    mimic: bool | None,
-    root_joint: str | None,
-    oracle: WitnessName,
+    **how: Unpack[How],
 ) -> Robot:
     _refuse_arguments(xacro_args, "MJCF")
     read = read_mjcf(source)
@@ -161,11 +160,9 @@ def _load_mjcf(
     name = as_word(path) if path is not None else streamed.source if streamed else name_of(source)
     text = Text(write_urdf(read.tree).encode(), f"{name} (as a URDF)", name)
     listed = tuple(left_out(one, name) for one in read.listed)
-    robot = robot_of(
-        text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, listed=listed, made=True
-    )
-    if checked_choice(verify):
-        plain = mimic is not False and root_joint is None
+    robot = robot_of(text, **how, listed=listed, made=True)
+    if checked_choice(how["verify"]):
+        plain = how["mimic"] is not False and how["root_joint"] is None
         verifier = (robot if plain else robot_of(text, listed=listed, made=True)).verifier
         robot.verifier.reading = demand_the_mjcfs(verifier, read, None if path is None else str(path))
     return robot
@@ -174,18 +171,14 @@ def _load_mjcf(
 def _load_model(
     source: Any,
     xacro_args: Mapping[str, object] | None,
-    *,
-    verify: Verify,
-    mimic: bool | None,
-    root_joint: str | None,
-    oracle: WitnessName,
+    **how: Unpack[How],
 ) -> Robot:
     _refuse_arguments(xacro_args, "a pinocchio.Model")
     read = tree_of_model(source)
     text = Text(write_urdf(read.tree).encode(), "<pinocchio.Model>", "<pinocchio.Model>")
-    robot = robot_of(text, verify=verify, mimic=mimic, root_joint=root_joint, oracle=oracle, made=True)
-    if checked_choice(verify):
-        plain = root_joint is None
+    robot = robot_of(text, **how, made=True)
+    if checked_choice(how["verify"]):
+        plain = how["root_joint"] is None
         verifier = (robot if plain else robot_of(text, made=True)).verifier
         robot.verifier.reading = demand_the_models(verifier, read, source)
     return robot
