@@ -33,7 +33,7 @@ from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
 from urdfkin.urdf.mujoco import library
 from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.verify.followers import rules_of_text
-from urdfkin.verify.pinocchio import depth_of
+from urdfkin.verify.pinocchio import demand_the_same, depth_of
 from urdfkin.verify.pinocchio_base import BaseNumbers, nearest_quaternion
 
 #: What a root joint, or a base that moves, hangs from.
@@ -119,7 +119,7 @@ class MujocoOracle:
         self._model = self._compiled([*carrier, *joints])
         self._places = list(self._laid_out([*carrier, *joints], rules))
         self.nq, self.nv = tree.nq, tree.nv
-        self._demand_the_same(tree, moving, rules)
+        demand_the_same("MuJoCo", tree, moving, [name for name in moving if name not in rules])
         self._moving = [JointFrame.of(name) for name in moving]
         self._constant = all(place.kind not in _PARTS for place in self._places)
         self._local = threading.local()
@@ -194,18 +194,6 @@ class MujocoOracle:
             yield _Place(
                 joint.kind, int(own.qposadr[0]), int(own.dofadr[0]), *at, rule.multiplier, rule.offset
             )
-
-    def _demand_the_same(
-        self, tree: KinematicTree, moving: Sequence[str], rules: Mapping[str, Mimic]
-    ) -> None:
-        """Names, order and who has coordinates: where these differ, a q does not mean the same to the two."""
-        for what, other, own in (
-            ("joints", moving, [joint.name for joint in tree.joints if joint.kind.nv]),
-            ("coordinates", [x for x in moving if x not in rules], [j.name for j in tree.joints if j.nv]),
-        ):
-            if list(other) != own:
-                found = ", ".join(sorted(set(other) ^ set(own))[:5]) or "the same in another order"
-                raise OracleError(f"the text has other {what} for MuJoCo", where=tree.name, found=found)
 
     def _ids(self, frames: Sequence[str]) -> list[int]:
         """MuJoCo's bodies: a link's own; a joint's frame is that of the link that it carries."""

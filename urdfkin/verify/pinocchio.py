@@ -42,6 +42,8 @@ MOST_RATES = 315
 #: Coordinates of a joint that moves freely.
 _CARTESIAN = 7
 
+#: Names that an error lists at most.
+_NAMED = 5
 #: What carries a robot whose base moves.
 _BASE = "base"
 
@@ -130,7 +132,7 @@ class Oracle:
             joints, self._index = self._put_on_free_flyer(joints)
         rules = self._rules(text, names) if mimic else {}
         self._layout = Layout(self._model, joints, names, rules)
-        self._demand_the_same_joints(names)
+        demand_the_same("Pinocchio", tree, names, self._layout.coordinates)
         self._local = threading.local()
 
     def _rules(self, text: str, joints: Sequence[str]) -> dict[str, Mimic]:
@@ -141,17 +143,6 @@ class Oracle:
             raise OracleError(
                 "the mimic rules read differently", where=self._tree.name, found=str(error)
             ) from error
-
-    def _demand_the_same_joints(self, theirs: Sequence[str]) -> None:
-        """Names, order and who has coordinates: where these differ, a q does not mean the same to the two."""
-        joints = self._tree.joints
-        for what, other, own in (
-            ("other joints", theirs, [joint.name for joint in joints if joint.kind.nv]),
-            ("other coordinates", self._layout.coordinates, [joint.name for joint in joints if joint.nv]),
-        ):
-            if list(other) != own:
-                found = ", ".join(sorted(set(other) ^ set(own))[:5]) or "the same in another order"
-                raise OracleError(f"Pinocchio finds {what} in this robot", where=self._tree.name, found=found)
 
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Have the model carried by a joint that can be given the base's motion; a root joint moves on top.
@@ -405,7 +396,7 @@ def mjcf_placements(
         raise OracleError("it does not accept the file", found=str(error).strip()) from error
     joints = dict(_numbered(model, list(coordinates)))
     if joints.keys() != coordinates.keys():
-        found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:5])
+        found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:_NAMED])
         raise OracleError("it finds other joints", found=found)
     if missing := [name for name in bodies if not model.existFrame(name)]:
         raise OracleError("it finds no such body", found=missing[0])
@@ -439,6 +430,23 @@ def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int
                 yield part, (joint.idx_q + i, 1)
         else:
             yield name, (joint.idx_q, joint.nq)
+
+
+def demand_the_same(
+    oracle: str, tree: KinematicTree, joints: Sequence[str], coordinates: Sequence[str]
+) -> None:
+    """Names, order and who has coordinates: where these differ, a q does not mean the same to the two.
+
+    Raises:
+        OracleError: they do.
+    """
+    for what, theirs, own in (
+        ("joints", joints, [joint.name for joint in tree.joints if joint.kind.nv]),
+        ("coordinates", coordinates, [joint.name for joint in tree.joints if joint.nv]),
+    ):
+        if list(theirs) != own:
+            found = ", ".join(sorted(set(theirs) ^ set(own))[:_NAMED]) or "the same in another order"
+            raise OracleError(f"{oracle} finds other {what} in this robot", where=tree.name, found=found)
 
 
 def depth_of(tree: KinematicTree) -> int:
