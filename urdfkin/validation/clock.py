@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import astuple, dataclass
 from typing import Any, ParamSpec, TypeVar
 
 _P = ParamSpec("_P")
@@ -31,27 +32,26 @@ class Clock:
 
     def ours(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Call something of urdfkin's."""
-        begin = time.perf_counter()
-        try:
+        with self._counted("urdfkin"):
             return function(*args, **kwargs)
-        finally:
-            self.urdfkin += time.perf_counter() - begin
 
     def theirs(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Call something of Pinocchio's."""
-        begin = time.perf_counter()
-        try:
+        with self._counted("pinocchio"):
             return function(*args, **kwargs)
-        finally:
-            self.pinocchio += time.perf_counter() - begin
 
     def witness(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Call something of a second witness's."""
+        with self._counted("second"):
+            return function(*args, **kwargs)
+
+    @contextmanager
+    def _counted(self, whose: str) -> Iterator[None]:
         begin = time.perf_counter()
         try:
-            return function(*args, **kwargs)
+            yield
         finally:
-            self.second += time.perf_counter() - begin
+            setattr(self, whose, getattr(self, whose) + (time.perf_counter() - begin))
 
     def close(self, seconds: float) -> None:
         """What the whole took."""
@@ -69,11 +69,4 @@ class Clock:
 
 def total(clocks: Iterable[Clock]) -> Clock:
     """The sum of several."""
-    whole = Clock()
-    for clock in clocks:
-        whole.read += clock.read
-        whole.urdfkin += clock.urdfkin
-        whole.pinocchio += clock.pinocchio
-        whole.compare += clock.compare
-        whole.second += clock.second
-    return whole
+    return Clock(*(sum(seconds) for seconds in zip(*map(astuple, clocks), strict=True)))

@@ -46,13 +46,12 @@ class SecondWitness:
     ) -> ThreeSides:
         """Its answers beside urdfkin's and Pinocchio's, about the block's frames or joints."""
         inputs = block.x.q, block.x.v, block.x.a
-        asked = block.joints if row.of == "joints" else block.frames
-        answers = block.clock.witness(row.theirs, self.oracle, inputs, asked, reference)
+        answers = block.clock.witness(row.theirs, self.oracle, inputs, block.asked(row)[0], reference)
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.witness.size(block.size))
         )
         if row.of == "joints":
-            bounds = (Bound(one.scale[:, block.places], one.k[:, block.places]) for one in bounds)
+            bounds = (block.part(one) for one in bounds)
         return three_sides(self.witness.name, ours, theirs, answers, *bounds)
 
 
@@ -139,23 +138,35 @@ class _Block(_Work):
         for row in validated():
             joints = [joint for joint in validated("joints") if joint.compute is row.compute]
             for reference in row.references:
-                name = reference.name.lower() if reference is not None else ""
                 ours = self.clock.ours(row.ours, self.plan, inputs, reference)
-                theirs = self.clock.theirs(row.theirs, self.oracle, inputs, self.frames, reference)
                 bound = row.bound(self.plan, self.size, reference)
-                found = self.tally(ours, theirs, bound, self.frames)
-                if second is not None:
-                    found = replace(found, witness=second.three_sides(self, row, reference, ours, theirs))
-                yield (row.name, name), found
+                yield self._held(row, reference, ours, bound, second)
                 for joint in joints:
-                    theirs = self.clock.theirs(joint.theirs, self.oracle, inputs, self.joints, reference)
-                    part = Bound(bound.scale[:, self.places], bound.k[:, self.places])
-                    own = ours[:, self.places]
-                    found = self.tally(own, theirs, part, self.joint_names)
-                    if second is not None:
-                        sides = second.three_sides(self, joint, reference, own, theirs)
-                        found = replace(found, witness=sides)
-                    yield (joint.name, name), found
+                    yield self._held(joint, reference, ours[:, self.places], self.part(bound), second)
+
+    def part(self, bound: Bound) -> Bound:
+        """What of a bound on the frames is one on the joints."""
+        return Bound(bound.scale[:, self.places], bound.k[:, self.places])
+
+    def asked(self, row: Quantity) -> tuple[Any, tuple[str, ...]]:
+        """What an oracle is asked about for a quantity, and its names."""
+        return (self.joints, self.joint_names) if row.of == "joints" else (self.frames, self.frames)
+
+    def _held(
+        self,
+        row: Quantity,
+        reference: Reference | None,
+        ours: FloatArray,
+        bound: Bound,
+        second: SecondWitness | None,
+    ) -> tuple[Key, Tally]:
+        asked, names = self.asked(row)
+        inputs = self.x.q, self.x.v, self.x.a
+        theirs = self.clock.theirs(row.theirs, self.oracle, inputs, asked, reference)
+        found = self.tally(ours, theirs, bound, names)
+        if second is not None:
+            found = replace(found, witness=second.three_sides(self, row, reference, ours, theirs))
+        return (row.name, reference.name.lower() if reference is not None else ""), found
 
 
 class _Screws(_Work):
