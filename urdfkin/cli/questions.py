@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 
+from urdfkin.lint.explain import WIDTH
 from urdfkin.system.files import read_text
 from urdfkin.system.resources import questions_page
 
@@ -24,13 +25,13 @@ def answer_to(topic: str) -> str | None:
     return known.get("-".join(topic.lower().split())) or (known[found[0]] if len(found) == 1 else None)
 
 
-def as_text(answer: str, width: int = 88) -> str:
+def as_text(answer: str) -> str:
     """A section for a terminal: filled paragraphs, code set in, and last what the code takes for granted."""
     words = _BLOCK.split(answer)
     prose, kinds, codes = words[::3], words[1::3], words[2::3]
     parts = []
     for text, code in zip(prose, [*codes, ""], strict=True):
-        parts += [textwrap.fill(one, width, break_on_hyphens=False) for one in text.strip("\n").split("\n\n")]
+        parts += [textwrap.fill(one, WIDTH, break_on_hyphens=False) for one in text.strip("\n").split("\n\n")]
         parts.append(_set_in(code))
     if "python" in kinds:
         parts += ["It runs after:", _set_in("".join(code for _, code in _BLOCK.findall(_sections()[0])))]

@@ -11,17 +11,16 @@ _COMPARED = 128
 
 #: Pairs of characters that are compared for one word, after what tells at a glance that names differ.
 WORK = 1_000_000
+#: How many names are offered.
+_OFFERED = 3
 
 
-def nearest(
-    word: str, known: Iterable[str], *, count: int = 3, cutoff: float = 0.6, work: int = WORK
-) -> list[str]:
-    """Up to `count` known names that look like `word`, the nearest first, as `difflib.get_close_matches`.
+def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int = WORK) -> list[str]:
+    """Up to three known names that look like `word`, the nearest first, as `difflib.get_close_matches`.
 
     Args:
         word: What was written.
         known: The names there are.
-        count: How many are wanted at most.
         cutoff: How alike they must be, from 0 to 1.
         work: Pairs of characters to compare before the search ends with what it has.
 
@@ -40,4 +39,4 @@ def nearest(
             break
         if (alike := matcher.ratio()) >= cutoff:
             found.append((alike, name))
-    return [name for _, name in heapq.nlargest(count, found)]
+    return [name for _, name in heapq.nlargest(_OFFERED, found)]

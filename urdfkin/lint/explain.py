@@ -10,23 +10,25 @@ from urdfkin.lint.rule import Rule
 
 #: Longest line of an example that is shown whole.
 _WIDEST = 100
+#: How wide prose is on a terminal.
+WIDTH = 88
 
 
-def explain(rule: Rule, width: int = 88) -> str:
+def explain(rule: Rule) -> str:
     """The page as plain text."""
     said = page(rule.id)
     paragraphs = [
         f"{rule.id} {rule.slug} ({rule.severity.value})",
-        textwrap.fill(said.title[0].upper() + said.title[1:] + ".", width),
-        textwrap.fill(said.why, width),
+        textwrap.fill(said.title[0].upper() + said.title[1:] + ".", WIDTH),
+        textwrap.fill(said.why, WIDTH),
         "Found in:\n\n" + _example(said.example),
         "Better:\n\n" + _example(said.cure),
-        textwrap.fill(said.others, width),
+        textwrap.fill(said.others, WIDTH),
     ]
     if rule.oracle is not None:
         paragraphs.append(
             textwrap.fill(
-                "Because of this, urdfkin computes the robot and reports every result as not verified.", width
+                "Because of this, urdfkin computes the robot and reports every result as not verified.", WIDTH
             )
         )
     if said.question is not None:

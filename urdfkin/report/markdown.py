@@ -31,7 +31,7 @@ _MARKS = {"verified": "✅", "disagrees": "❌", "not verified": "⚠️", "bad 
 _SHOWN = 3
 
 
-def as_markdown(document: Document, limit: int = LIMIT) -> str:
+def as_markdown(document: Document) -> str:
     """The report as a comment; robots that failed come first, and a line says what did not fit."""
     found = outcome_of(document)
     head = [
@@ -54,7 +54,7 @@ def as_markdown(document: Document, limit: int = LIMIT) -> str:
         "",
     ]
     robots = sorted(document["robots"], key=lambda robot: VERDICTS.index(robot["verdict"]))
-    room = limit - len("\n".join(head + foot))
+    room = LIMIT - len("\n".join(head + foot))
     return "\n".join(head + _body(robots, room) + foot)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from urdfkin.model.mechanisms.alignment import IDENTITY, FramePair, Step
 from urdfkin.model.mechanisms.mechanism import Screw
-from urdfkin.model.mechanisms.support import Grid, Support, point
+from urdfkin.model.mechanisms.support import Support, point
 from urdfkin.model.mechanisms.upper import COARSE, at_the_frame, before_it, difference, passed
 from urdfkin.model.mechanisms.variables import Pair, Variables
 from urdfkin.model.pose import pose
@@ -30,7 +30,7 @@ _Vectors = tuple[Support, Support]
 
 
 def curvature(
-    steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair, grid: Grid = COARSE
+    steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
     """Names of variables, and (variables, variables) what second derivatives of D are at most, metres.
 
@@ -38,7 +38,7 @@ def curvature(
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     found = np.zeros((len(names), len(names)))
-    for i, j, most in _bends(steps, pairs, variables, frame, grid):
+    for i, j, most in _bends(steps, pairs, variables, frame):
         if not most:
             continue
         if not all(pairs[k].a.slope and pairs[k].a.slope == pairs[k].b.slope for k in (i, j)):
@@ -52,11 +52,11 @@ def curvature(
 
 
 def _bends(
-    steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair, grid: Grid
+    steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
     """For two steps, i not in front of j, the largest second derivative by the joints' values."""
     free = [_without_place(step) for step in steps]
-    d, y = at_the_frame(frame, grid)
+    d, y = at_the_frame(frame, COARSE)
     for i in reversed(range(len(steps))):
         first = _derived(steps[i], pairs[i], variables, d, y)
         if steps[i].kind == "turns":

@@ -25,7 +25,7 @@ from urdfkin.model.ranges import WIDEST
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.sameness.boxes import MOST, tightened
-from urdfkin.sameness.lower import Search, pinocchios, urdfkins
+from urdfkin.sameness.lower import Search, pinocchios
 from urdfkin.sameness.result import Interval, JointMap, Sameness, Verdict, demand_joint_names
 from urdfkin.sameness.wording import differences, put_right, remarks
 from urdfkin.urdf.sources import Source
@@ -253,7 +253,7 @@ class Judge:
         if seen is None:
             return Interval(*names, 0.0, *upper, 0.0, (), ())
         metres, z = seen
-        poses = search.poses(z[np.newaxis], [frame], urdfkins)
+        poses = search.poses(z[np.newaxis], [frame])
         turned = apart(poses[0][0, 0], poses[1][0, 0])[0]
         q_a, q_b = search.configurations(z[np.newaxis])
         lower = max(0.0, metres - self.rounding(found, search.variables)[0])

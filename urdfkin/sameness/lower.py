@@ -109,22 +109,14 @@ class Search:
         off = np.abs(mapped - q_b) <= EPS * FOLLOWER * (1.0 + np.abs(mapped))
         return bool(off.all() and (low - room <= z).all() and (z <= high + room).all())
 
-    def poses(
-        self, z: FloatArray, frames: Sequence[FramePair], computed: Placements
-    ) -> tuple[FloatArray, FloatArray]:
-        """(n, frames, 4, 4) of A, and of B with its base where A's is.
-
-        Args:
-            z: (n, variables).
-            frames: Links of both.
-            computed: Who computes them, for either robot.
-        """
-        return self.poses_at(*self.configurations(z), frames, computed)
+    def poses(self, z: FloatArray, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
+        """(n, frames, 4, 4) of A at values (n, variables), and of B with its base where A's is."""
+        return self.poses_at(*self.configurations(z), frames, urdfkins)
 
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> tuple[FloatArray, FloatArray]:
-        """`poses` at configurations of each robot, (n, nq)."""
+        """`poses` at configurations of each robot, (n, nq), by whom `computed` says."""
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.found.base[1]]
@@ -148,11 +140,9 @@ class Search:
         low, high = self.ends.T
         return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
 
-    def metres(
-        self, z: FloatArray, frames: Sequence[FramePair], computed: Placements | None = None
-    ) -> FloatArray:
+    def metres(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
         """(n, frames) how far the frames' origins are apart; arguments as `poses`."""
-        return _distances(*self.poses(z, frames, computed or urdfkins))
+        return _distances(*self.poses(z, frames))
 
     def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
         """(n, frames) distances at random values and corners of the ranges; the values (n, variables)."""

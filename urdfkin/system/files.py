@@ -49,10 +49,10 @@ def read_bytes(path: Path, most: int | None = None) -> bytes:
         raise SourceError("cannot be read", where=shortened(path), found=reason) from error
 
 
-def read_text(path: Path, most: int | None = None) -> str:
+def read_text(path: Path) -> str:
     """What a file holds, as UTF-8 with or without a byte order mark; errors as `read_bytes`."""
     try:
-        return read_bytes(path, most).decode("utf-8-sig")
+        return read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SourceError("cannot be read", where=str(path), found=f"no UTF-8 text ({error})") from None
 

@@ -24,23 +24,16 @@ from urdfkin.view.figure import label, new_figure, style
 
 _X, _Z, _D, _A, _AXIS, _TEXT = "#c0392b", "#2456a6", "#6b7280", "#d97904", "#9aa7b5", "#222222"
 
+#: Of the eye, degrees: above the base's x-y plane, and about its z.
+_ELEVATION, _AZIMUTH = 20.0, -55.0
 
-def drawing(
-    table: DHTable,
-    q: ArrayLike | Mapping[str, float] | None = None,
-    *,
-    elevation: float = 20.0,
-    azimuth: float = -55.0,
-    labels: bool = True,
-) -> str:
+
+def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) -> str:
     """An SVG of the table's chain.
 
     Args:
         table: Any table.
         q: (coordinates,) rad and m, or a mapping by name; None is all zero.
-        elevation: Of the eye above the base's x-y plane, degrees.
-        azimuth: Of the eye about the base's z, degrees.
-        labels: Whether frames and joints are named.
 
     Raises:
         InputError: matplotlib is not installed, or `q` has the wrong length.
@@ -54,11 +47,10 @@ def drawing(
         points = np.concatenate(
             [frames[:, :3, 3], _corners(table, frames), tip[None, :3, 3], np.zeros((1, 3))]
         )
-        eye = _view(math.radians(elevation), math.radians(azimuth))
+        eye = _view(math.radians(_ELEVATION), math.radians(_AZIMUTH))
         sheet = _Sheet(axes, eye, max(float(np.ptp(points, axis=0).max()), 1e-3))
         _draw(sheet, table, frames, tip)
-        if labels:
-            sheet.write_labels()
+        sheet.write_labels()
         axes.set_aspect("equal")
         axes.set_axis_off()
         title = label(f"{table.robot}: {table.base_frame} to {table.tip_frame}")

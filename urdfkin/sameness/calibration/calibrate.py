@@ -42,6 +42,8 @@ _DEPENDENT = 1e-12
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Times `Way.rounding`: Pinocchio goes to the base and to the tip, through origins that were written anew.
 _READ_BACK = 4.0
+#: Parameters or poses that a doubt names.
+_NAMED = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -368,6 +370,6 @@ def _doubts(found: Calibration) -> Iterator[str]:
         yield f"a URDF has no gains: {_listed(name[k] for k in gains)} are not written"
 
 
-def _listed(names: Iterable[str], most: int = 6) -> str:
+def _listed(names: Iterable[str]) -> str:
     every = list(names)
-    return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
+    return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")

@@ -131,11 +131,11 @@ def _posed(T: FloatArray, where: str) -> FloatArray:
     return good
 
 
-def checked_poses(poses: ArrayLike, where: str = "poses") -> FloatArray:
+def checked_poses(poses: ArrayLike) -> FloatArray:
     """(s, 4, 4) or (s, 3) as numbers; raises InputError for anything else."""
-    array = scalars(poses, where)
+    array = scalars(poses, "poses")
     if array.ndim == 2 and array.shape[1] == 3:
         return array
     if array.ndim == 3 and array.shape[1:] == (4, 4):
-        return _posed(array, where)
-    raise InputError(f"{where} are (n, 4, 4), or positions (n, 3)", found=f"shape {array.shape}")
+        return _posed(array, "poses")
+    raise InputError("poses are (n, 4, 4), or positions (n, 3)", found=f"shape {array.shape}")
