@@ -9,8 +9,8 @@ where four parameters can; a prismatic axis keeps the line that the URDF draws, 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
 
@@ -24,9 +24,11 @@ from urdfkin.dh.normals import (
     Step,
     cleaned_angle,
     cleaned_length,
+    lifted,
     step_between,
 )
 from urdfkin.dh.row import Convention, DHRow, convention_of
+from urdfkin.dh.steps_like import PairLike, near, steps_like
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
@@ -144,16 +146,19 @@ def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> 
     first, *between, end = noises(chain, reach)
     _use_freedom_of_prismatic_axes(chain, constants, choices, reach)
     base, phi_in, carry = _frame_zero(constants[0], reach, first)
-    rows, steps = list[tuple[float, float]](), list[Step]()
-    for i, (A, noise) in enumerate(zip(constants[1:-1], between, strict=True)):
-        if like is None:
-            step, theta = _next_step(A, phi_in, carry, reach, choices, noise)
-        else:
-            step, theta = _step_like(like.rows[i], A, phi_in, carry, reach, choices, noise, i)
-        rows.append((theta, step.delta))
-        steps.append(step)
-        phi_in, carry = step.phi_next, step.delta_next
-    theta, d, last, tool = _last(_lifted(constants[-1], carry), phi_in, carry, reach, choices, end)
+    if like is None:
+        steps, thetas = _steps(constants[1:-1], phi_in, carry, reach, choices, between)
+    else:
+        pairs = [
+            PairLike(A, row, reach, noise, choices.near_parallel)
+            for A, row, noise in zip(constants[1:-1], like.rows[:-1], between, strict=True)
+        ]
+        tip = _passed_to_last(like, constants[-1], choices, end)
+        steps, thetas = steps_like(pairs, phi_in, carry, tip)
+    if steps:
+        phi_in, carry = steps[-1].phi_next, steps[-1].delta_next
+    rows = [(theta, step.delta) for theta, step in zip(thetas, steps, strict=True)]
+    theta, d, last, tool = _last(lifted(constants[-1], carry), phi_in, carry, reach, choices, end)
     if like is not None:
         theta, d, last, tool = _last_like(like, theta, d, last, tool)
     rows.append((theta, d))
@@ -311,55 +316,39 @@ def _clean_rotation(T: FloatArray) -> None:
     R[np.abs(R) <= ENTRY * EPS] = 0.0
 
 
-def _lifted(A: FloatArray, carry: float) -> FloatArray:
-    """Tz(carry) A: measured from the origin of the DH frame instead of the joint's."""
-    lifted = A.copy()
-    lifted[2, 3] += carry
-    return lifted
-
-
-def _next_step(
-    A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: Noise
-) -> tuple[Step, float]:
-    """The step to the next axis and theta of its row, with x turned so that theta stays small."""
-    each = choices.parallel_offset is not ParallelOffset.LAST
-    step = step_between(_lifted(A, carry), reach, choices.near_parallel, -phi_in, each, noise)
-    theta = cleaned_angle(phi_in + step.phi)
-    if _points_back(step, theta, choices.sign):
-        step = step.turned()
-        theta = cleaned_angle(phi_in + step.phi)
-    return step, theta
-
-
-def _step_like(
-    row: DHRow,
-    A: FloatArray,
+def _steps(
+    constants: Sequence[FloatArray],
     phi_in: float,
     carry: float,
     reach: float,
     choices: Choices,
-    noise: Noise,
-    i: int,
-) -> tuple[Step, float]:
-    """The step with x as a row of another table has it, and d as there where that is free."""
+    noise: Sequence[Noise],
+) -> tuple[list[Step], list[float]]:
+    """The steps between consecutive axes and theta of each row, with x turned so that theta stays small."""
+    each = choices.parallel_offset is not ParallelOffset.LAST
+    steps, thetas = list[Step](), list[float]()
+    for A, rounding in zip(constants, noise, strict=True):
+        step = step_between(lifted(A, carry), reach, choices.near_parallel, -phi_in, each, rounding)
+        theta = cleaned_angle(phi_in + step.phi)
+        if _points_back(step, theta, choices.sign):
+            step = step.turned()
+            theta = cleaned_angle(phi_in + step.phi)
+        steps.append(step)
+        thetas.append(theta)
+        phi_in, carry = step.phi_next, step.delta_next
+    return steps, thetas
 
-    def step_from(height: float) -> Step:
-        lifted = _lifted(A, carry - height)
-        step = step_between(lifted, reach, choices.near_parallel, row.theta - phi_in, noise=noise)
-        return replace(step, delta=step.delta + height) if height else step
 
-    step = step_from(0.0)
-    if row.d and i > 0 and (step.beta or step.alpha in (0.0, math.pi)):
-        step = step_from(row.d)
+def _passed_to_last(like: DHTable, A: FloatArray, choices: Choices, noise: Noise) -> float | None:
+    """What gives the last joint the other table's d if passed on to it; None where tool or slide takes it."""
+    row = like.rows[-1]
+    if not row.kind.turns or not _has_no_tool(like) or not _representable(A, choices, noise):
+        return None
+    return float(row.d - A[2, 3])
 
-    def unlike(one: Step) -> tuple[float, float]:
-        apart = abs(math.remainder(one.alpha - row.alpha, 2.0 * math.pi))
-        turned = abs(math.remainder(phi_in + one.phi - row.theta, 2.0 * math.pi))
-        return round(abs(one.a - row.a) / (reach or 1.0) + apart, 6), turned
 
-    if not step.free:
-        step = min((step, step.turned()), key=unlike)
-    return step, _near(phi_in + step.phi, row.theta)
+def _has_no_tool(table: DHTable) -> bool:
+    return bool(np.abs(table.tool - np.eye(4)).max() < 1e-6)
 
 
 def _first_like(
@@ -379,9 +368,9 @@ def _last_like(
 ) -> tuple[float, float, Step, FloatArray]:
     """The last row's own numbers if it ends where the other one does, else the other's, and a tool."""
     row = like.rows[-1]
-    as_there = np.abs(like.tool - np.eye(4)).max() < 1e-6 and np.array_equal(tool, np.eye(4))
+    as_there = _has_no_tool(like) and np.array_equal(tool, np.eye(4))
     if as_there and abs(math.remainder(theta - row.theta, 2.0 * math.pi)) < RIGHT_ANGLE_SLACK:
-        return _near(theta, row.theta), d, last, tool
+        return near(theta, row.theta), d, last, tool
     height = d if row.d else 0.0
     rest = along_axis(theta, d) @ between_axes(last.a, last.alpha) @ tool
     tool = np.linalg.inv(along_axis(row.theta, height) @ between_axes(row.a, row.alpha)) @ rest
@@ -390,12 +379,6 @@ def _last_like(
     if np.abs(tool - np.eye(4)).max() <= ANGLE * EPS:
         tool = np.eye(4)
     return row.theta, height, Step(0.0, 0.0, row.a, row.alpha, 0.0, 0.0, 0.0), tool
-
-
-def _near(theta: float, there: float) -> float:
-    """An angle, by whole turns near another one, and that one where nothing but rounding is between them."""
-    off = math.remainder(theta - there, 2.0 * math.pi)
-    return there if abs(off) <= ANGLE * EPS else cleaned_angle(theta)
 
 
 def _points_back(step: Step, theta: float, sign: Sign) -> bool:

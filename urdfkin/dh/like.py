@@ -9,7 +9,6 @@ way, and its frame 0 stands upright as on the sheet.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +17,7 @@ from urdfkin.dh.compare.agreement import check_joints
 from urdfkin.dh.compare.align import align
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.derive import Choices, derive
-from urdfkin.dh.row import Convention, DHRow
+from urdfkin.dh.row import Convention
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.errors.questions import Question
@@ -26,6 +25,8 @@ from urdfkin.model.chain import FrameChain
 
 #: Of the reach, or radians: cells that differ by more are another robot's; zeros that do are other zeros.
 _ANOTHER, _OTHER = 0.1, 1e-2
+#: Likewise: cells that differ by less are equal.
+_ROUNDING = 1e-9
 
 
 def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
@@ -54,7 +55,7 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
     # What the first and the last joint count, base and tool take up.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
-    best, flip = (math.inf, 0.0, 0.0, 0.0), tuple[str, ...]()
+    best, flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
     for senses in dict.fromkeys(patterns):
         reversed_ = tuple(name for name, sense in zip(names, senses, strict=True) if sense < 0)
         found = derive(chain, replace(choices, convention=Convention.STANDARD, flip=reversed_), there)
@@ -71,28 +72,30 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
     return flip
 
 
-def _unlike(found: DHTable, there: DHTable, reach: float) -> tuple[float, float, float, float]:
-    """How unlike two tables are: in cells, in zeros and signs of d, in base and tool, in senses."""
-    n, cells, zeros = len(found.rows), 0.0, 0
+def _unlike(found: DHTable, there: DHTable, reach: float) -> tuple[float, int, int, float, int]:
+    """How unlike two tables are: in cells, by powers of ten, in zeros and signs of d, base and tool, senses.
+
+    A slide's line may be anywhere, so that the cells that tell of it decide between equals only.
+    """
+    n, cells, lines, zeros = len(found.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(found.rows, there.rows, strict=True)):
+        apart = abs(row.a - other.a) / reach
         if i < n - 1:  # base and tool take up what leads to the first axis and away from the last
             placed = row.kind.turns and found.rows[i + 1].kind.turns
-            cells = max(cells, abs(_angle(row.alpha, other.alpha)), abs(row.a - other.a) / reach * placed)
-        if 0 < i < n - 1 and row.kind.turns and not _slides_along(found.rows, i):
+            cells = max(cells, abs(_angle(row.alpha, other.alpha)), apart * placed)
+            lines = max(lines, abs(row.beta - other.beta), apart)
+        if 0 < i < n - 1 and row.kind.turns:
             cells = max(cells, abs(row.d - other.d) / reach)
+        elif 0 < i < n - 1:
+            lines = max(lines, abs(_angle(row.theta, other.theta)))
         zeros += abs(_angle(row.theta, other.theta)) > _OTHER
         zeros += row.d * other.d < 0.0
     ends = sum(
         float(np.abs(mine[:3, :3] - theirs[:3, :3]).max() > _OTHER)
         for mine, theirs in ((found.base, there.base), (found.tool, there.tool))
     )
-    return round(cells, 2), zeros, ends, sum(row.sense < 0 for row in found.rows)
-
-
-def _slides_along(rows: Sequence[DHRow], i: int) -> bool:
-    """Whether the joint before or after slides along a joint's axis: then d is a matter of its zero."""
-    beside = [(i - 1, i - 1), (i + 1, i)]
-    return any(not rows[k].kind.turns and abs(math.sin(rows[twist].alpha)) <= _OTHER for k, twist in beside)
+    power = math.ceil(math.log10(max(cells, lines, _ROUNDING)))
+    return round(cells, 2), power, zeros, ends, sum(row.sense < 0 for row in found.rows)
 
 
 def _angle(one: float, other: float) -> float:

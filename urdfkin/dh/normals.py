@@ -68,6 +68,13 @@ class Step:
         )
 
 
+def lifted(A: FloatArray, carry: float) -> FloatArray:
+    """Tz(carry) A: measured from the origin of the DH frame instead of the joint's."""
+    raised = A.copy()
+    raised[2, 3] += carry
+    return raised
+
+
 def step_between(
     A: FloatArray,
     reach: float,
@@ -92,7 +99,7 @@ def step_between(
         return _parallel(A, reach, noise, phi_free, delta_each)
     feet = _skew(A, sine, reach, noise)
     if near_parallel is NearParallel.HAYATI and _is_near(feet, sine, reach):
-        return _hayati(A, reach, noise, phi_free)
+        return hayati_step(A, reach, noise, phi_free)
     return feet
 
 
@@ -124,7 +131,7 @@ def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_
     return Step(phi, delta, a, alpha, 0.0, _rest(A, phi, alpha, 0.0), delta_next, free=not a)
 
 
-def _hayati(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> Step:
+def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> Step:
     """X from this origin to where the next axis pierces the plane normal to this one (Hayati, 1983)."""
     z = A[:3, 2]
     delta_next = cleaned_length(A[2, 3] / z[2], reach, noise.metres)
