@@ -32,6 +32,11 @@ REFERENCES = ("local", "world", "local_world_aligned")
 _RANDOM_SAMPLES = 1
 
 
+def forms(*names: str) -> Callable[[_F], _F]:
+    """The option --format with some forms, the first of which is taken where none is said."""
+    return click.option("--format", "format_", type=click.Choice(names), default=names[0], show_default=True)
+
+
 def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
     """Several click decorators as one, in the order written."""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from urdfkin.cli.arguments import load_robot, robot_argument
+from urdfkin.cli.arguments import forms, load_robot, robot_argument
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.output import check_line, compiling, console, exit_code, write_file
@@ -56,7 +56,7 @@ _FILE = click.Path(path_type=Path)
     "--unit", type=click.Choice(["m", "mm"]), default="m", show_default=True, help="Of measured positions."
 )
 @click.option("--drop-odd", is_flag=True, help="Leave out poses that do not belong to the others.")
-@click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
+@forms("table", "json")
 @click.option("--output", "-o", type=_FILE, help="Write the calibrated URDF, or the table as TOML.")
 @click.pass_context
 def command(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.arguments import (
+    forms,
     load_robot,
     path_options,
     q_option,
@@ -36,9 +37,7 @@ _ENDINGS = {".json": ("json",), ".csv": ("csv",)}
 @path_options
 @q_option
 @seed_option
-@click.option(
-    "--format", "format_", type=click.Choice(["table", "json", "csv"]), default="table", show_default=True
-)
+@forms("table", "json", "csv")
 @verify_option
 @output_option
 @click.pass_context

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from urdfkin.cli.arguments import forms
 from urdfkin.cli.numbers import NumberFrom
 from urdfkin.cli.output import console, write_file
 from urdfkin.cli.reports import check_writable
@@ -24,7 +25,7 @@ EXAMPLE = "urdfkin compare main.json branch.json --markdown comment.md"
     show_default=True,
     help="By how much a worst disagreement may grow before it is a regression.",
 )
-@click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
+@forms("table", "json")
 @click.option("--markdown", type=click.Path(path_type=Path), help="Write Markdown for a pull request.")
 @click.pass_context
 def command(

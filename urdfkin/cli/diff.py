@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from urdfkin.cli.arguments import load_two, xacro_option
+from urdfkin.cli.arguments import forms, load_two, xacro_option
 from urdfkin.cli.completing import complete_robot
 from urdfkin.cli.door import say_file
 from urdfkin.cli.output import compiling, console, write_file
@@ -22,7 +22,7 @@ EXAMPLE = "urdfkin diff arm.urdf my.urdf --markdown comment.md"
 @click.option(
     "--effects/--no-effects", default=True, help="Whether to bound how far changes move frames (the default)."
 )
-@click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
+@forms("table", "json")
 @click.option(
     "--markdown",
     type=click.Path(path_type=Path, dir_okay=False),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from urdfkin.cli.arguments import load_robot, robot_argument
+from urdfkin.cli.arguments import forms, load_robot, robot_argument
 from urdfkin.errors.showing import ASCII, Table
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ EXAMPLE = "urdfkin info panda"
 
 @click.command(epilog=f"Example: {EXAMPLE}")
 @robot_argument
-@click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
+@forms("table", "json")
 def command(robot: str, format_: str) -> None:
     """A robot's tree: links, joints, axes, limits, places in q and v, and who follows whom.
 

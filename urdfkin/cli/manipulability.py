@@ -10,6 +10,7 @@ import click
 
 from urdfkin.cli.arguments import (
     Inputs,
+    forms,
     frame_option,
     load_robot,
     q_option,
@@ -48,9 +49,7 @@ _SHOWN = 5
 @q_option
 @seed_option
 @verify_option
-@click.option(
-    "--format", "format_", type=click.Choice(["table", "json", "csv"]), default="table", show_default=True
-)
+@forms("table", "json", "csv")
 @output_option
 @click.pass_context
 def command(

@@ -17,7 +17,6 @@ EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 @click.argument("results", metavar="RESULTS.json|DIR", type=click.Path(path_type=Path), required=False)
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write a store's report as data.")
 @report_options
-@click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case.")
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of the data instead.")
 @click.pass_context
 def command(

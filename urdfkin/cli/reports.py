@@ -28,6 +28,7 @@ report_options = together(
     click.option("--html", type=_PATH, help="Write the report as a page for a browser, offline."),
     click.option("--junit", type=_PATH, help="Write JUnit XML, a test case for each robot and quantity."),
     click.option("--markdown", type=_PATH, help="Write Markdown that fits a pull request's comment."),
+    click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case."),
 )
 
 

@@ -7,6 +7,7 @@ import sys
 
 import click
 
+from urdfkin.cli.arguments import forms
 from urdfkin.urdf.catalogue import Entry, catalogue
 
 EXAMPLE = "urdfkin robots --family arm"
@@ -15,7 +16,7 @@ _FAMILIES = sorted({entry.family for entry in catalogue().values()})
 
 @click.command(epilog=f"Example: {EXAMPLE}")
 @click.option("--family", metavar="NAME", help=f"Only one of: {', '.join(_FAMILIES)}.")
-@click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
+@forms("table", "json")
 def command(family: str | None, format_: str) -> None:
     """Robots that can be called by a short name.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from urdfkin.cli.arguments import load_two, xacro_option
+from urdfkin.cli.arguments import forms, load_two, xacro_option
 from urdfkin.cli.completing import complete_robot
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.numbers import NumberFrom, Whole
@@ -49,7 +49,7 @@ _PATH = click.Path(path_type=Path, dir_okay=False)
     help="More than 131072 for sharper bounds where many things differ, in more time; 0 for none.",
 )
 @click.option("--all", "all_", is_flag=True, help="Show every line.")
-@click.option("--format", "format_", type=click.Choice(["table", "json"]), default="table", show_default=True)
+@forms("table", "json")
 @click.option("--certificate", type=_PATH, help="Write what was found as JSON that --recheck verifies.")
 @click.option("--recheck", type=_PATH, help="Verify a certificate against both models, without searching.")
 @click.option("--markdown", type=_PATH, help="Write Markdown that fits a pull request's comment.")

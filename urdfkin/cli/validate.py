@@ -65,7 +65,6 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @click.option("--judge-moving-base", is_flag=True, help="For --judge: the root link moves, at random.")
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as data.")
 @report_options
-@click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case.")
 @click.pass_context
 def command(
     context: click.Context,
