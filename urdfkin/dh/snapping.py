@@ -23,7 +23,7 @@ from urdfkin.errors.demands import real_number
 from urdfkin.kinematics.rotation.euler import coordinate_rotation
 from urdfkin.kinematics.roundings import EPS, TURN
 from urdfkin.model.chain import ChainJoint, FrameChain, chain, steps_between
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen, is_bounded
 
 #: Half of 15 degrees is where the next multiple begins; a tolerance must stay clear of it.
 LARGEST_TOLERANCE = math.pi / 36.0
@@ -222,8 +222,6 @@ def values_within(bounds: Mapping[str, tuple[float, float]], names: Sequence[str
 
 def range_of(joint: ChainJoint | DHRow) -> tuple[float, float]:
     """Where a joint may be: its limits; a whole turn, or a metre either way, where there are none."""
-    limit = joint.limit
-    bounded = limit is not None and math.isfinite(limit.lower) and math.isfinite(limit.upper)
-    if joint.kind is JointKind.CONTINUOUS or limit is None or not bounded:
-        return (-math.pi, math.pi) if joint.kind.turns else (-1.0, 1.0)
-    return (limit.lower, limit.upper)
+    if joint.kind is not JointKind.CONTINUOUS and is_bounded(joint.limit):
+        return joint.limit.lower, joint.limit.upper
+    return (-math.pi, math.pi) if joint.kind.turns else (-1.0, 1.0)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.dh.screws import Screws
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, is_bounded
 
 #: Radians and metres up to which a kind is said, with its distance; and up to which it is exact.
 NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
@@ -254,8 +254,7 @@ def _sampled(screws: Screws) -> tuple[FloatArray, FloatArray]:
     rng, bounds = np.random.default_rng(0), []
     for joint in screws.joints:
         limit = joint.limit
-        known = limit is not None and math.isfinite(limit.lower) and math.isfinite(limit.upper)
-        bounds.append((limit.lower, limit.upper) if known and limit else (-math.pi, math.pi))
+        bounds.append((limit.lower, limit.upper) if is_bounded(limit) else (-math.pi, math.pi))
     lower, upper = np.array(bounds).reshape(-1, 2).T
     values = rng.uniform(lower, upper, (_SAMPLES, len(bounds)))
     free = Screws(tuple(type(j)(j.name, j.kind) for j in screws.joints), screws.M, screws.space)

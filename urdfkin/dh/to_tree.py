@@ -8,14 +8,11 @@ and what a URDF is written from.
 
 from __future__ import annotations
 
-import math
-from typing import TypeGuard
-
 import numpy as np
 
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.table import DHTable
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
 from urdfkin.urdf.writer import to_urdf as write_urdf
 
 #: A sliding joint that no file bounds: a kilometre either way, m and m/s and N.
@@ -98,17 +95,13 @@ def _fixed(name: str, T: FloatArray, table: DHTable) -> Joint:
     return Joint(_new(name, taken), JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0]))
 
 
-def _is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
-    return limit is not None and math.isfinite(limit.lower) and math.isfinite(limit.upper)
-
-
 def _kind(row: DHRow) -> JointKind:
     """By the row's own word, not by whether it turns: that the table's matrices ask, which check the URDF."""
-    unbounded = row.kind is JointKind.REVOLUTE and not _is_bounded(row.limit)
+    unbounded = row.kind is JointKind.REVOLUTE and not is_bounded(row.limit)
     return JointKind.CONTINUOUS if unbounded else row.kind
 
 
 def _limit(row: DHRow) -> Limit | None:
-    if _is_bounded(row.limit) or row.kind is JointKind.CONTINUOUS:
+    if is_bounded(row.limit) or row.kind is JointKind.CONTINUOUS:
         return row.limit
     return None if row.kind.turns else UNBOUNDED_SLIDE

@@ -154,7 +154,7 @@ class UrdfError(UrdfkinError, ValueError):
 
     def __init__(self, findings: Iterable[Finding]) -> None:
         self.findings = tuple(findings)
-        errors = [finding for finding in self.findings if finding.severity is Severity.ERROR]
+        errors = self._errors = [one for one in self.findings if one.severity is Severity.ERROR]
         file = self.findings[0].file if self.findings else "<text>"
         total = sum(error.count for error in errors)
         count = "an error" if total == 1 else f"{total} errors"
@@ -165,9 +165,8 @@ class UrdfError(UrdfkinError, ValueError):
         )
 
     def __str__(self) -> str:
-        errors = [finding for finding in self.findings if finding.severity is Severity.ERROR]
-        lines = [super().__str__(), *(f"  {finding}" for finding in errors[: self.SHOWN])]
-        rest = sum(error.count for error in errors[self.SHOWN :])
+        lines = [super().__str__(), *(f"  {finding}" for finding in self._errors[: self.SHOWN])]
+        rest = sum(error.count for error in self._errors[self.SHOWN :])
         if rest:
             lines.append(f"  ... and {rest} more: see .findings or 'urdfkin check'")
         return "\n".join(lines)

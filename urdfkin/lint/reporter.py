@@ -15,7 +15,7 @@ from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
 from urdfkin.lint.rule import Rule
 from urdfkin.lint.silence import Comment, Silences
 from urdfkin.system.edits import Edit
-from urdfkin.urdf.element import Element
+from urdfkin.urdf.element import ATTRIBUTE, START_TAG, Element
 
 #: How many misspelt names of a file get suggestions, from how many names and after how much comparing.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
@@ -224,7 +224,7 @@ class Reporter:
 
     def without_element(self, at: Element) -> Fix | None:
         """The fix that takes an element away that holds nothing, and its line where it has one of its own."""
-        tag = _START_TAG.match(self.data, at.offset)
+        tag = START_TAG.match(self.data, at.offset)
         if tag is None:
             return None
         end = tag.end()
@@ -253,20 +253,17 @@ class _Written:
 #: of characters is looked at twice, wherever such text stands.
 _RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
-#: A start tag: '<', then quoted values, in which '>' may stand, and everything else.
-_START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
-_ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
 _NEWLINE = re.compile(rb"\r\n|\r|\n")
 _REST_OF_LINE = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
 
 
 def _attributes(data: bytes, at: Element) -> Iterator[tuple[str, _Written]]:
     """The attributes of an element's start tag, in one walk over it."""
-    tag = _START_TAG.match(data, at.offset)
+    tag = START_TAG.match(data, at.offset)
     if tag is None:
         return
     line, column, cursor = at.line, at.column, at.offset
-    for match in _ATTRIBUTE.finditer(data, at.offset + len(at.tag.encode()) + 1, tag.end()):
+    for match in ATTRIBUTE.finditer(data, at.offset + len(at.tag.encode()) + 1, tag.end()):
         lines = _NEWLINE.split(data[cursor : match.start()])
         column = len(lines[-1].decode("utf-8", "replace")) + (column if len(lines) == 1 else 1)
         line, cursor = line + len(lines) - 1, match.start()

@@ -6,11 +6,12 @@ sibling joints by name), so that coordinates and rates can be exchanged with it 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -91,6 +92,11 @@ class Limit:
     upper: float
     velocity: float
     effort: float
+
+
+def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
+    """Whether there are bounds, both finite."""
+    return limit is not None and math.isfinite(limit.lower) and math.isfinite(limit.upper)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from urdfkin.report.document import Model, asset
 from urdfkin.report.html import as_is, environment
+from urdfkin.report.model_consistency import moving_names
 from urdfkin.report.scene import scene
 from urdfkin.validation.description import describe
 
@@ -34,8 +35,7 @@ class Cell:
     def page(self) -> str:
         """The page."""
         model = cast("Model", self._description)
-        names = [joint["name"] for joint in model["joints"] if joint["kind"] != "fixed"]
-        data: dict[str, Any] = {"source": self._name, "joints": names, "chains": []}
+        data: dict[str, Any] = {"source": self._name, "joints": moving_names(model), "chains": []}
         return (
             environment()
             .get_template("cell.html.j2")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 from urdfkin.errors.printable import markdown_code, printable
 from urdfkin.errors.printable import markdown_text as text
@@ -12,14 +13,12 @@ from urdfkin.report.words import (
     check_name,
     columns,
     counted,
-    of_quantity,
     percent,
-    quantities,
     share_of,
     summary,
     units,
-    witness_cells,
     witness_heads,
+    witness_rows,
     witness_title,
     worst_of,
 )
@@ -69,10 +68,7 @@ def _three_sides(robots: list[Robot]) -> list[str]:
         _row(heads),
         _row(["---", *["---:"] * (len(heads) - 2), "---"]),
     ]
-    for name in quantities(robots):
-        checks = [check for robot in robots for check in of_quantity(robot, name) if "witness" in check]
-        if checks:
-            lines.append(_row([text(name), *map(text, witness_cells(checks, title))]))
+    lines += (_row(map(text, (name, *cells))) for name, cells in witness_rows(robots, title))
     return [*lines, ""]
 
 
@@ -128,7 +124,7 @@ def _details(robot: Robot) -> list[str]:
     return lines
 
 
-def _row(cells: list[str]) -> str:
+def _row(cells: Iterable[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 

@@ -24,8 +24,8 @@ from urdfkin.report.words import (
     share_of,
     summary,
     units,
-    witness_cells,
     witness_heads,
+    witness_rows,
     witness_title,
     worst,
     worst_of,
@@ -132,11 +132,7 @@ def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
 
 def _three_sides(robots: Sequence[Robot], title: str) -> Table:
     """One row a quantity, over all robots and references."""
-    rows = []
-    for name in quantities(robots):
-        checks = [check for robot in robots for check in of_quantity(robot, name) if "witness" in check]
-        if checks:
-            rows.append([quantity_name(name), *witness_cells(checks, title)])
+    rows = ([quantity_name(name), *cells] for name, cells in witness_rows(robots, title))
     heads = [head.replace(", ", ",\n") for head in witness_heads(title)]
     return plain_table(["quantity", *heads], rows, words=(0, 5))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal
 
 from urdfkin.report.document import Check, Document, Judged, Judgement, Robot, Units, Witness
@@ -109,6 +109,14 @@ def witness_title(robots: Sequence[Robot]) -> str | None:
 def witness_heads(title: str) -> list[str]:
     """The columns of a table of three sides: the pairs, and who stands alone."""
     return ["results", "urdfkin, Pinocchio", f"urdfkin, {title}", f"Pinocchio, {title}", "stands alone"]
+
+
+def witness_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[str, list[str]]]:
+    """Each quantity with its cells under `witness_heads`, over all robots and references."""
+    for name in quantities(robots):
+        checks = [check for robot in robots for check in of_quantity(robot, name) if "witness" in check]
+        if checks:
+            yield name, witness_cells(checks, title)
 
 
 def witness_cells(checks: Sequence[Check], title: str) -> list[str]:

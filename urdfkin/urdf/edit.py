@@ -10,21 +10,18 @@ import re
 from collections.abc import Iterator, Mapping
 
 from urdfkin.system.edits import Edit
-from urdfkin.urdf.element import Element
+from urdfkin.urdf.element import ATTRIBUTE, START_TAG, Element
 from urdfkin.urdf.writer import attribute
 
-#: A start tag: '<', then quoted values, in which '>' may stand, and everything else.
-_START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
-_ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
 _INDENTATION = re.compile(rb"((?:\r\n|\r|\n)?[ \t]*+)\Z")
 
 
 def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iterator[Edit]:
     """Edits that give an element's attributes these values; those that it has not come behind the others."""
     name_end = at.offset + 1 + len(at.tag.encode())
-    tag = _START_TAG.match(data, at.offset)
+    tag = START_TAG.match(data, at.offset)
     end = tag.end() if tag else name_end
-    known = {match[1].decode(): match.span(2) for match in _ATTRIBUTE.finditer(data, name_end, end)}
+    known = {match[1].decode(): match.span(2) for match in ATTRIBUTE.finditer(data, name_end, end)}
     added = ""
     for name, value in values.items():
         if name not in known:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import os
 import re
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -26,7 +25,7 @@ from urdfkin.kinematics.rotation.quaternion import rotation_of
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree
 from urdfkin.system.files import at_home
-from urdfkin.urdf.mujoco import library
+from urdfkin.urdf.mujoco import compiled, library
 
 #: A sliding joint that the file does not bound: a URDF must say something. A kilometre either way.
 UNBOUNDED = 1000.0
@@ -144,9 +143,7 @@ def read_mjcf(source: str | bytes | os.PathLike[str]) -> Mjcf:
         else:
             spec = mujoco.MjSpec.from_file(str(at_home(source)))
         left = list(_stripped(mujoco, spec))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # about masses
-            model = spec.compile()
+        model = compiled(spec)
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         found = str(error).strip().replace("\n", "; ")
         raise InputError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 from urdfkin.errors import InputError
@@ -19,6 +20,13 @@ def library() -> Any:
     except ImportError:
         raise InputError("MuJoCo is not installed", remedy="pip install 'urdfkin[mujoco]'") from None
     return mujoco
+
+
+def compiled(spec: Any) -> Any:
+    """MuJoCo's model of a specification, whatever it warns of: that is about dynamics."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return spec.compile()
 
 
 def version() -> str:

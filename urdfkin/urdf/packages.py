@@ -16,6 +16,8 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
+from urdfkin.system.files import is_folder
+
 #: The environment's search paths.
 VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 
@@ -54,7 +56,7 @@ def find_package(
     """
     if not name or name in (".", "..") or "\0" in name:
         return None
-    found = filter(_is_folder, _candidates(name, beside, environ))
+    found = filter(is_folder, _candidates(name, beside, environ))
     return next((folder for folder in found if accepts(folder)), None)
 
 
@@ -91,10 +93,3 @@ def _folders(entry: Path) -> list[Path]:
         return sorted(child for child in entry.iterdir() if child.is_dir())
     except OSError:
         return []
-
-
-def _is_folder(path: Path) -> bool:
-    try:
-        return path.is_dir()
-    except OSError:
-        return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -41,7 +42,6 @@ def describe(robot: Robot) -> dict[str, Any]:
 def _joint(robot: Robot, i: int) -> dict[str, Any]:
     tree = robot.tree
     joint = tree.joints[i]
-    mimic = joint.mimic
     return {
         "name": joint.name,
         "kind": joint.kind.value,
@@ -52,9 +52,7 @@ def _joint(robot: Robot, i: int) -> dict[str, Any]:
         "q": tree.q_index[i] if joint.kind.nq else None,
         "v": tree.v_index[i] if joint.kind.nv else None,
         "limit": _limit(joint),
-        "mimic": None
-        if mimic is None
-        else {"leader": mimic.leader, "multiplier": mimic.multiplier, "offset": mimic.offset},
+        "mimic": asdict(joint.mimic) if joint.mimic else None,
     }
 
 

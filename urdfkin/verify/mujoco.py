@@ -17,7 +17,6 @@ the followers' factors, and the rotation that takes a floating joint's rates, in
 from __future__ import annotations
 
 import threading
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -30,7 +29,7 @@ from urdfkin.errors import OracleError
 from urdfkin.model.frame_names import JointFrame, LinkFrame
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
-from urdfkin.urdf.mujoco import library
+from urdfkin.urdf.mujoco import compiled, library
 from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.verify.followers import rules_of_text
 from urdfkin.verify.pinocchio import demand_the_same, depth_of
@@ -148,10 +147,7 @@ class MujocoOracle:
                     kind = getattr(mujoco.mjtJoint, f"mjJNT_{what.upper()}")
                     body = spec.body(self._bodies[joint.child])
                     body.add_joint(name=f"j{i} {part}", type=kind, axis=_AXES[axis or "z"])
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # about dynamics, of which nothing is asked
-                model = spec.compile()
-            return _weighing_its_root(model, self._bodies[self._links[0]])
+            return _weighing_its_root(compiled(spec), self._bodies[self._links[0]])
         except (ValueError, RuntimeError, mujoco.FatalError) as error:
             first = str(error).strip().replace("\n", "; ")
             raise OracleError("MuJoCo does not accept this robot", where=self._name, found=first) from error

@@ -21,7 +21,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import EPS, of_a_fit
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
-from urdfkin.model.tree import FloatArray, JointKind, Limit
+from urdfkin.model.tree import FloatArray, JointKind, Limit, is_bounded
 
 #: Metres at the tip up to which a table agrees: half as much again as rounding to 0.1 mm in a cell or two.
 TOLERANCE = 2e-4
@@ -252,8 +252,7 @@ def _slides(chain: FrameChain) -> dict[str, tuple[float, float]]:
 
 
 def _slide(limit: Limit | None) -> tuple[float, float]:
-    lower, upper = (limit.lower, limit.upper) if limit else _SLIDE
-    return (lower, upper) if math.isfinite(lower) and math.isfinite(upper) and lower < upper else _SLIDE
+    return (limit.lower, limit.upper) if is_bounded(limit) and limit.lower < limit.upper else _SLIDE
 
 
 def _apart(model: Model, wanted: Wanted) -> tuple[float, float]:

@@ -26,6 +26,12 @@ def identifier(name: str) -> str:
     return f"{word}_" if keyword.iskeyword(word) else word
 
 
+def docstring(table: DHTable) -> list[str]:
+    """The same as the docstring of a Python module, with a blank line."""
+    first, *others = (f"{line}." for line in header(table))
+    return ['"""' + first, "", *others, '"""', ""]
+
+
 def header(table: DHTable) -> list[str]:
     """What a reader of the code must know, without comment marks; names cannot end a comment early."""
     lines = [

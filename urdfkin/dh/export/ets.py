@@ -7,7 +7,7 @@ solvers take it.
 from __future__ import annotations
 
 from urdfkin.dh.export.cells import is_identity
-from urdfkin.dh.export.code import bounds, demand_free, header, numbers, plain
+from urdfkin.dh.export.code import bounds, demand_free, docstring, numbers, plain
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
@@ -22,7 +22,7 @@ def write(table: DHTable, units: Units) -> str:
     """
     del units
     demand_free(table, "a sequence of elementary transforms")
-    lines = ['"""' + header(table)[0] + ".", "", *(f"{line}." for line in header(table)[1:]), '"""', ""]
+    lines = docstring(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "from roboticstoolbox import ET", ""]
     lines += ["ets = rtb.ETS(", "    [", *_pose(table.base, always=not table.rows)]
     lines += [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 from urdfkin.dh.row import DHRow
@@ -52,8 +53,7 @@ def _row(row: DHRow) -> dict[str, Any]:
     if row.sense != 1:
         data["sense"] = row.sense
     if row.mimic is not None:
-        mimic = row.mimic
-        data["mimic"] = {"leader": mimic.leader, "multiplier": mimic.multiplier, "offset": mimic.offset}
+        data["mimic"] = asdict(row.mimic)
     if row.limit is not None:
         names = ("lower", "upper", "velocity", "effort")
         # Infinity has no place in JSON; a bound that is not written is infinite.

@@ -7,7 +7,7 @@ of elementary transforms.
 from __future__ import annotations
 
 from urdfkin.dh.export import ets
-from urdfkin.dh.export.code import demand_free, header, numbers, plain
+from urdfkin.dh.export.code import demand_free, docstring, numbers, plain
 from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
@@ -22,7 +22,7 @@ def write(table: DHTable, units: Units) -> str:
     if table.has_hayati_rows or not table.rows:
         return ets.write(table, units)
     demand_free(table, "DHRobot")
-    lines = ['"""' + header(table)[0] + ".", "", *(f"{line}." for line in header(table)[1:]), '"""', ""]
+    lines = docstring(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "", "robot = rtb.DHRobot(", "    ["]
     lines += [f"        {_link(row, table.convention)}," for row in table.rows]
     lines += ["    ],", f'    name="{plain(table.robot)}",']

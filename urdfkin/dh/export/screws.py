@@ -14,6 +14,7 @@ from urdfkin.dh.screws import Screws
 from urdfkin.dh.subproblems import axes_and_steps
 from urdfkin.errors.printable import latex_text, printable
 from urdfkin.errors.showing import six_digits
+from urdfkin.model.tree import FloatArray
 
 FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -65,8 +66,7 @@ def _numpy(screws: Screws, _digits: int) -> str:
     ]
     lines += ["", "import numpy as np", ""]
     for name, rows in (("M", screws.M), ("Slist", screws.space), ("Blist", screws.body)):
-        lines += [f"{name} = np.array(", "    [", *(f"        [{numbers(row)}]," for row in rows), "    ]"]
-        lines.append(")" if name == "M" else ").reshape(-1, 6).T")
+        lines += _array(name, rows, ")" if name == "M" else ").reshape(-1, 6).T")
     if all(joint.kind.turns for joint in screws.joints):
         H, P = axes_and_steps(screws)
         lines += [
@@ -75,15 +75,13 @@ def _numpy(screws: Screws, _digits: int) -> str:
             "# They are asked for the rotation R @ R6T.T, where R is the tip's.",
         ]
         for name, rows in (("H", H), ("P", P)):
-            lines += [
-                f"{name} = np.array(",
-                "    [",
-                *(f"        [{numbers(row)}]," for row in rows),
-                "    ]",
-            ]
-            lines.append(").reshape(-1, 3)")
+            lines += _array(name, rows, ").reshape(-1, 3)")
         lines.append("R6T = M[:3, :3]")
     return "\n".join(lines) + "\n"
+
+
+def _array(name: str, rows: FloatArray, end: str) -> list[str]:
+    return [f"{name} = np.array(", "    [", *(f"        [{numbers(row)}]," for row in rows), "    ]", end]
 
 
 def _matlab(screws: Screws, _digits: int) -> str:

@@ -147,8 +147,7 @@ def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Supp
 
 def _slid_apart(step: Step, pair: Pair, variables: Variables, grid: Grid) -> Support:
     """Of two slides' difference, which is largest at the ends of their ranges."""
-    if pair.a.variable == pair.b.variable or not pair.a.slope or not pair.b.slope:
-        name = pair.a.variable if pair.a.slope else pair.b.variable
+    if (name := pair.variable) is not None:
         ends = [(z, z) for z in variables.ranges.get(name, (0.0, 0.0))]
         values = [
             tuple(
@@ -170,9 +169,9 @@ def _slid_apart(step: Step, pair: Pair, variables: Variables, grid: Grid) -> Sup
 
 def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
     """(n,) values of the variable that moves a turning joint in both models; None where one is not enough."""
-    if pair.a.slope and pair.b.slope and pair.a.variable != pair.b.variable:
+    if (name := pair.variable) is None:
         return None
-    low, high = variables.ranges[pair.a.variable if pair.a.slope else pair.b.variable]
+    low, high = variables.ranges[name]
     fastest = max(abs(pair.a.slope), abs(pair.b.slope))
     if math.isinf(high - low):
         if {abs(pair.a.slope), abs(pair.b.slope)} - {0.0, 1.0}:

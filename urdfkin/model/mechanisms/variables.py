@@ -42,6 +42,13 @@ class Pair:
     #: What B's file calls the value: sense * b + offset.
     written: Line
 
+    @property
+    def variable(self) -> str | None:
+        """What alone moves both; None where two variables do."""
+        if self.a.slope and self.b.slope and self.a.variable != self.b.variable:
+            return None
+        return self.a.variable if self.a.slope else self.b.variable
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variables:
@@ -72,8 +79,7 @@ class Variables:
 
     def off(self, pair: Pair) -> float:
         """By how much (rad, m) a joint's values differ at most."""
-        if pair.a.variable == pair.b.variable or not pair.a.slope or not pair.b.slope:
-            variable = pair.a.variable if pair.a.slope else pair.b.variable
+        if (variable := pair.variable) is not None:
             low, high = self.range(
                 Line(variable, pair.b.slope - pair.a.slope, pair.b.constant - pair.a.constant)
             )

@@ -167,9 +167,7 @@ class Walk:
 
     def _tool_on(self, place: Place, taken: list[tuple[int, int]]) -> FramePair | None:
         """Where no link of two bodies is the other's: any of either, as another tool on the same body."""
-        names_a, names_b = self.a.tree.links, self.b.tree.links
-        ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
-        theirs = [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
+        ours, theirs = self._own_links(place)
         if taken or not ours or not theirs:
             return None
         home = self.a.homes[ours[0]]
@@ -180,17 +178,21 @@ class Walk:
         """Links of one name, then those that stand in one place under names that the other has not."""
         pairs = self.pairing.links(*place.bodies)
         taken = {j for _, j in pairs}
-        names_a, names_b = self.a.tree.links, self.b.tree.links
-        others = [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
-        for i in self.a.bodies[place.bodies[0]]:
-            if names_a[i] not in names_b:
-                at = place.G @ self.a.homes[i]
-                for j in others:
-                    if j not in taken and self.tolerance.holds(*apart(at, place.XC @ self.b.homes[j])):
-                        pairs.append((i, j))
-                        taken.add(j)
-                        break
+        ours, theirs = self._own_links(place)
+        for i in ours:
+            at = place.G @ self.a.homes[i]
+            for j in theirs:
+                if j not in taken and self.tolerance.holds(*apart(at, place.XC @ self.b.homes[j])):
+                    pairs.append((i, j))
+                    taken.add(j)
+                    break
         return pairs
+
+    def _own_links(self, place: Place) -> tuple[list[int], list[int]]:
+        """Links of two bodies under names that the other model has not."""
+        names_a, names_b = self.a.tree.links, self.b.tree.links
+        ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
+        return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
 
     def _step(self, place: Place, e: Edge, f: Edge, index: int, depth: int) -> tuple[Step, Place, Score]:
         """The step that a pair of joints makes, where it leads, and how well it fits what is behind it."""
