@@ -3,31 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from urdfkin.cli.arguments import (
-    TRAJECTORY_HELP,
-    Inputs,
-    a_option,
-    frame_option,
-    load_robot,
-    oracle_option,
-    q_option,
-    read_inputs,
-    robot_argument,
-    seed_option,
-    v_option,
-    verify_option,
-)
-from urdfkin.cli.base import base_options, with_base
+from urdfkin.cli.arguments import TRAJECTORY_HELP, Inputs
+from urdfkin.cli.computing import Computing, computing_options
 from urdfkin.cli.door import say
-from urdfkin.cli.endings import form_of
 from urdfkin.cli.idle import refuse_idle
-from urdfkin.cli.output import ENDINGS, compiling, emit, exit_code, format_option, output_option
+from urdfkin.cli.output import compiling
 from urdfkin.verify.quantities import IMU
-from urdfkin.verify.witnesses import WitnessName
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
@@ -36,39 +21,19 @@ _TRAJECTORY = f"{TRAJECTORY_HELP[:-1]}, base_placement, base_velocity, base_acce
 
 
 @click.command(epilog="Example: urdfkin imu panda --frame panda_hand --trajectory log.csv --format csv")
-@robot_argument
-@frame_option
-@click.option(
-    "--gravity", metavar="X,Y,Z", default="0,0,-9.81", show_default=True, help="In the world's axes, m/s^2."
+@computing_options(
+    IMU.inputs,
+    click.option(
+        "--gravity",
+        metavar="X,Y,Z",
+        default="0,0,-9.81",
+        show_default=True,
+        help="In the world's axes, m/s^2.",
+    ),
+    click.option("--trajectory", type=click.Path(path_type=Path), help=_TRAJECTORY),
 )
-@click.option("--trajectory", type=click.Path(path_type=Path), help=_TRAJECTORY)
-@q_option
-@v_option
-@a_option
-@base_options(IMU.inputs)
-@seed_option
-@verify_option
-@oracle_option
-@format_option
-@output_option
-@click.pass_context
 def command(
-    context: click.Context,
-    robot: str,
-    frame: str | None,
-    gravity: str,
-    trajectory: Path | None,
-    q: str,
-    v: str,
-    a: str,
-    base_placement: str | None,
-    base_velocity: str | None,
-    base_acceleration: str | None,
-    seed: int,
-    verify: bool,
-    oracle: WitnessName,
-    format_: str,
-    output: Path | None,
+    context: click.Context, frame: str | None, gravity: str, trajectory: Path | None, **_: Any
 ) -> None:
     """What an accelerometer and a gyroscope in a frame read, in the frame's own axes.
 
@@ -80,20 +45,17 @@ def command(
     """
     from urdfkin.motion.columns import numbers  # noqa: PLC0415  keeps --help fast
 
-    format_ = form_of(context, output, ENDINGS, "csv")
-    loaded = load_robot(robot, verify=verify, oracle=oracle)
+    run = Computing(context)
     if trajectory is None:
-        x = read_inputs(loaded, frame, seed, q, v, a)
-        x = with_base(x, base_placement, base_velocity, base_acceleration)
+        x = run.inputs()
     else:
         moved = ("base_placement", "base_velocity", "base_acceleration")
         refuse_idle(context, ("q", "v", "a", *moved, "seed"), "along a --trajectory")
-        x = _along(loaded, frame, trajectory)
+        x = _along(run.robot, frame, trajectory)
     g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
     with compiling():
-        result = loaded.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base)
-    emit(x, IMU, None, result, format_, output)
-    context.exit(exit_code(loaded.certificate()))
+        result = run.robot.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base)
+    run.answer(x, IMU, result)
 
 
 def _along(robot: Robot, frame: str | None, path: Path) -> Inputs:

@@ -5,31 +5,16 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from urdfkin.cli.arguments import (
-    Inputs,
-    frame_name,
-    frame_option,
-    load_robot,
-    oracle_option,
-    q_option,
-    read_inputs,
-    robot_argument,
-    seed_option,
-    verify_option,
-)
-from urdfkin.cli.base import base_options, with_base
-from urdfkin.cli.endings import form_of
+from urdfkin.cli.arguments import Inputs, frame_name
+from urdfkin.cli.computing import Computing, computing_options
 from urdfkin.cli.idle import refuse_idle
-from urdfkin.cli.output import ENDINGS, compiling, emit, exit_code, format_option, output_option
-from urdfkin.cli.reports import check_writable
+from urdfkin.cli.output import compiling
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.replay import replay_line
-from urdfkin.verify.witnesses import WitnessName
 
 if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
@@ -53,39 +38,19 @@ _FORMS = {
 
 
 @click.command("placement", epilog=f"Example: {PLACEMENT.example}")
-@robot_argument
-@frame_option
-@frame_name("--relative-to", "Seen from this link or joint. Default: the world.")
-@click.option(
-    "--as",
-    "written",
-    type=click.Choice(["matrix", *_FORMS]),
-    default="matrix",
-    show_default=True,
-    help="rpy: x, y, z, roll, pitch, yaw as in a URDF's origin; quaternion: x, y, z, qx, qy, qz, qw.",
+@computing_options(
+    PLACEMENT.inputs,
+    frame_name("--relative-to", "Seen from this link or joint. Default: the world."),
+    click.option(
+        "--as",
+        "written",
+        type=click.Choice(["matrix", *_FORMS]),
+        default="matrix",
+        show_default=True,
+        help="rpy: x, y, z, roll, pitch, yaw as in a URDF's origin; quaternion: x, y, z, qx, qy, qz, qw.",
+    ),
 )
-@q_option
-@base_options(PLACEMENT.inputs)
-@seed_option
-@verify_option
-@oracle_option
-@format_option
-@output_option
-@click.pass_context
-def command(
-    context: click.Context,
-    robot: str,
-    frame: str | None,
-    relative_to: str | None,
-    written: str,
-    q: str,
-    base_placement: str | None,
-    seed: int,
-    verify: bool,
-    oracle: WitnessName,
-    format_: str,
-    output: Path | None,
-) -> None:
+def command(context: click.Context, relative_to: str | None, written: str, verify: bool, **_: Any) -> None:
     """Pose of a frame (eq. 7.77): its axes and its origin in the world, or in another frame, in metres.
 
     As a matrix T; with --as rpy or quaternion as few numbers, of which Pinocchio makes the same rotation.
@@ -93,24 +58,20 @@ def command(
     ROBOT is a path (a table, .toml, .json or .csv, is made a robot), a name that `urdfkin robots` lists, or -
     for standard input.
     """
-    format_ = form_of(context, output, ENDINGS, "csv")
-    check_writable(output)
     if relative_to is not None:
         refuse_idle(context, ("base_placement",), "with --relative-to, which moves with the base")
-    loaded = load_robot(robot, verify=verify, oracle=oracle)
-    x = with_base(read_inputs(loaded, frame, seed, q), base_placement)
+    run = Computing(context)
+    x = run.inputs()
     with compiling():
         if relative_to is None:
-            T = loaded.placement(x.q, x.frame, base=x.base)
+            T = run.robot.placement(x.q, x.frame, base=x.base)
         else:
-            T = loaded.relative_placement(x.q, x.frame, relative_to)
+            T = run.robot.relative_placement(x.q, x.frame, relative_to)
             x = x.saying(relative_to=relative_to)
     if written == "matrix":
-        emit(x, PLACEMENT, None, T, format_, output)
-    else:
-        x = x.saying(written_as=written)
-        emit(x, _FORMS[written], None, _numbers(x, T, written, verify=verify), format_, output)
-    context.exit(exit_code(loaded.certificate()))
+        run.answer(x, PLACEMENT, T)
+    x = x.saying(written_as=written)
+    run.answer(x, _FORMS[written], _numbers(x, T, written, verify=verify))
 
 
 def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
