@@ -86,6 +86,7 @@ class Mechanism:
         self.orders: tuple[tuple[str, ...], ...] = ()
         #: How far (m) the way from the root to each link is, and how many joints it passes, fixed ones too.
         self.lengths, self.depths = lengths, depths
+        self._screws: dict[int, Screw] = {}
 
     def joint(self, edge: Edge) -> Joint:
         """What the tree says of it."""
@@ -93,8 +94,10 @@ class Mechanism:
 
     def screw(self, edge: Edge) -> Screw:
         """Of a joint that turns or slides, at home, seen from the root."""
-        T = self.homes[edge.joint + 1]
-        return Screw(T[:3, :3] @ self.joint(edge).axis, T[:3, 3])
+        if (known := self._screws.get(edge.joint)) is None:
+            T = self.homes[edge.joint + 1]
+            known = self._screws[edge.joint] = Screw(T[:3, :3] @ self.joint(edge).axis, T[:3, 3])
+        return known
 
     def in_order(self, names: Sequence[str]) -> Mechanism:
         """The same motion with joints one behind the other taken in another order, which their axes allow.

@@ -11,6 +11,7 @@ from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, Tolerance
 from urdfkin.model.tree import FloatArray, JointKind
 
 Pair = tuple[Edge, Edge]
+Came = tuple[Edge | None, Edge | None]
 
 
 def family(kind: JointKind) -> str:
@@ -32,18 +33,23 @@ class Pairing:
         self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
         self._named = {name for pair in given.items() for name in pair}
         self._signatures: dict[tuple[bool, int, int], str] = {}
+        #: What names alone tell is asked again for thousands of places where a root may stand.
+        self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
+        self._by_names: dict[tuple[tuple[int, int], Came], tuple[list[Pair], list[Edge], list[Edge]]] = {}
 
-    def links(self, body_a: int, body_b: int) -> list[tuple[int, int]]:
+    def links(self, body_a: int, body_b: int) -> tuple[tuple[int, int], ...]:
         """Links of one name on two bodies."""
-        there = {self.b.tree.links[link]: link for link in self.b.bodies[body_b]}
-        return [
-            (link, there[name])
-            for link in self.a.bodies[body_a]
-            if (name := self.a.tree.links[link]) in there
-        ]
+        if (known := self._links.get((body_a, body_b))) is None:
+            there = {self.b.tree.links[link]: link for link in self.b.bodies[body_b]}
+            known = self._links[body_a, body_b] = tuple(
+                (link, there[name])
+                for link in self.a.bodies[body_a]
+                if (name := self.a.tree.links[link]) in there
+            )
+        return known
 
     def edges(
-        self, bodies: tuple[int, int], came: tuple[Edge | None, Edge | None], G: FloatArray, XC: FloatArray
+        self, bodies: tuple[int, int], came: Came, G: FloatArray, XC: FloatArray
     ) -> tuple[list[Pair], list[Edge], list[Edge]]:
         """Joints that lead on from two bodies: pairs, and what is left over of each.
 
@@ -53,14 +59,9 @@ class Pairing:
             G: (4, 4) what moves a's home to where b's is.
             XC: (4, 4) what moves b's own home there.
         """
-        left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not came[0]]
-        left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not came[1]]
-        pairs: list[Pair] = []
-        for e, f in self._by_name(bodies, list(left_a), list(left_b)):
-            if e in left_a and f in left_b:
-                pairs.append((e, f))
-                left_a.remove(e)
-                left_b.remove(f)
+        if (known := self._by_names.get((bodies, came))) is None:
+            known = self._by_names[bodies, came] = self._named_alike(bodies, came)
+        pairs, left_a, left_b = list(known[0]), known[1], known[2]
         rest = sorted(
             (self._unlikeness(one, other), i, j)
             for i, one in self._standing(self.a, bodies[0], left_a, G)
@@ -78,6 +79,18 @@ class Pairing:
             [edge for i, edge in enumerate(left_a) if i not in taken_a],
             [edge for j, edge in enumerate(left_b) if j not in taken_b],
         )
+
+    def _named_alike(self, bodies: tuple[int, int], came: Came) -> tuple[list[Pair], list[Edge], list[Edge]]:
+        """What `edges` says as far as names tell: the pairs, and what is left for how joints lie."""
+        left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not came[0]]
+        left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not came[1]]
+        pairs: list[Pair] = []
+        for e, f in self._by_name(bodies, list(left_a), list(left_b)):
+            if e in left_a and f in left_b:
+                pairs.append((e, f))
+                left_a.remove(e)
+                left_b.remove(f)
+        return pairs, left_a, left_b
 
     def _by_name(self, bodies: tuple[int, int], ours: list[Edge], theirs: list[Edge]) -> Iterator[Pair]:
         by_name = {self.b.joint(f).name: f for f in theirs}
@@ -125,8 +138,12 @@ class Pairing:
 
     def mismatch(self, e: Edge, f: Edge, G: FloatArray, XC: FloatArray) -> tuple[float, float]:
         """How far (rad, m) the axes of two joints lie apart as lines, whichever way they point."""
-        ours, theirs = _Standing.of(self.a, e, G), _Standing.of(self.b, f, XC)
-        return ours.mismatch(theirs) if ours.kind == theirs.kind else (0.0, 0.0)
+        kind = family(self.a.joint(e).kind)
+        if kind != family(self.b.joint(f).kind):
+            return 0.0, 0.0
+        if kind == "planar":
+            return _Standing.of(self.a, e, G).mismatch(_Standing.of(self.b, f, XC))
+        return _lines_apart(kind, self.a.screw(e).moved(G), self.b.screw(f).moved(XC))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,9 +165,14 @@ class _Standing:
 
     def mismatch(self, other: _Standing) -> tuple[float, float]:
         """How far (rad, m) its axis lies from that of a joint of its kind."""
-        if self.kind == "floating":  # goes anywhere, wherever it counts from
-            return 0.0, 0.0
         if self.kind == "planar":
             normals = (Screw(one.normal, one.normal) for one in (self, other))
             return between_lines(*normals, placed=False)
-        return between_lines(self.screw, other.screw, placed=self.kind == "turns")
+        return _lines_apart(self.kind, self.screw, other.screw)
+
+
+def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
+    """How far (rad, m) the axes of two joints of a kind lie apart."""
+    if kind == "floating":  # goes anywhere, wherever it counts from
+        return 0.0, 0.0
+    return between_lines(s, t, placed=kind == "turns")

@@ -176,7 +176,7 @@ class Walk:
 
     def _all_links(self, place: Place) -> list[tuple[int, int]]:
         """Links of one name, then those that stand in one place under names that the other has not."""
-        pairs = self.pairing.links(*place.bodies)
+        pairs = list(self.pairing.links(*place.bodies))
         taken = {j for _, j in pairs}
         ours, theirs = self._own_links(place)
         for i in ours:
