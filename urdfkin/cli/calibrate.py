@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -61,20 +61,13 @@ _FILE = click.Path(path_type=Path)
 @click.pass_context
 def command(
     context: click.Context,
+    /,
     robot: str,
-    poses: Path | None,
-    like: str | None,
     ur: Path | None,
     order: str,
-    tip: str | None,
-    base: str | None,
-    fit: str,
-    positions: bool,
-    noise: str | None,
-    unit: str,
-    drop_odd: bool,
     format_: str,
     output: Path | None,
+    **_: Any,
 ) -> None:
     """Which parameters of a path poses can tell, fitted to measured ones, and the URDF with them in it.
 

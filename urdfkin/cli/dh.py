@@ -185,5 +185,6 @@ def command(
     if (written or options["like"]) and not typed(context, "convention"):
         options["convention"] = None
     with compiling():
-        code = run(Work(robot=loaded, written=written, output=output, **options))
+        choices = {name: options.pop(name) for name in ("near_parallel", "slide", *_SIGNS)}
+        code = run(Work(robot=loaded, written=written, choices=choices, output=output, **options))
     context.exit(code)

@@ -46,24 +46,19 @@ class Work:
 
     Attributes:
         written: The table's file that is the robot, if it is to be written as it stands.
+        choices: What else `Robot.dh` is asked for.
     """
 
     robot: Robot
     written: str | None
+    choices: dict[str, Any]
     output: Path | None
     base: str | None
     tip: str | None
     all_: bool
     tree: bool
     convention: str | None
-    near_parallel: str
     snap: float
-    last: str
-    parallel_offset: str
-    flip: tuple[str, ...]
-    first: str
-    sign: str
-    slide: str
     like: str | None
     compare: str | None
     tolerance: float
@@ -147,16 +142,10 @@ def _made(work: Work, tip: str | None, snap: float) -> DHTable:
         tip,
         base,
         work.convention or (like.convention if like else "standard"),
-        near_parallel=work.near_parallel,
         snap=snap,
-        last=work.last,
-        parallel_offset=work.parallel_offset,
-        flip=work.flip,
-        first=work.first,
-        sign=work.sign,
-        slide=work.slide,
         like=like,
         verify=False,
+        **work.choices,
     )
 
 

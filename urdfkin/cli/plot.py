@@ -27,19 +27,9 @@ if TYPE_CHECKING:
 
 #: They repeat those of `urdfkin.view.plot.panels`, whose import --help does not need.
 PANELS = (
-    *(
-        "q",
-        "v",
-        "a",
-        "position",
-        "orientation",
-        "velocity",
-        "angular-velocity",
-        "acceleration",
-        "angular-acceleration",
-    ),
-    *("parts", "singular-values", "angular-singular-values", "manipulability", "angular-manipulability"),
-    "disagreement",
+    *("q", "v", "a", "position", "orientation", "velocity", "angular-velocity", "acceleration"),
+    *("angular-acceleration", "parts", "singular-values", "angular-singular-values", "manipulability"),
+    *("angular-manipulability", "disagreement"),
 )
 
 EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.svg"

@@ -20,14 +20,7 @@ EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of the data instead.")
 @click.pass_context
 def command(
-    context: click.Context,
-    results: Path | None,
-    json_: Path | None,
-    html: Path | None,
-    junit: Path | None,
-    markdown: Path | None,
-    cases: bool,
-    schema: bool,
+    context: click.Context, /, results: Path | None, cases: bool, schema: bool, **files: Path | None
 ) -> None:
     """Show or write the report of an earlier `urdfkin validate ... --json RESULTS.json` or `--store DIR`.
 
@@ -45,11 +38,11 @@ def command(
     if results is None:
         raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of --store")
     document = stored_document(results) if is_folder(results) else read_document(results)
-    check_writable(json_, html, junit, markdown)
-    failed = write_reports(document, json_=json_, html=html, junit=junit, markdown=markdown)
+    check_writable(*files.values())
+    failed = write_reports(document, files)
     if not failed:
-        say_written(json_, html, junit, markdown)
-    if not (json_ or html or junit or markdown):
+        say_written(files)
+    if not any(files.values()):
         from urdfkin.report.terminal import print_report  # noqa: PLC0415
 
         print_report(document, console(), cases=cases)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,8 @@ Files = Iterator[tuple[Path, bytes]]
 
 _PATH = click.Path(path_type=Path, dir_okay=False)
 
+#: What options call a report's files.
+FILES = ("json_", "html", "junit", "markdown")
 report_options = together(
     click.option("--html", type=_PATH, help="Write the report as a page for a browser, offline."),
     click.option("--junit", type=_PATH, help="Write JUnit XML, a test case for each robot and quantity."),
@@ -51,27 +53,20 @@ def check_writable(*paths: Path | None) -> None:
             raise SourceError("cannot be written", where=str(path), found=found) from error
 
 
-def write_reports(
-    document: Document,
-    *,
-    json_: Path | None = None,
-    html: Path | None = None,
-    junit: Path | None = None,
-    markdown: Path | None = None,
-) -> int:
+def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
     """Write the forms that were asked for, each whatever becomes of the others.
 
     Returns:
         0, or the exit code of the first that could not be written; what was wrong has been said.
     """
-    forms = ((json_, _json), (html, _html), (junit, _junit), (markdown, _markdown))
-    codes = (_written(path, form, document) for path, form in forms if path is not None)
+    forms = {"json_": _json, "html": _html, "junit": _junit, "markdown": _markdown}
+    codes = (_written(path, forms[name], document) for name in FILES if (path := files[name]) is not None)
     return next(filter(None, list(codes)), 0)
 
 
-def say_written(*paths: Path | None) -> None:
+def say_written(files: Mapping[str, Path | None]) -> None:
     """Name the files that were written, if any."""
-    if named := [str(path) for path in paths if path]:
+    if named := [str(files[name]) for name in FILES if files[name]]:
         say(f"wrote {', '.join(named)}")
 
 

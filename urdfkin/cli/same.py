@@ -59,6 +59,7 @@ _PATH = click.Path(path_type=Path, dir_okay=False)
 @click.pass_context
 def command(
     context: click.Context,
+    /,
     a: str | None,
     b: str | None,
     pairs: tuple[str, ...],
@@ -67,11 +68,9 @@ def command(
     boxes: int | None,
     all_: bool,
     format_: str,
-    certificate: Path | None,
     recheck: Path | None,
-    markdown: Path | None,
-    html: Path | None,
     schema: bool,
+    **paths: Path | None,
 ) -> None:
     """Are A and B the same robot, in every configuration?
 
@@ -89,7 +88,7 @@ def command(
         return
     if a is None or b is None:
         raise click.UsageError("name two models: urdfkin same A B")
-    check_writable(certificate, markdown, html)
+    check_writable(*paths.values())
     robots = load_two(a, b)
     with compiling():
         if recheck is not None:
@@ -107,7 +106,6 @@ def command(
         from urdfkin.sameness.judging import parse_map, same  # noqa: PLC0415
 
         found = same(*robots, map=parse_map(pairs), boxes=MOST if boxes is None else boxes)
-    paths = {"certificate": certificate, "markdown": markdown, "html": html}
     _write(found, robots, format_, paths, all_=all_)
     context.exit(found.exit_code(strict=strict, within=within))
 

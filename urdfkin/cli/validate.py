@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
@@ -17,7 +17,7 @@ from urdfkin.cli.judgement import judge_all
 from urdfkin.cli.numbers import Whole
 from urdfkin.cli.output import compiling, console
 from urdfkin.cli.progress import progress
-from urdfkin.cli.reports import check_writable, report_options, say_written, write_reports
+from urdfkin.cli.reports import FILES, check_writable, report_options, say_written, write_reports
 from urdfkin.cli.stopping import stoppable
 from urdfkin.errors import InputError
 from urdfkin.urdf.catalogue import examples
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.validation.engine import Engine
     from urdfkin.validation.results import ValidationReport
-    from urdfkin.verify.witnesses import WitnessName
 
 EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 
@@ -68,26 +67,16 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @click.pass_context
 def command(
     context: click.Context,
+    /,
     robots: tuple[str, ...],
     all_: bool,
-    samples: int,
-    seed: int,
-    jobs: int,
     judged: bool,
     judge_samples: int,
     judge_moving_base: bool,
-    isolate: bool,
-    oracle: WitnessName,
-    store: Path | None,
-    retry: Literal["failed"] | None,
-    shard: str | None,
     scheduler: str | None,
     json_progress: bool,
-    json_: Path | None,
-    html: Path | None,
-    junit: Path | None,
-    markdown: Path | None,
     cases: bool,
+    **asked: Any,
 ) -> None:
     """Compare every quantity, frame, joint and reference with Pinocchio's, on many samples.
 
@@ -99,15 +88,17 @@ def command(
     With --store the same command goes on where one was ended, however it was, and `urdfkin report DIR` has
     the report at any time.
     """
+    files = {name: asked.pop(name) for name in FILES}
+    store, shard, retry = (asked[name] for name in ("store", "shard", "retry"))
     if bool(robots) == all_:
         raise click.UsageError("name robots, or say --all for the whole catalogue")
     if (retry or shard) and store is None:
         raise click.UsageError("--retry and --shard go with --store DIR")
-    if scheduler and (jobs > 1 or isolate):
+    if scheduler and (asked["jobs"] > 1 or asked["isolate"]):
         raise click.UsageError(
             "--jobs and --isolate are for this machine's processes, --scheduler for others'"
         )
-    if shard and (json_ or html or junit or markdown):
+    if shard and any(files.values()):
         raise click.UsageError("a shard has no report: merge the stores, then `urdfkin report DIR`")
     from urdfkin.report.document import Document  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.terminal import print_report  # noqa: PLC0415
@@ -115,39 +106,24 @@ def command(
     from urdfkin.validation.campaign import validate  # noqa: PLC0415
     from urdfkin.validation.judging import Asked  # noqa: PLC0415
 
-    check_writable(json_, html, junit, markdown)
+    check_writable(*files.values())
     how = how_to_load()
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         refuse_idle(context, ("xacro_arg",), "without a .xacro file")
     given = [_once(robot, how) if judged else robot for robot in robots or examples()]
     with stoppable() as stop, compiling(), _cluster(scheduler) as on, progress(as_json=json_progress) as tell:
-        report = validate(
-            given,
-            samples=samples,
-            seed=seed,
-            jobs=jobs,
-            isolate=isolate,
-            oracle=oracle,
-            executor=on,
-            store=store,
-            retry=retry,
-            shard=shard,
-            progress=tell,
-            **how,
-        )
+        report = validate(given, executor=on, progress=tell, **asked, **how)
         if judged and not report.interrupted:
-            asked = Asked(judge_samples, seed, judge_moving_base)
-            report = judge_all(
-                report, given, asked, store=store, shard=shard, retry=retry is not None, how=how
-            )
+            of = Asked(judge_samples, asked["seed"], judge_moving_base)
+            report = judge_all(report, given, of, store=store, shard=shard, retry=retry is not None, how=how)
     if shard:
         _say_shard(report, shard, store)
         context.exit(stop.exit_code(report.exit_code))
     document = cast("Document", report.as_dict())
-    written = write_reports(document, json_=json_, html=html, junit=junit, markdown=markdown)
+    written = write_reports(document, files)
     print_report(document, console(), cases=cases)
     if not written:
-        say_written(json_, html, junit, markdown)
+        say_written(files)
     context.exit(stop.exit_code(report.exit_code) or written)
 
 
