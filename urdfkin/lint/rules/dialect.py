@@ -202,28 +202,18 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
         return (1, 0)
     match = _VERSION.fullmatch(written)
     version = (int(match[1]), int(match[2])) if match and len(written) < 20 else None
-    known = version is not None and (1, 0) <= version <= NEWEST
-    if version is None or not known:
-        later = version is not None and version > NEWEST
-        what = "there is no such URDF version" if version else "a URDF version is two numbers and a point"
-        report.add(
-            VERSION,
-            "the URDF version is later than 1.2, the last that urdfdom and Pinocchio read" if later else what,
-            root,
-            attribute="version",
-            found=quoted(written),
-            remedy="write the version whose rules the file keeps, 1.0 to 1.2"
-            if later
-            else 'write version="1.0" if the file follows it, or leave it out',
-        )
-        return (1, 0)
-    if version != (1, 0):
-        report.add(
-            NEWER_VERSION,
-            "most readers know only URDF 1.0",
-            root,
-            attribute="version",
-            found=quoted(written),
-            remedy="leave it out unless the file uses what is new in it",
-        )
-    return version
+    rule, remedy = VERSION, 'write version="1.0" if the file follows it, or leave it out'
+    if version is None:
+        message = "a URDF version is two numbers and a point"
+    elif version > NEWEST:
+        message = "the URDF version is later than 1.2, the last that urdfdom and Pinocchio read"
+        remedy = "write the version whose rules the file keeps, 1.0 to 1.2"
+    elif version < (1, 0):
+        message = "there is no such URDF version"
+    elif version == (1, 0):
+        return version
+    else:
+        rule, message = NEWER_VERSION, "most readers know only URDF 1.0"
+        remedy = "leave it out unless the file uses what is new in it"
+    report.add(rule, message, root, attribute="version", found=quoted(written), remedy=remedy)
+    return version if version is not None and rule is NEWER_VERSION else (1, 0)

@@ -115,39 +115,26 @@ class JointReader:
 
     def _quaternion(self, joint: JointRecord, origin: Element) -> None:
         found = f"quat_xyzw={quoted(origin.attributes['quat_xyzw'])}"
+
+        def say(rule: Rule, message: str, remedy: str) -> None:
+            self.report.add(rule, message, origin, attribute="quat_xyzw", found=found, remedy=remedy)
+
         if self.version < (1, 1):
-            self.report.add(
-                QUATERNION_IGNORED,
-                'quat_xyzw needs version="1.1" and is ignored',
-                origin,
-                attribute="quat_xyzw",
-                found=found,
-                remedy="write the rotation as rpy",
-            )
+            message = 'quat_xyzw needs version="1.1" and is ignored'
+            say(QUATERNION_IGNORED, message, "write the rotation as rpy")
             return
         quaternion = self.numbers.vector(origin, "quat_xyzw", 4)
         if quaternion is None:
             return
         both, zero = "rpy" in origin.attributes, not 1e-150 < sum(abs(x) for x in quaternion) < 1e150
-        if both or zero:
-            self.report.add(
-                BAD_QUATERNION,
-                "rpy and quat_xyzw are both given" if both else "the quaternion has no direction",
-                origin,
-                attribute="quat_xyzw",
-                found=found,
-                remedy="keep one of the two" if both else 'no rotation is "0 0 0 1"',
-            )
-            return
-        joint.quaternion = quaternion
-        self.report.add(
-            QUATERNION,
-            "quat_xyzw is obeyed, but most readers ignore it",
-            origin,
-            attribute="quat_xyzw",
-            found=found,
-            remedy="write the rotation as rpy for them",
-        )
+        if both:
+            say(BAD_QUATERNION, "rpy and quat_xyzw are both given", "keep one of the two")
+        elif zero:
+            say(BAD_QUATERNION, "the quaternion has no direction", 'no rotation is "0 0 0 1"')
+        else:
+            joint.quaternion = quaternion
+            message = "quat_xyzw is obeyed, but most readers ignore it"
+            say(QUATERNION, message, "write the rotation as rpy for them")
 
     def _axis(self, joint: JointRecord) -> None:
         axis = joint.axis_element = joint.element.first("axis")

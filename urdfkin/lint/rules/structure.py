@@ -89,26 +89,15 @@ def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[Join
 
 
 def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | None, *, loop: bool) -> None:
-    at = joint.element.first("child")
     if loop:
-        report.add(
-            CYCLE,
-            f"the joint closes a loop: its child stands above its parent {quoted(joint.parent or '')}",
-            at,
-            attribute="link",
-            found=quoted(joint.child or ""),
-            remedy="remove a joint of the loop; a URDF is a tree",
-        )
-        return
-    other = f"joint {quoted(first.name)} on line {first.element.line}" if first else "another joint"
-    report.add(
-        SEVERAL_PARENTS,
-        f"the child link already is the child of {other}",
-        at,
-        attribute="link",
-        found=quoted(joint.child or ""),
-        remedy="a link has one parent; remove one of the joints",
-    )
+        rule, remedy = CYCLE, "remove a joint of the loop; a URDF is a tree"
+        message = f"the joint closes a loop: its child stands above its parent {quoted(joint.parent or '')}"
+    else:
+        other = f"joint {quoted(first.name)} on line {first.element.line}" if first else "another joint"
+        rule, remedy = SEVERAL_PARENTS, "a link has one parent; remove one of the joints"
+        message = f"the child link already is the child of {other}"
+    at, found = joint.element.first("child"), quoted(joint.child or "")
+    report.add(rule, message, at, attribute="link", found=found, remedy=remedy)
 
 
 def _one_root(report: Reporter, robot: RobotRecord) -> bool:
