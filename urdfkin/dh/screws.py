@@ -22,7 +22,7 @@ from urdfkin.dh.to_tree import UNBOUNDED_SLIDE
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.kinematics.rotation.nearest import ROUNDED, polar_factor
-from urdfkin.kinematics.roundings import EPS, ROW
+from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.chain import FrameChain, motion_about_z
 from urdfkin.model.coupling import Coupling, coupling_of
 from urdfkin.model.given import Given
@@ -120,16 +120,19 @@ class Screws:
             T = T @ exp_screw(screw, value)
         return np.array(columns).reshape(-1, 6).T
 
+    @property
+    def roundings(self) -> float:
+        """How many eps rounding may turn `placement` by, angles apart: two rows' for each exponential."""
+        return 2.0 * of_rows(len(self.joints))
+
     def rounding(self, q: Given) -> FloatArray:
-        """(...,) metres: what rounding may do to `placement(q)`: that of two rows for each exponential."""
+        """(...,) metres: what rounding may do to `placement(q)`."""
         values = np.abs(self.coupling.values(q))
         turns = np.array([joint.kind.turns for joint in self.joints], dtype=bool)
         way = np.vstack([np.zeros(3), self.points, self.M[:3, 3]])
         length = 2.0 * float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
         lever = length + values[..., ~turns].sum(axis=-1)
-        return np.asarray(
-            EPS * (2.0 * ROW * (len(self.joints) + 1) + values[..., turns].sum(axis=-1)) * lever
-        )
+        return np.asarray(EPS * (self.roundings + values[..., turns].sum(axis=-1)) * lever)
 
     def to_tree(self) -> KinematicTree:
         """The robot: with all joints at zero every link frame stands like the base's, on its joint's axis."""

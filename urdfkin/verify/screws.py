@@ -47,7 +47,7 @@ def check_screws(verifier: Verifier, screws: Screws) -> str | None:
     unit = EPS * (of_joints(joints) + np.abs(own).sum(axis=-1)) + left_out(path)
     allowed = screws.rounding(own) + unit * (lever + np.abs(own).sum(axis=-1))
     share = float((off[..., 3].max(axis=-1) / allowed).max(initial=0.0))
-    turn = float((off[..., :3].max(axis=(-1, -2)) / (unit + EPS * 16.0 * (len(screws.joints) + 1))).max())
+    turn = float((off[..., :3].max(axis=(-1, -2)) / (unit + EPS * screws.roundings)).max())
     if max(share, turn) > 1.0:
         raise TableError(
             "the product of exponentials disagrees",

@@ -6,6 +6,7 @@ from urdfkin.lint.escape import quoted
 from urdfkin.lint.finding import Severity
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, WARNING, Rule
+from urdfkin.lint.rules.axes import LONGEST, SHORTEST
 from urdfkin.lint.rules.names import named, report_duplicate
 from urdfkin.lint.rules.numbers import NumberReader
 from urdfkin.lint.rules.vocabulary import JOINT_TYPES, nearest
@@ -126,7 +127,7 @@ class JointReader:
         quaternion = self.numbers.vector(origin, "quat_xyzw", 4)
         if quaternion is None:
             return
-        both, zero = "rpy" in origin.attributes, not 1e-150 < sum(abs(x) for x in quaternion) < 1e150
+        both, zero = "rpy" in origin.attributes, not SHORTEST < sum(map(abs, quaternion)) < LONGEST
         if both:
             say(BAD_QUATERNION, "rpy and quat_xyzw are both given", "keep one of the two")
         elif zero:
