@@ -168,11 +168,7 @@ def _load_mjcf(
     return robot
 
 
-def _load_model(
-    source: Any,
-    xacro_args: Mapping[str, object] | None,
-    **how: Unpack[How],
-) -> Robot:
+def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[How]) -> Robot:
     _refuse_arguments(xacro_args, "a pinocchio.Model")
     read = tree_of_model(source)
     text = Text(write_urdf(read.tree).encode(), "<pinocchio.Model>", "<pinocchio.Model>")

@@ -154,14 +154,7 @@ def _refuse_idle(context: click.Context, is_table: bool, options: dict[str, Any]
 @verify_option
 @output_option
 @click.pass_context
-def command(
-    context: click.Context,
-    /,
-    robot: str,
-    verify: bool,
-    output: Path | None,
-    **options: Any,
-) -> None:
+def command(context: click.Context, /, robot: str, verify: bool, output: Path | None, **options: Any) -> None:
     """Denavit-Hartenberg table of the path between two frames, exact to rounding and checked.
 
     The path may run down the tree, up, or through the common ancestor. Angles and lengths stay as the file

@@ -6,13 +6,7 @@ from pathlib import Path
 
 import click
 
-from urdfkin.cli.arguments import (
-    frame_option,
-    load_robot,
-    reference_option,
-    robot_options,
-    verify_option,
-)
+from urdfkin.cli.arguments import frame_option, load_robot, reference_option, robot_options, verify_option
 from urdfkin.cli.completing import complete_robot
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.idle import refuse_idle

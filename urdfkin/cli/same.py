@@ -111,12 +111,7 @@ def command(
 
 
 def _write(
-    found: Sameness,
-    robots: tuple[Robot, Robot],
-    format_: str,
-    paths: dict[str, Path | None],
-    *,
-    all_: bool,
+    found: Sameness, robots: tuple[Robot, Robot], format_: str, paths: dict[str, Path | None], *, all_: bool
 ) -> None:
     """Every form that was asked for."""
     from urdfkin.report.sameness import markdown_of, print_sameness  # noqa: PLC0415

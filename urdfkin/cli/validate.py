@@ -35,11 +35,7 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 @click.option("--all", "all_", is_flag=True, help="Every robot of example-robot-data in the catalogue.")
 @click.option("--samples", type=Whole(0), default=1000, show_default=True, help="For each robot.")
 @click.option(
-    "--seed",
-    type=Whole(0),
-    default=0,
-    show_default=True,
-    help="The same seed gives the same numbers.",
+    "--seed", type=Whole(0), default=0, show_default=True, help="The same seed gives the same numbers."
 )
 @click.option("--jobs", type=Whole(1), default=1, show_default=True, help="Local processes.")
 @mimic_option("Whether mimic joints follow (the default).")

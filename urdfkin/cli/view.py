@@ -28,14 +28,7 @@ EXAMPLE = "urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04"
 @seed_option
 @click.option("--browser/--no-browser", default=None, help="Whether to open it.  [default: on a screen]")
 @click.option("--port", type=Whole(1, 65535), default=8080, show_default=True)
-def command(
-    robot: str,
-    q: str,
-    seed: int,
-    host: str,
-    port: int,
-    browser: bool | None,
-) -> None:
+def command(robot: str, q: str, seed: int, host: str, port: int, browser: bool | None) -> None:
     """Show a robot in a browser tab: sliders, shapes, frames, DH frames, velocity and acceleration arrows.
 
     It begins at --q, or in the neutral configuration, moved to within the limits. The numbers of the chosen

@@ -32,9 +32,7 @@ def plan_of(table: DHTable) -> Plan:
 
 
 def jacobian(
-    table: DHTable,
-    q: Given,
-    reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
+    table: DHTable, q: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
     """(..., 6, coordinates) Jacobian of the tip in the base frame, [linear; angular]: 7.85.
 
@@ -52,10 +50,7 @@ def jacobian(
 
 
 def velocity(
-    table: DHTable,
-    q: Given,
-    v: Given,
-    reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
+    table: DHTable, q: Given, v: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
     """(..., 6) velocity of the tip in the base frame, [linear; angular]: 7.127, 7.128.
 
@@ -73,11 +68,7 @@ def velocity(
 
 
 def acceleration(
-    table: DHTable,
-    q: Given,
-    v: Given,
-    a: Given,
-    reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
+    table: DHTable, q: Given, v: Given, a: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
     """(..., 6) classical acceleration of the tip in the base frame, [linear; angular]: 7.129, 7.130.
 

@@ -27,16 +27,7 @@ from urdfkin.model.chain import FrameChain, motion_about_z
 from urdfkin.model.coupling import Coupling, coupling_of
 from urdfkin.model.given import Given
 from urdfkin.model.pose import pose
-from urdfkin.model.tree import (
-    FloatArray,
-    Joint,
-    JointKind,
-    KinematicTree,
-    Limit,
-    Mimic,
-    build_tree,
-    frozen,
-)
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, frozen
 
 #: How far a written screw may be from one: the length of its axis from 1, its pitch from 0, metres a radian.
 _WRITTEN = 1e-4

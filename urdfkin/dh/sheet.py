@@ -324,10 +324,7 @@ def _number(cell: str, column: _Column, where: str, commas: bool) -> str:
     except NoCellError as error:
         decimal = "separate cells by semicolons if commas are decimal" if "," in cell else f"{error}"
         raise InputError(
-            "not a number",
-            where=where,
-            found=shown(cell),
-            remedy=f"{decimal}: write 1.5708, pi/2 or 90 deg",
+            "not a number", where=where, found=shown(cell), remedy=f"{decimal}: write 1.5708, pi/2 or 90 deg"
         ) from None
     plain = spelled(text)
     return f"{plain} {column.unit}" if column.unit and found.unit is None and found.number else plain

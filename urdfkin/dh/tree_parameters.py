@@ -32,12 +32,7 @@ from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.chain import motion_about_z
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
 
-_SIGMA = {
-    JointKind.REVOLUTE: 0,
-    JointKind.CONTINUOUS: 0,
-    JointKind.PRISMATIC: 1,
-    JointKind.FIXED: 2,
-}
+_SIGMA = {JointKind.REVOLUTE: 0, JointKind.CONTINUOUS: 0, JointKind.PRISMATIC: 1, JointKind.FIXED: 2}
 
 
 @dataclass(frozen=True, slots=True)

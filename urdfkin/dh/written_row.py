@@ -130,10 +130,7 @@ def _known(given: Mapping[str, Any], keys: Sequence[str], what: str, where: str)
     for key in given:
         if key not in keys:
             raise InputError(
-                f"unknown key in {what}",
-                where=where,
-                found=repr(key),
-                remedy=f"keys are {', '.join(keys)}",
+                f"unknown key in {what}", where=where, found=repr(key), remedy=f"keys are {', '.join(keys)}"
             )
 
 
@@ -177,10 +174,7 @@ def _read(text: str, where: str) -> Cell:
         return cell_of(text)
     except NoCellError as error:
         raise InputError(
-            "not a number",
-            where=where,
-            found=shown(text),
-            remedy=f"{error}: write 1.5708, pi/2 or 90 deg",
+            "not a number", where=where, found=shown(text), remedy=f"{error}: write 1.5708, pi/2 or 90 deg"
         ) from None
 
 

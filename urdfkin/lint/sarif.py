@@ -91,10 +91,7 @@ def _fix(finding: Finding, fix: Fix) -> dict[str, Any]:
 
 def _location(finding: Finding) -> dict[str, Any]:
     location: dict[str, Any] = {
-        "physicalLocation": {
-            "artifactLocation": {"uri": _uri(finding.file)},
-            "region": _region(finding),
-        }
+        "physicalLocation": {"artifactLocation": {"uri": _uri(finding.file)}, "region": _region(finding)}
     }
     if finding.element and finding.name:
         location["logicalLocations"] = [{"name": finding.name, "kind": finding.element}]

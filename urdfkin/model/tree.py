@@ -403,11 +403,7 @@ def freed(tree: KinematicTree) -> KinematicTree:
     return KinematicTree(tree.name, tree.links, tuple(replace(joint, mimic=None) for joint in tree.joints))
 
 
-def build_tree(
-    name: str,
-    root: str,
-    joints: Sequence[tuple[Joint, str, str]],
-) -> KinematicTree:
+def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -> KinematicTree:
     """Order joints as Pinocchio does (depth first, siblings by name) and make the tree.
 
     Args:

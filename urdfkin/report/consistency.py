@@ -76,11 +76,7 @@ def _subjects(robot: Robot) -> dict[str, list[str]]:
     model = robot["model"]
     if model is None:
         return {"frames": [], "joints": [], "columns": []}
-    return {
-        "frames": frame_names(model),
-        "joints": moving_names(model),
-        "columns": column_names(model),
-    }
+    return {"frames": frame_names(model), "joints": moving_names(model), "columns": column_names(model)}
 
 
 def _verdict(robot: Robot, samples: int) -> Iterator[str]:

@@ -156,13 +156,7 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
 def _summary(robot: Robot, index: int) -> dict[str, Any]:
     """What stands of a robot while it is folded."""
     opened = robot["verdict"] != "verified" and index < _FAILURES_OPEN
-    return {
-        "index": index,
-        "data": robot,
-        "summary": pages.overview(robot, []),
-        "file": "",
-        "opened": opened,
-    }
+    return {"index": index, "data": robot, "summary": pages.overview(robot, []), "file": "", "opened": opened}
 
 
 def _totals(document: Document) -> dict[str, Any]:

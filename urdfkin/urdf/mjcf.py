@@ -146,11 +146,7 @@ def read_mjcf(source: str | bytes | os.PathLike[str]) -> Mjcf:
         model = compiled(spec)
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         found = str(error).strip().replace("\n", "; ")
-        raise InputError(
-            "MuJoCo does not accept this MJCF",
-            where=name_of(source),
-            found=found,
-        ) from None
+        raise InputError("MuJoCo does not accept this MJCF", where=name_of(source), found=found) from None
     reader = _Reader(mujoco, model, spec.modelname or "robot", name_of(source))
     tree = reader.tree()
     text = isinstance(source, bytes) or _is_text(source)

@@ -110,13 +110,7 @@ class _Block(_Work):
     """The comparisons of some frames, and of the joints whose child links are among them."""
 
     def __init__(
-        self,
-        robot: Robot,
-        oracle: Oracle,
-        x: Samples,
-        first_sample: int,
-        clock: Clock,
-        frames: slice,
+        self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock, frames: slice
     ) -> None:
         super().__init__(robot, oracle, x, first_sample, clock)
         tree = robot.tree

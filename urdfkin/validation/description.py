@@ -61,10 +61,5 @@ def _limit(joint: Joint) -> dict[str, float | None] | None:
     limit = joint.limit
     if limit is None:
         return None
-    named = {
-        "lower": limit.lower,
-        "upper": limit.upper,
-        "velocity": limit.velocity,
-        "effort": limit.effort,
-    }
+    named = {"lower": limit.lower, "upper": limit.upper, "velocity": limit.velocity, "effort": limit.effort}
     return {name: value if math.isfinite(value) else None for name, value in named.items()}

@@ -42,10 +42,7 @@ _MASS = "1"
 #: Links one behind the other: MuJoCo refuses more than 1,023, after a time that grows with their square.
 _DEEPEST = 1_000
 #: What each kind of joint is in MuJoCo, in the order of its coordinates: slides along the axes, then turns.
-_PARTS = {
-    "planar": ("slide x", "slide y", "hinge"),
-    "floating": ("slide x", "slide y", "slide z", "ball"),
-}
+_PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 #: A joint's coordinates and rates in urdfkin's layout.
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}

@@ -328,11 +328,7 @@ IMU = replace(
     command="",
 )
 JOINT_JACOBIAN = replace(
-    JACOBIAN,
-    name="joint jacobian",
-    title="joint Jacobian",
-    ask=asked("joint_jacobians"),
-    of="joints",
+    JACOBIAN, name="joint jacobian", title="joint Jacobian", ask=asked("joint_jacobians"), of="joints"
 )
 JOINT_JACOBIAN_RATE = replace(
     JACOBIAN_RATE,
@@ -342,13 +338,7 @@ JOINT_JACOBIAN_RATE = replace(
     of="joints",
 )
 SCREWS = replace(
-    JACOBIAN,
-    name="screws",
-    title="data.J",
-    shape=(6,),
-    ask=asked("screws"),
-    of="columns",
-    head="data.J",
+    JACOBIAN, name="screws", title="data.J", shape=(6,), ask=asked("screws"), of="columns", head="data.J"
 )
 
 #: Every quantity by its name, in the order of certificates and reports.

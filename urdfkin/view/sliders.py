@@ -55,12 +55,7 @@ class Sliders:
     """
 
     def __init__(
-        self,
-        gui: Any,
-        folder: Any,
-        rows: Iterable[Row],
-        rate: str,
-        moved: Callable[[int, float], None],
+        self, gui: Any, folder: Any, rows: Iterable[Row], rate: str, moved: Callable[[int, float], None]
     ) -> None:
         self._gui, self._folder, self.rows, self._rate, self._moved = gui, folder, list(rows), rate, moved
         self._setting = False

@@ -122,9 +122,7 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
     )
 
 
-def principal_moments(
-    moments: Sequence[float],
-) -> tuple[float, float, float]:
+def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
     """Eigenvalues of an inertia tensor, smallest first, by the trigonometric solution of the cubic.
 
     Args:

@@ -97,10 +97,7 @@ class JointReader:
         end = element.first(tag)
         if end is None:
             self.report.add(
-                MISSING_ELEMENT,
-                f"the joint has no <{tag}>",
-                element,
-                remedy=f'write <{tag} link="..."/>',
+                MISSING_ELEMENT, f"the joint has no <{tag}>", element, remedy=f'write <{tag} link="..."/>'
             )
             return None
         return self.required(end, "link", f'<{tag} link="..."/>')
