@@ -47,7 +47,7 @@ def status(context: click.Context, folder: Path) -> None:
     say(f"{folder}: {of}, began {manifest.started}")
     say(f"robots: {over:,} of {len(counts):,} are done, {len(failed):,} of them failed")
     say(f"chunks: {there:,} are there, {missing:,} are missing")
-    _say_judged(store, [robot for robot, (_, has_failed) in counts.items() if not has_failed])
+    _say_judged(store, counts)
     for robot in failed[:_NAMED]:
         say(f"  failed: {manifest.robots[robot][0].words}{_why(store, robot)}")
     if len(failed) > _NAMED:
@@ -66,10 +66,11 @@ def status(context: click.Context, folder: Path) -> None:
     context.exit(3 if missing or failed else 0)
 
 
-def _say_judged(store: Store, robots: list[int]) -> None:
+def _say_judged(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
     """How far the judge has come, where it was asked for."""
     if not store.has_judge:
         return
+    robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
     from urdfkin.report.words import counted  # noqa: PLC0415  keeps --help fast
     from urdfkin.validation.judging import Judged  # noqa: PLC0415
 
@@ -122,7 +123,7 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
         counts = whole.counts()
         size = len(whole.manifest.cut)
         missing = sum(size - done for done, failed in counts.values() if not failed)
-        _say_judged(whole, [robot for robot, (_, has_failed) in counts.items() if not has_failed])
+        _say_judged(whole, counts)
     say(f"{folder}: complete" if not missing else f"{folder}: {missing:,} chunks are missing")
 
 

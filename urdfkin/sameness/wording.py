@@ -102,27 +102,14 @@ def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...
     ]
     ordered = [one for _, some in sorted(placed, key=lambda pair: pair[0]) for one in some]
     for tree, joints, which in ((tree_a, found.only_a, "A"), (tree_b, found.only_b, "B")):
-        ordered += [
-            Difference(
-                f"joint {tree.joints[j].name}",
-                f"only in {which}",
-                f"joint {tree.joints[j].name} is only in {which}",
-            )
-            for j in sorted(joints)
-            if tree.joints[j].kind.nv
-        ]
+        alone = [f"joint {tree.joints[j].name}" for j in sorted(joints) if tree.joints[j].kind.nv]
+        ordered += [Difference(place, f"only in {which}", f"{place} is only in {which}") for place in alone]
     have = {tree_a.links[frame.a] for frame in found.frames}
     for link in tree_a.links:
-        if link in tree_b.links and link not in have:
-            carried = [_carrier(tree, link) for tree in (tree_a, tree_b)]
-            if _of_the_pair(found, tree_a, tree_b, link):
-                ordered.append(
-                    Difference(
-                        f"link {link}",
-                        "carried by",
-                        f"link {link} is carried by {carried[0]} in A, by {carried[1]} in B",
-                    )
-                )
+        if link in tree_b.links and link not in have and _of_the_pair(found, tree_a, tree_b, link):
+            ours, theirs = (_carrier(tree, link) for tree in (tree_a, tree_b))
+            words = f"link {link} is carried by {ours} in A, by {theirs} in B"
+            ordered.append(Difference(f"link {link}", "carried by", words))
     return tuple(ordered)
 
 
@@ -147,8 +134,7 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
     joint, other = tree_a.joints[step.a], tree_b.joints[step.b]
     place = f"joint {joint.name}"
     if step.unlike == "kind":
-        words = f"{place} is {joint.kind.value} in A, {other.kind.value} in B"
-        return [Difference(place, "kind", words)]
+        return [Difference(place, "kind", f"{place} is {joint.kind.value} in A, {other.kind.value} in B")]
     if step.unlike:
         fixed, moves = ("A", "B") if step.unlike == "a" else ("B", "A")
         return [Difference(place, "fixed", f"{place} moves in {moves} and is fixed in {fixed}")]
@@ -162,8 +148,7 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
         (variables.rules, "{0} follows by another rule: {1} in A, {2} in B"),
     ):
         if i in steps:
-            text = words.format(place, _rule(joint), _rule(other))
-            some.append(Difference(place, "mimic rule", text))
+            some.append(Difference(place, "mimic rule", words.format(place, _rule(joint), _rule(other))))
     return some
 
 
@@ -201,11 +186,8 @@ def remarks(found: Alignment, variables: Variables, tolerance: Tolerance) -> tup
         paired = {tree.links[frame.a if which == "A" else frame.b] for frame in found.frames}
         lacking = [link for link in tree.links if link not in other.links and link not in paired]
         if lacking:
-            some.append(
-                Difference(
-                    f"links of {which}", f"only in {which}", f"links only in {which}: {', '.join(lacking)}"
-                )
-            )
+            words = f"links only in {which}: {', '.join(lacking)}"
+            some.append(Difference(f"links of {which}", f"only in {which}", words))
     return tuple(some)
 
 
