@@ -81,6 +81,20 @@ def test_sliding_joints_are_fitted_as_well(kinds: str) -> None:
     assert found.differences == ()
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_patterns_of_coinciding_axes_crowd_no_other_out(seed: int) -> None:
+    tree = arm(
+        shift(0.4, -0.5, -0.3),
+        rotation("z", math.pi) @ shift(0, 0, -0.3) @ rotation("z", -math.pi / 2) @ shift(0, 0, -0.15),
+        rotation("z", -math.pi / 2) @ rotation("x", math.pi),
+        shift(0.17, 0.23, 0) @ rotation("x", 5.4e-4) @ rotation("z", math.pi / 2) @ shift(0, 0, 0.47),
+        rotation("z", 2.0) @ shift(0, 0, 0.5) @ rotation("x", 0.015) @ rotation("z", 2.7),
+        rotation("z", -math.pi / 2) @ shift(0.13, 0, 0) @ rotation("x", 7.9e-5) @ shift(0, 0, 0.45),
+        kinds="RRRPRR",
+    )
+    assert compare(chain(tree, "tip"), disguised(dh_table(tree, "tip"), seed)).exact
+
+
 @given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
 @settings(max_examples=20)
 def test_a_table_agrees_with_the_chain_it_came_from(tree: KinematicTree, seed: int) -> None:

@@ -29,6 +29,8 @@ REVERSAL = 1e-9
 _SLIDING = 1e-3
 #: Metres: an offset between axes that is smaller counts as none, and leaves x free.
 _NO_OFFSET = 1e-5
+#: Decimals of metres and radians to which patterns are alike.
+_ALIKE = 6
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
 
@@ -84,7 +86,7 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
             for sense in (1, -1)
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
-        partials = sorted(longer, key=lambda partial: partial.cost)[:beam]
+        partials = _unlike_each_other(sorted(longer, key=lambda partial: partial.cost))[:beam]
     # Where axes nearly coincide, many patterns of x are nearly the same: the fit finds from one to another.
     by_senses: dict[tuple[int, ...], _Partial] = {}
     for partial in partials:
@@ -95,6 +97,17 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
 
 def _first(sense: int) -> _Partial:
     return _Partial(REVERSAL * (sense < 0), (sense,), (), 0.0, 0.0, np.eye(4))
+
+
+def _unlike_each_other(partials: list[_Partial]) -> list[_Partial]:
+    """Of those that go on alike the first: coinciding axes have many, which would crowd others out."""
+    found: dict[tuple[object, ...], _Partial] = {}
+    for one in partials:
+        # What an offset before it may still turn goes on alike whichever way x points.
+        circle = math.pi if one.absorber else 2.0 * math.pi
+        ahead = round(one.phi_in % circle, _ALIKE), round(one.carry, _ALIKE)
+        found.setdefault((one.senses, one.absorber, *ahead), one)
+    return list(found.values())
 
 
 def _pose(chain: FrameChain, k: int, before: int, after: int) -> FloatArray:
