@@ -26,7 +26,7 @@ from urdfkin.model.chain import FrameChain
 #: Of the reach, or radians: cells that differ by more are another robot's; zeros that do are other zeros.
 _ANOTHER, _OTHER = 0.1, 1e-2
 #: Likewise: cells that differ by less are equal.
-_ROUNDING = 1e-9
+_ROUNDING = 1e-12
 
 
 def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
