@@ -15,14 +15,15 @@ from tests.dh.test_compare import disguised
 from tests.random_chains import TURNS, configurations, rotation, shift
 from urdfkin.dh import DHTable, dh_table
 from urdfkin.dh.compare import compare
+from urdfkin.dh.convert import to_convention
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import FloatArray, KinematicTree
 
 pytestmark = pytest.mark.slow
 
-#: Of a change of a cell (m or rad) a twentieth is a difference: with two slides, one on either side of a tilt
+#: Of a change of a cell (m or rad) a fifth is a difference: with two slides, one on either side of a tilt
 #: of 1e-8 rad, rounding hides more of where a plane cuts than with one.
-CHANGE, SAME, EXACT = 1e-6, 5e-8, 1e-11
+CHANGE, SAME, EXACT = 1e-6, 2e-7, 1e-11
 
 turn = st.one_of(st.sampled_from(list(TURNS)), st.floats(-3.0, 3.0))
 length = st.one_of(st.just(0.0), st.floats(0.05, 0.5), st.floats(-0.5, -0.05))
@@ -94,13 +95,19 @@ def test_another_zero_of_one_slide_is_no_difference_to_rounding(tree: KinematicT
     assert max(differences(table, reference).values()) <= EXACT
 
 
-@given(arms_with_slides(), st.integers(0, 99))
+conventions = st.sampled_from(["standard", "modified"])
+
+
+@given(arms_with_slides(), st.integers(0, 99), conventions, conventions)
 @settings(max_examples=100)
-def test_other_zeros_are_no_difference(tree: KinematicTree, seed: int) -> None:
+def test_other_zeros_are_no_difference_in_either_convention(
+    tree: KinematicTree, seed: int, there: str, here: str
+) -> None:
     reference = disguised(dh_table(tree, "tip"), seed)
-    table = dh_table(tree, "tip", like=reference)
+    table = dh_table(tree, "tip", convention=here, like=to_convention(reference, there))
+    assert table.convention == here
     assert is_the_urdf(table, tree)
-    assert max(differences(table, reference).values()) <= SAME
+    assert max(differences(to_convention(table, "standard"), reference).values()) <= SAME
 
 
 def along_slides(reference: DHTable) -> list[int]:
@@ -131,14 +138,15 @@ def test_a_length_along_a_slide_may_stand_in_either_d(tree: KinematicTree, seed:
 
 
 @given(arms_with_slides(inner=True), st.integers(0, 99), st.data())
-@settings(max_examples=30)
-def test_what_no_zero_explains_is_a_difference(tree: KinematicTree, seed: int, data: st.DataObject) -> None:
+@settings(max_examples=60)
+def test_where_there_is_no_difference_the_robot_is_the_same(
+    tree: KinematicTree, seed: int, data: st.DataObject
+) -> None:
     reference = disguised(dh_table(tree, "tip"), seed)
-    rows, path = list(reference.rows), chain(tree, "tip")
-    inner = differences(reference, reference)
-    i, cell = data.draw(st.sampled_from([one for one in inner if one[1] != "beta"]))
+    rows, cells = list(reference.rows), sorted(differences(reference, reference))
+    i, cell = data.draw(st.sampled_from([one for one in cells if one[1] != "beta"]))
     rows[i] = replace(rows[i], **{cell: getattr(rows[i], cell) + CHANGE})
     changed = replace(reference, rows=tuple(rows))
-    judged = compare(path, changed)
-    assume(judged.metres + judged.radians > SAME)
-    assert max(differences(dh_table(tree, "tip", like=changed), changed).values()) >= SAME
+    if max(differences(dh_table(tree, "tip", like=changed), changed).values()) < 0.5 * CHANGE:
+        judged = compare(chain(tree, "tip"), changed)
+        assert judged.metres + judged.radians <= SAME

@@ -77,8 +77,8 @@ class PairLike:
     def cut(self) -> float | None:
         """Metres along this axis from its joint's frame to the plane that cuts the other table's pair.
 
-        None where none is within reach. There x reaches the plane at the other a, of which the lean tells
-        a part. By a slight tilt, rounding hides which: then it is what the part across the lean leaves.
+        None where none is within reach. There x reaches the plane at the other a, of which the lean tells the
+        part along itself. That is known to rounding by the tilt; by a slight one better from the part across.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, lean = tilt_of(self.A), math.hypot(along, across)
@@ -86,8 +86,9 @@ class PairLike:
             return None
         (x, y, z), p = self.A[:3, 2] / sine, self.A[:3, 3]
         there = self.row.a * along / lean
-        if sine * sine <= self.noise.radians:
-            there = math.copysign(math.sqrt(max(0.0, self.row.a**2 - (p[0] * y - p[1] * x) ** 2)), there)
+        beside = p[0] * y - p[1] * x
+        if sine * sine <= self.noise.radians and self.row.a**2 * sine < abs(there * beside):
+            there = math.copysign(math.sqrt(max(0.0, self.row.a**2 - beside**2)), there)
         cut = float(p[2] + (there - p[0] * x - p[1] * y) * z)
         return cut if abs(cut) <= self.reach else None
 
