@@ -73,7 +73,7 @@ def test_families_share_what_is_asked_for() -> None:
 
 @pytest.mark.slow
 def test_every_mutator_is_used_and_nearly_all_change_something() -> None:
-    files = fuzz.files()
+    files = [path for path in fuzz.files() if path.stat().st_size < 20_000]  # the large are no other
     originals = {path.stem: path.read_bytes() for path in files}
     used, changed = set(), 0
     for number in range(1000):
