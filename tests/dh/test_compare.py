@@ -95,6 +95,28 @@ def test_patterns_of_coinciding_axes_crowd_no_other_out(seed: int) -> None:
     assert compare(chain(tree, "tip"), disguised(dh_table(tree, "tip"), seed)).exact
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_x_beside_a_slide_stands_across_both_axes(seed: int) -> None:
+    square = rotation("x", math.pi / 2)
+    tree = arm(
+        rotation("x", 3.1) @ shift(0, 0, -0.12),
+        rotation("z", math.pi)
+        @ shift(-0.23, 0, -0.22)
+        @ square
+        @ rotation("z", math.pi)
+        @ shift(0, 0, -0.39),
+        shift(-0.31, 0, -0.19) @ square @ rotation("z", -2.0) @ shift(0, 0, 0.43),
+        rotation("z", 1.9) @ shift(0, 0, 0.3) @ square @ rotation("z", -math.pi / 2),
+        shift(-0.27, 0, -0.37) @ rotation("x", 0.21) @ rotation("z", math.pi) @ shift(0, 0, -0.07),
+        rotation("z", -0.49) @ shift(0.08, 0, 0.34) @ rotation("x", 1.3) @ shift(0, 0, -0.28),
+        kinds="PRRRPR",
+        tip=rotation("z", math.pi / 2) @ shift(0.46, 0, 0.45) @ square @ rotation("z", math.pi),
+    )
+    reference = disguised(dh_table(tree, "tip"), seed)
+    assert compare(chain(tree, "tip"), reference).exact
+    assert dh_table(tree, "tip", like=reference).rows[3].alpha == pytest.approx(reference.rows[3].alpha)
+
+
 @given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
 @settings(max_examples=20)
 def test_a_table_agrees_with_the_chain_it_came_from(tree: KinematicTree, seed: int) -> None:

@@ -183,13 +183,13 @@ def _steps(
     """A pair taken apart in the ways the reference's may be, with both directions of x.
 
     Axes that are nearly parallel in both are cut by the normal plane too, at the reference's own d. An offset
-    of nearly nothing, or of an axis that slides and has no place (not `placed`), counts as
-    none: x is free there.
+    of nearly nothing, or of an axis that slides and has no place (not `placed`), counts as none: x is free
+    there. Across both axes x needs no place, and is tried for sliding ones too.
     """
     steps = []
     sine = math.hypot(A[0, 2], A[1, 2])
     near = abs(math.sin(row.alpha)) < FAR_FEET and sine < FAR_FEET
-    if not near or (placed and row.beta == 0.0):
+    if not near or row.beta == 0.0:
         steps.append(step_between(A, reach, NearParallel.STRICT, phi_free))
     if near:
         lifted = A.copy()
