@@ -26,7 +26,7 @@ def draw(figures: Mapping[str, Any], path: Path) -> bytes:
     """
     rows = figures["rows"]
     with style(font_size=8, svg_fonttype="none"):
-        figure = new_figure(9.0, 7.0)
+        figure = new_figure(11.0, 7.0)  # as wide as the longest name and title beside it
         axes = figure.subplots(2, 2, height_ratios=[1.35, 1.0])
         for panel, quantity in zip(axes[0], MARKS, strict=True):
             _bars(panel, _chosen(rows, "batch", quantity), quantity)
