@@ -107,6 +107,17 @@ def test_what_is_no_configuration_is_refused_as_everywhere(arm: Robot) -> None:
         arm.compiled("nowhere")
 
 
+def test_so_is_every_number_of_rows_that_no_register_divides() -> None:
+    free = urdfkin.load("panda", mimic=False)
+    fast, inputs = free.compiled(free.tip_frame), np.zeros((3, 20, 9))
+    fast.acceleration(*inputs)
+    for place in np.ndindex(inputs.shape):
+        inputs[place] = np.nan
+        with pytest.raises(InputError, match="finite"):
+            fast.acceleration(*inputs)
+        inputs[place] = 0.0
+
+
 def test_it_is_made_once_and_a_copy_makes_its_own(arm: Robot) -> None:
     fast = arm.compiled(arm.tip_frame)
     assert arm.compiled(arm.tip_frame) is fast
