@@ -79,8 +79,8 @@ def test_the_rate_of_the_jacobian_is_its_difference_quotient_to_many_digits() ->
         return exact_recursion.move(robot.tree, joints, q, v, v)
 
     for reference in Reference:
-        ahead, behind = (exact_recursion.jacobian(at(t), link, reference) for t in (step, -step))
-        found = exact_recursion.jacobian_rate(at(mp.mpf(0)), link, reference)
+        ahead, behind = (exact_recursion.jacobian_values(at(t), link, reference).T for t in (step, -step))
+        found = exact_recursion.jacobian_rate_values(at(mp.mpf(0)), link, reference).T
         for column, after, before in zip(found, ahead, behind, strict=True):
             for x, late, early in zip(column, after, before, strict=True):
                 assert abs(x - (late - early) / (2 * step)) < 1e-25

@@ -1,0 +1,186 @@
+"""The recursion of section 7.7 and what is read off a frame, on any kind of number.
+
+`eq` are the chapter's equations, computing with that kind (`urdfkin.kinematics.arithmetic.bound`). The walk
+in compiled code is `urdfkin.compiled.walk`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from urdfkin.model.reference import Reference
+
+Number = Any
+Vector = tuple[Number, Number, Number]
+Matrix = tuple[Vector, Vector, Vector]
+Six = tuple[Number, ...]
+
+ZERO: Vector = (0, 0, 0)
+IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A link's frame: R and p in the world's axes, w, vel, alpha and acc in the axes of the recursion."""
+
+    R: Matrix = IDENTITY
+    p: Vector = ZERO
+    w: Vector = ZERO
+    vel: Vector = ZERO
+    alpha: Vector = ZERO
+    acc: Vector = ZERO
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A rate: its axis, whether it turns, its joint's frame and place on the path, its place in v, its factor."""
+
+    z: Vector
+    turns: bool
+    carrier: State
+    order: int
+    place: int
+    factor: Number
+
+
+@dataclass(eq=False)
+class Recursion:
+    """From a link's state to the next.
+
+    Attributes:
+        eq: The equations.
+        own: Whether motion is seen in each link's own axes, not in the world's.
+    """
+
+    eq: Any
+    own: bool = False
+
+    def seen(self, s: State, x: Vector) -> Vector:
+        """A vector of the link, in the axes of the recursion."""
+        return x if self.own else self.eq.rotate(s.R, x)
+
+    def carried(self, s: State, d: Vector) -> State:
+        """Along the rigid link: 7.58, 7.128, 7.130."""
+        eq, lever = self.eq, self.seen(s, d)
+        vel, acc = eq.point_velocity(s.vel, s.w, lever), eq.point_acceleration(s.acc, s.alpha, s.w, lever)
+        return replace(s, p=eq.point_position(s.p, s.R, d), vel=vel, acc=acc)
+
+    def turned(self, s: State, S: Matrix) -> State:
+        """The same motion, seen from a frame that is turned by S."""
+        R = self.eq.product(s.R, S)
+        if not self.own:
+            return replace(s, R=R)
+        back = self.eq.transposed(S)
+        return State(R, s.p, *(self.eq.rotate(back, x) for x in (s.w, s.vel, s.alpha, s.acc)))
+
+    def revolute(self, s: State, axis: Vector, S: Matrix, v: Number, a: Number) -> State:
+        """7.129, then 7.127, then the turn itself."""
+        z = self.seen(s, axis)
+        alpha = self.eq.angular_acceleration(s.alpha, s.w, z, v, a)
+        return self.turned(replace(s, alpha=alpha, w=self.eq.angular_velocity(s.w, z, v)), S)
+
+    def prismatic(self, s: State, axis: Vector, x: Number, v: Number, a: Number) -> State:
+        """The slide is a part of the interorigin vector (7.64); then 7.130 and 7.128."""
+        s = self.carried(s, self.eq.times(x, axis))
+        z = self.seen(s, axis)
+        acc = self.eq.sliding_acceleration(s.acc, s.w, z, v, a)
+        return replace(s, vel=self.eq.sliding_velocity(s.vel, z, v), acc=acc)
+
+    def free(self, s: State, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> State:
+        """A planar or floating joint; u, o and their rates are in the moved axes."""
+        eq, s = self.eq, self.turned(self.carried(s, slide), S)
+        u, o, u_rate, o_rate = (self.seen(s, x) for x in rates)
+        return replace(
+            s,
+            w=eq.plus(s.w, o),
+            vel=eq.plus(s.vel, u),
+            alpha=eq.free_angular_acceleration(s.alpha, s.w, o, o_rate),
+            acc=eq.free_acceleration(s.acc, s.w, o, u, u_rate),
+        )
+
+    # -- what is asked of a frame; columns are in the world's axes -----------------------------------
+
+    def velocity(self, s: State, reference: Reference) -> tuple[Vector, Vector]:
+        """Linear, angular: 7.127, 7.128."""
+        at_world = reference is Reference.WORLD
+        return self.eq.point_velocity(s.vel, s.w, self.eq.minus(ZERO, s.p)) if at_world else s.vel, s.w
+
+    def acceleration(self, s: State, reference: Reference) -> tuple[Vector, Vector]:
+        """Linear, angular, classical: 7.129, 7.130."""
+        at_world = reference is Reference.WORLD
+        acc = self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)) if at_world else s.acc
+        return acc, s.alpha
+
+    def in_reference(self, s: State, reference: Reference, linear: Vector, angular: Vector) -> Six:
+        """A pair seen in the world's axes, in those of its reference."""
+        if reference is Reference.LOCAL:
+            back = self.eq.transposed(s.R)
+            linear, angular = self.eq.rotate(back, linear), self.eq.rotate(back, angular)
+        return (*linear, *angular)
+
+    def _column(self, column: Column, to: Vector) -> tuple[Vector, Vector]:
+        if not column.turns:
+            return column.z, ZERO
+        six: tuple[Vector, Vector] = self.eq.turning_column(column.z, self.eq.minus(to, column.carrier.p))
+        return six
+
+    def jacobian(self, s: State, columns: Sequence[Column], nv: int, reference: Reference) -> list[Six]:
+        """The columns of 7.85, one for each rate."""
+        to = ZERO if reference is Reference.WORLD else s.p
+        return self._summed(s, reference, nv, ((one, *self._column(one, to)) for one in columns))
+
+    def jacobian_rate(self, s: State, columns: Sequence[Column], nv: int, reference: Reference) -> list[Six]:
+        """The columns of 7.126."""
+        to, to_rate = (ZERO, ZERO) if reference is Reference.WORLD else (s.p, s.vel)
+        rates = ((one, *self._rate(s, one, to, to_rate, reference)) for one in columns)
+        return self._summed(s, reference, nv, rates)
+
+    def _rate(
+        self, s: State, column: Column, to: Vector, to_rate: Vector, reference: Reference
+    ) -> tuple[Vector, Vector]:
+        eq, carrier, (linear, angular) = self.eq, column.carrier, self._column(column, to)
+        rate, turning = eq.axis_rate(carrier.w, column.z), ZERO
+        if column.turns:
+            d, d_rate = eq.minus(to, carrier.p), eq.minus(to_rate, carrier.vel)
+            rate, turning = eq.turning_column_rate(column.z, rate, d, d_rate)
+        if reference is Reference.LOCAL:
+            rate = eq.rate_in_turning_axes(rate, s.w, linear)
+            turning = eq.rate_in_turning_axes(turning, s.w, angular)
+        return rate, turning
+
+    def _summed(
+        self, s: State, reference: Reference, nv: int, found: Iterator[tuple[Column, Vector, Vector]]
+    ) -> list[Six]:
+        """By rate: a leader's own column and those of its followers."""
+        out: list[Six] = [(0,) * 6] * nv
+        for column, linear, angular in found:
+            six = self.in_reference(s, reference, linear, angular)
+            out[column.place] = tuple(
+                x + column.factor * y for x, y in zip(out[column.place], six, strict=True)
+            )
+        return out
+
+    def hessian(
+        self, s: State, columns: Sequence[Column], reference: Reference
+    ) -> Iterator[tuple[int, int, Number, Six]]:
+        """By which column and which rate, their factor, and how the rate changes the column."""
+        to = ZERO if reference is Reference.WORLD else s.p
+        ends = [(one, self._column(one, to)) for one in columns]
+        for of, six in ends:
+            for by, by_six in ends:
+                change = self._change(six, by_six, reference, before=by.order <= of.order)
+                yield of.place, by.place, of.factor * by.factor, self.in_reference(s, reference, *change)
+
+    def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
+        """How a column changes with a rate that comes before it, or with it, or behind it."""
+        eq = self.eq
+        change: tuple[Vector, Vector] = ZERO, ZERO
+        if reference is Reference.WORLD:
+            change = eq.motion_product(*by, *six) if before else change
+        elif reference is Reference.LOCAL:
+            change = change if before else eq.motion_product(*six, *by)
+        else:
+            change = eq.turned_along(by[1], *six) if before else (eq.end_moved(six[1], by[0]), ZERO)
+        return change
