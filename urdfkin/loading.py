@@ -29,7 +29,6 @@ from urdfkin.urdf.mjcf import is_mjcf, name_of, read_mjcf
 from urdfkin.urdf.origin import Origin
 from urdfkin.urdf.pinocchio_model import is_model, tree_of_model
 from urdfkin.urdf.reader import read_tree
-from urdfkin.urdf.remembering import remembered_tree
 from urdfkin.urdf.sources import Source, Text, as_word, read_source
 from urdfkin.urdf.trees import XmlElement, XmlTree, text_of
 from urdfkin.urdf.writer import to_urdf as write_urdf
@@ -222,8 +221,7 @@ def robot_of(
         for finding in findings:
             if finding.severity is Severity.WARNING and not (made and finding.code in _OF_A_TEXT):
                 warnings.warn(str(finding), UrdfWarning, stacklevel=4 if made else 3)
-    read = read_tree if text.entry is None else remembered_tree
-    tree = read(urdf, mimic=mimic, root_joint=root_joint)
+    tree = read_tree(urdf, mimic=mimic, root_joint=root_joint)
     if tilted := tilts(urdf):
         tree = with_tilts(tree, tilted)
     if text.entry is not None and text.entry.poses:

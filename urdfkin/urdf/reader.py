@@ -1,22 +1,23 @@
-"""What a URDF says to `KinematicTree`, through yourdfpy; the only module that imports it.
+"""What a URDF says to `KinematicTree`.
 
-yourdfpy is given the links and joints alone (`urdfkin.urdf.skeleton`): shapes, colours, odd encodings, loose
-ends that its parser would repair, and quaternions that it does not know never reach it. What the URDF
-specification says beyond it is done here: axes are normalised, chains of mimic joints are resolved, joints
-are put in Pinocchio's order. Meshes are never opened.
+The records were read once and strictly (`urdfkin.lint`). What the URDF specification says beyond them is done
+here: axes are normalised, chains of mimic joints are resolved, joints are put in Pinocchio's order. A robot
+that yourdfpy holds comes the same way.
 """
 
 from __future__ import annotations
 
-import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
+from urdfkin.kinematics.rotation.euler import rotation_from_rpy, rpy_of
+from urdfkin.kinematics.rotation.quaternion import rotation_of
+from urdfkin.model.pose import pose
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -27,12 +28,14 @@ from urdfkin.model.tree import (
     build_tree,
     with_root_joint,
 )
-from urdfkin.urdf.records import RobotRecord
-from urdfkin.urdf.skeleton import skeleton
+from urdfkin.urdf.element import Element
+from urdfkin.urdf.records import JointRecord, LimitRecord, MimicRecord, RobotRecord
 from urdfkin.urdf.writer import to_urdf
 
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
+
+_NOWHERE = Element("", {}, None, 0, 0, 0)
 
 
 def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
@@ -47,10 +50,8 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
         InputError: the joints make no tree, a mimic joint cannot follow, or `root_joint` is no such kind.
         UnknownNameError: a mimic joint names a leader that does not exist.
     """
-    robot = _parse(urdf)
-    rules = _rules(robot.joints) if mimic else {}
-    rows = [(_joint(joint, rules.get(joint.name)), joint.parent, joint.child) for joint in robot.joints]
-    tree = build_tree(robot.name, _root(robot), rows)
+    name = urdf.element.attributes.get("name", "")
+    tree = build_tree(name, _root(name, urdf.links, urdf.joints), _rows(urdf.joints, mimic=mimic))
     return tree if root_joint is None else with_root_joint(tree, _root_kind(root_joint))
 
 
@@ -65,37 +66,41 @@ def urdf_of(robot: yourdf.Robot) -> str:
         UnknownNameError: a mimic joint names a leader that does not exist.
     """
     try:
-        rules = _rules(robot.joints)
-        rows = [
-            (replace(_joint(joint, rules.get(joint.name)), axis=_written(joint)), joint.parent, joint.child)
-            for joint in robot.joints
-        ]
-        return to_urdf(build_tree(robot.name, _root(robot), rows))
+        records = [_record(joint) for joint in robot.joints]
+        axes = {record.name: np.array(record.axis) for record in records}
+        rows = [(replace(joint, axis=axes[joint.name]), *ends) for joint, *ends in _rows(records)]
+        return to_urdf(
+            build_tree(robot.name, _root(robot.name, [link.name for link in robot.links], records), rows)
+        )
     except UrdfkinError:
         raise
-    except (TypeError, ValueError, AttributeError) as error:
+    except (TypeError, ValueError, AttributeError, IndexError) as error:
         raise InputError("yourdfpy's robot cannot be written as a URDF", found=str(error)) from error
 
 
-def _written(joint: yourdf.Joint) -> FloatArray:
-    return np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.array(joint.axis, dtype=np.float64)
+def _record(joint: yourdf.Joint) -> JointRecord:
+    """A joint of yourdfpy's, as if it had been read."""
+    T = np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=np.float64)
+    axis = (1.0, 0.0, 0.0) if joint.axis is None else tuple(map(float, joint.axis))
+    limit, rule = joint.limit, joint.mimic
+    return JointRecord(
+        _NOWHERE, joint.name, joint.type, joint.parent, joint.child, tuple(T[:3, 3]), tuple(rpy_of(T[:3, :3])),
+        axis=axis,
+        limit=limit and LimitRecord(_NOWHERE, limit.lower, limit.upper, limit.effort, limit.velocity),
+        mimic=rule and MimicRecord(_NOWHERE, rule.joint, rule.multiplier, rule.offset),
+    )  # fmt: skip
 
 
-def _parse(urdf: RobotRecord) -> yourdf.Robot:
-    # Imported on first use: the meshing library under yourdfpy takes half a second.
-    from yourdfpy import URDF  # noqa: PLC0415
-
-    text = io.BytesIO(skeleton(urdf))
-    return URDF.load(text, build_scene_graph=False, load_meshes=False).robot
+def _rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
+    rules = _rules(joints) if mimic else {}
+    return [(_joint(one, rules.get(one.name)), str(one.parent), str(one.child)) for one in joints]
 
 
-def _root(robot: yourdf.Robot) -> str:
-    roots = {link.name for link in robot.links} - {joint.child for joint in robot.joints}
+def _root(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
+    roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
-        raise InputError(
-            "a robot has one root link", where=robot.name, found=", ".join(sorted(roots)) or "none"
-        )
-    return str(roots.pop())
+        raise InputError("a robot has one root link", where=name, found=", ".join(sorted(roots)) or "none")
+    return roots.pop()
 
 
 def _root_kind(word: str) -> JointKind:
@@ -104,17 +109,25 @@ def _root_kind(word: str) -> JointKind:
     return JointKind(word)
 
 
-def _joint(joint: yourdf.Joint, rule: Mimic | None) -> Joint:
-    kind = JointKind(joint.type)
+def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
+    kind = JointKind(joint.kind)
+    quaternion = joint.quaternion
+    R = rotation_from_rpy(joint.rpy if quaternion is None else rpy_of_quaternion(quaternion))
     return Joint(
         name=joint.name,
         kind=kind,
         parent=0,
-        T_parent_joint=np.eye(4) if joint.origin is None else joint.origin,
-        axis=_unit(joint.axis, joint.name) if kind.has_axis else np.array([1.0, 0.0, 0.0]),
+        T_parent_joint=pose(R, joint.xyz),
+        axis=_unit(np.array(joint.axis), joint.name) if kind.has_axis else np.array([1.0, 0.0, 0.0]),
         limit=_limit(joint.limit, kind),
         mimic=rule,
     )
+
+
+def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:
+    """Roll, pitch and yaw of a quaternion (x, y, z, w) of any length, as URDF 1.1 writes it."""
+    scaled = np.asarray(quaternion) / np.abs(quaternion).max()
+    return rpy_of(rotation_of(scaled / np.linalg.norm(scaled)))
 
 
 def _unit(axis: FloatArray, joint: str) -> FloatArray:
@@ -125,7 +138,7 @@ def _unit(axis: FloatArray, joint: str) -> FloatArray:
     return axis if length == 1.0 else axis / length
 
 
-def _limit(limit: Any, kind: JointKind) -> Limit | None:
+def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     if limit is None or kind.nv == 0:
         return None
     bounded = kind in (JointKind.REVOLUTE, JointKind.PRISMATIC)
@@ -138,7 +151,7 @@ def _limit(limit: Any, kind: JointKind) -> Limit | None:
     )
 
 
-def _rules(joints: Sequence[yourdf.Joint]) -> dict[str, Mimic]:
+def _rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Whom each follower follows in the end: along a chain multipliers multiply and offsets add up.
 
     A chain is resolved from the joint that moves outwards: so each joint is looked at once, and the doubles
@@ -150,16 +163,16 @@ def _rules(joints: Sequence[yourdf.Joint]) -> dict[str, Mimic]:
         joint, waiting = start, {}
         while _follows(joint) and joint.name not in resolved:
             waiting[joint.name] = rule = joint.mimic
-            if rule.joint not in named:
+            if rule.leader not in named:
                 raise UnknownNameError(
                     "mimic leader",
-                    rule.joint,
+                    rule.leader,
                     named,
                     where=f"joint {joint.name} (mimic=False, --no-mimic, lets it move freely)",
                 )
-            if rule.joint in waiting:
+            if rule.leader in waiting:
                 raise InputError("mimic joints follow each other in a circle", where=f"joint {start.name}")
-            joint = named[rule.joint]
+            joint = named[rule.leader]
         end = resolved.get(joint.name, Mimic(joint.name, 1.0, 0.0))
         for follower, rule in reversed(waiting.items()):
             offset = rule.multiplier * end.offset + rule.offset
@@ -167,5 +180,5 @@ def _rules(joints: Sequence[yourdf.Joint]) -> dict[str, Mimic]:
     return resolved
 
 
-def _follows(joint: yourdf.Joint) -> bool:
-    return joint.mimic is not None and JointKind(joint.type) is not JointKind.FIXED
+def _follows(joint: JointRecord) -> bool:
+    return joint.mimic is not None and JointKind(joint.kind) is not JointKind.FIXED
