@@ -19,15 +19,11 @@ import numpy as np
 import pytest
 
 from tests.cli.running import Done, process
-from tests.reading import records
 from urdfkin.compiled import compiling
 from urdfkin.compiled.compiling import NUMBERS, Kernel
 from urdfkin.system import keeping
 from urdfkin.system.keeping import CacheWarning, kept_folder
 from urdfkin.system.sealed import keep, kept
-from urdfkin.urdf import remembering
-from urdfkin.urdf.remembering import remembered_tree
-from urdfkin.urdf.sources import read_source
 
 
 @pytest.fixture(autouse=True)
@@ -38,7 +34,6 @@ def _nothing_said_yet(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(compiling, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr(remembering, "_folder", lambda: tmp_path)
     return tmp_path
 
 
@@ -110,19 +105,6 @@ def test_a_kernel_that_is_whole_but_of_another_time_is_compiled_again(folder: Pa
     assert not was_compiled(fresh())
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("damage", DAMAGE)
-def test_a_damaged_tree_is_said_read_again_and_mended(damage: str, folder: Path) -> None:
-    data = read_source("ur5").data
-    names = remembered_tree(records(data)).links
-    (file,) = folder.iterdir()
-    file.write_bytes(DAMAGE[damage](file.read_bytes()))
-    with pytest.warns(CacheWarning, match=f"{file.name} is damaged and is made anew"):
-        assert remembered_tree(records(data)).links == names
-    assert remembered_tree(records(data)).links == names  # and nothing is said
-    assert list(folder.iterdir()) == [file]
-
-
 # -- no room ---------------------------------------------------------------------------------------------
 
 
@@ -146,7 +128,6 @@ def test_where_nothing_can_be_written_everything_goes_on_and_it_is_said_once(
         warnings.simplefilter("always")
         assert ask(fresh()) == 7
         assert ask(fresh()) == 7
-        assert remembered_tree(records(read_source("ur5").data)).links
     (warning,) = said
     assert warning.category is CacheWarning
     assert f"nothing can be kept in {folder}: {os.strerror(no_room)}" in str(warning.message)
@@ -209,20 +190,18 @@ def limited(*words: str, **env: str) -> Done:
 
 @pytest.mark.slow
 def test_a_command_with_a_damaged_cache_says_so_in_a_line_and_mends_it(tmp_path: Path) -> None:
-    """What is damaged is a tree, which needs nothing compiled; of a kernel the same is said."""
+    def placement() -> Done:
+        return process("placement", "ur5", XDG_CACHE_HOME=str(tmp_path), NUMBA_CACHE_DIR="")
 
-    def info() -> Done:
-        return process("info", "ur5", XDG_CACHE_HOME=str(tmp_path), NUMBA_CACHE_DIR="")
-
-    info()
-    (tree,) = (path for path in tmp_path.glob("urdfkin/trees-*/[!.]*"))
-    tree.write_bytes(flipped(tree.read_bytes()))
-    done = info()
+    placement()
+    kernel = min(tmp_path.glob("urdfkin/kernels-*/[!.]*"))
+    kernel.write_bytes(flipped(kernel.read_bytes()))
+    done = placement()
     assert done.code == 0
     lines = [line for line in done.err.splitlines() if "damaged" in line]
     assert len(lines) == 1
     assert lines[0].startswith("urdfkin: warning: ")
-    assert info().err == ""
+    assert placement().err == ""
 
 
 # -- whose folder ------------------------------------------------------------------------------------------
@@ -297,20 +276,19 @@ def test_a_folder_of_another_user_is_refused(
     refused(root, "belongs to another user; set XDG_CACHE_HOME to a folder of your own")
 
 
-def test_a_planted_tree_of_another_user_is_not_unpickled(
+def test_a_planted_kernel_of_another_user_is_not_unpickled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if os.geteuid() != 0:
         pytest.skip("only the superuser can give a folder away")
-    monkeypatch.setattr(remembering, "_folder", lambda: kept_folder("trees", [], root=tmp_path))
-    data = read_source("ur5").data
-    remembered_tree(records(data))
+    monkeypatch.setattr(compiling, "cache_folder", lambda: kept_folder("kernels", [], root=tmp_path))
+    ask(fresh())
     (folder,) = tmp_path.iterdir()
     (file,) = (path for path in folder.iterdir() if path.name != ".used")
     keep(file, pickle.dumps(Planted()))
     os.chown(folder, 12345, 12345)
     with pytest.warns(CacheWarning, match="belongs to another user"):
-        assert remembered_tree(records(data)).links
+        assert ask(fresh()) == 7
     assert not Planted.ran
 
 

@@ -9,12 +9,10 @@ from typing import Any
 import pytest
 
 from urdfkin import compiled as recursion
-from urdfkin import kinematics, urdf
+from urdfkin import kinematics
 from urdfkin.compiled import compiling
-from urdfkin.model import tree
 from urdfkin.system import keeping
 from urdfkin.system.keeping import kept_folder
-from urdfkin.urdf import remembering
 
 
 @pytest.mark.parametrize("changed", [0, 1, 2])
@@ -31,9 +29,8 @@ def test_a_change_in_any_source_leads_to_another_folder(changed: int, tmp_path: 
     ("module", "ask", "needed"),
     [
         (compiling, compiling.cache_folder, [recursion, kinematics]),
-        (remembering, remembering._folder, [urdf, tree]),
     ],
-    ids=["kernels", "trees"],
+    ids=["kernels"],
 )
 def test_every_file_of_the_part_is_among_the_sources(
     module: Any, ask: Any, needed: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

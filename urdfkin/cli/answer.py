@@ -14,7 +14,7 @@ from urdfkin.cli.endings import form_of
 from urdfkin.cli.output import end_of_path, hand_out, output_option
 
 if TYPE_CHECKING:
-    from urdfkin.robot import Robot
+    pass
 
 
 @dataclass(frozen=True)

@@ -67,10 +67,10 @@ def command(robot: Robot, base: str | None, tip: str | None, q: str, seed: int, 
                     "backwards": joint.backwards,
                     "follows": joint.mimic.leader if joint.mimic else None,
                     "axis": z.tolist(),
-                    "origin": O.tolist(),
+                    "origin": origin.tolist(),
                     "interorigin": d.tolist(),
                 }
-                for joint, z, O, d in joints
+                for joint, z, origin, d in joints
             ],
             "placement": path.placement(own).tolist(),
             "verified": line is not None,

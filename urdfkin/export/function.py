@@ -17,6 +17,7 @@ import numpy as np
 from urdfkin.compiled.plan import Plan
 from urdfkin.export import walk
 from urdfkin.export.expression import Graph, Node, Number, needed
+from urdfkin.model.recursion import State
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
@@ -160,7 +161,7 @@ def function_of(plan: Plan, quantity: Quantity, reference: Reference) -> Functio
     return Function(quantity, reference, plan, tuple(x if isinstance(x, Node) else x + 0.0 for x in results))
 
 
-def _name(place: int, state: walk.State) -> None:
+def _name(place: int, state: State) -> None:
     """Call the numbers of a state by the text's letters."""
     named = {f"R{place + 1}_{r}{c}": x for r, row in enumerate(state.R) for c, x in enumerate(row)}
     for letter in ("p", "w", "vel", "alpha", "acc"):

@@ -14,10 +14,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from urdfkin.compiled.plan import Column as C
+from urdfkin.compiled.plan import Column as ColumnField
 from urdfkin.compiled.plan import Geometry, Motion, Plan
-from urdfkin.model.recursion import Column, Matrix, Number, Recursion, State, Vector
 from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.recursion import Column, Matrix, Number, Recursion, State, Vector
 from urdfkin.model.reference import Reference
 
 _Z: Vector = (0, 0, 1)
@@ -110,9 +110,11 @@ class Walk(Recursion):
         """The rates of the path."""
         found = []
         for row, factor in zip(self.plan.columns.tolist(), self.plan.multipliers.tolist(), strict=True):
-            s = self.states[row[C.STEP]]
-            z = self.eq.transposed(s.R)[row[C.AXIS]]
-            found.append(Column(z, bool(row[C.TURNS]), s, row[C.STEP], row[C.V], factor))
+            s = self.states[row[ColumnField.STEP]]
+            z = self.eq.transposed(s.R)[row[ColumnField.AXIS]]
+            found.append(
+                Column(z, bool(row[ColumnField.TURNS]), s, row[ColumnField.STEP], row[ColumnField.V], factor)
+            )
         return found
 
 

@@ -35,7 +35,7 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A rate: its axis, whether it turns, its joint's frame and place on the path, its place in v, its factor."""
+    """A joint velocity: its axis, its kind, its joint's frame, its index on the path and in v, its factor."""
 
     z: Vector
     turns: bool

@@ -68,7 +68,9 @@ def urdf_of(robot: yourdf.Robot) -> str:
     try:
         records = [_record(joint) for joint in robot.joints]
         axes = {record.name: np.array(record.axis) for record in records}
-        rows = [(replace(joint, axis=axes[joint.name]), *ends) for joint, *ends in _rows(records)]
+        rows = [
+            (replace(joint, axis=axes[joint.name]), parent, child) for joint, parent, child in _rows(records)
+        ]
         return to_urdf(
             build_tree(robot.name, _root(robot.name, [link.name for link in robot.links], records), rows)
         )
@@ -83,8 +85,9 @@ def _record(joint: yourdf.Joint) -> JointRecord:
     T = np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=np.float64)
     axis = (1.0, 0.0, 0.0) if joint.axis is None else tuple(map(float, joint.axis))
     limit, rule = joint.limit, joint.mimic
+    xyz, rpy = tuple(T[:3, 3]), tuple(rpy_of(T[:3, :3]))
     return JointRecord(
-        _NOWHERE, joint.name, joint.type, joint.parent, joint.child, tuple(T[:3, 3]), tuple(rpy_of(T[:3, :3])),
+        _NOWHERE, joint.name, joint.type, joint.parent, joint.child, xyz, rpy,
         axis=axis,
         limit=limit and LimitRecord(_NOWHERE, limit.lower, limit.upper, limit.effort, limit.velocity),
         mimic=rule and MimicRecord(_NOWHERE, rule.joint, rule.multiplier, rule.offset),
@@ -160,13 +163,13 @@ def _rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     named = {joint.name: joint for joint in joints}
     resolved: dict[str, Mimic] = {}
     for start in joints:
-        joint, waiting = start, {}
-        while _follows(joint) and joint.name not in resolved:
-            waiting[joint.name] = rule = joint.mimic
+        joint, waiting = start, dict[str, MimicRecord]()
+        while (rule := _rule(joint)) is not None and joint.name not in resolved:
+            waiting[joint.name] = rule
             if rule.leader not in named:
                 raise UnknownNameError(
                     "mimic leader",
-                    rule.leader,
+                    str(rule.leader),
                     named,
                     where=f"joint {joint.name} (mimic=False, --no-mimic, lets it move freely)",
                 )
@@ -180,5 +183,5 @@ def _rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     return resolved
 
 
-def _follows(joint: JointRecord) -> bool:
-    return joint.mimic is not None and JointKind(joint.kind) is not JointKind.FIXED
+def _rule(joint: JointRecord) -> MimicRecord | None:
+    return None if JointKind(joint.kind) is JointKind.FIXED else joint.mimic
