@@ -23,60 +23,86 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Command name -> (module that holds `command`, one-line summary), in the order of the help page, before and
-#: after the commands that compute a quantity.
-_BEFORE: dict[str, tuple[str, str]] = {
-    "robots": ("urdfkin.cli.robots", "robots that can be called by a short name"),
-    "info": ("urdfkin.cli.info", "joints, limits, frames and coordinates of a robot"),
+#: Heading of the help page -> command name -> (module that holds `command`, one-line summary). The rows of the table
+#: of quantities come first under `_COMPUTE`.
+_COMPUTE = "Compute"
+_GROUPS: dict[str, dict[str, tuple[str, str]]] = {
+    "Look at a robot": {
+        "robots": ("urdfkin.cli.robots", "List the robots that have a short name."),
+        "info": ("urdfkin.cli.info", "Show a robot's links, joints, limits, frames and coordinates."),
+        "view": ("urdfkin.cli.view", "Show a robot in a browser tab, with sliders and checked numbers."),
+        "plot": ("urdfkin.cli.plot", "Plot a frame's motion along a trajectory."),
+    },
+    _COMPUTE: {
+        "analytical-jacobian": (
+            "urdfkin.cli.analytical_jacobian",
+            "Compute the derivatives of a frame's position and orientation angles.",
+        ),
+        "manipulability": (
+            "urdfkin.cli.manipulability",
+            "Compute a Jacobian's singular values, condition number and manipulability.",
+        ),
+        "imu": ("urdfkin.cli.imu", "Compute the readings of an accelerometer and a gyroscope on a frame."),
+    },
+    "Tables and code": {
+        "dh": ("urdfkin.cli.dh", "Derive Denavit-Hartenberg tables, or compare one with a published table."),
+        "screws": ("urdfkin.cli.screws", "Derive the product of exponentials: zero pose and joint screws."),
+        "chain": ("urdfkin.cli.chain", "List the joint axes between two frames."),
+        "structure": ("urdfkin.cli.structure", "Classify an arm: wrist, parallel axes, closed-form solvers."),
+        "export": (
+            "urdfkin.cli.export",
+            "Export kinematics as code in C, Python, MATLAB and more, with a check.",
+        ),
+    },
+    "Compare and calibrate": {
+        "same": ("urdfkin.cli.same", "Prove that two models are the same robot, or bound their distance."),
+        "diff": ("urdfkin.cli.diff", "List the changes between two versions of a model and their effect."),
+        "calibrate": (
+            "urdfkin.cli.calibrate",
+            "Fit a robot's parameters to measured poses; write them to the URDF.",
+        ),
+    },
+    "Validate against Pinocchio": {
+        "validate": ("urdfkin.cli.validate", "Compare all frames and joints with Pinocchio on many samples."),
+        "campaign": ("urdfkin.cli.campaign", "Show the progress of a resumable validation; merge several."),
+        "report": ("urdfkin.cli.report", "Show or convert the report of an earlier validation."),
+        "compare": ("urdfkin.cli.compare", "Compare the reports of two validations."),
+    },
+    "Check files": {
+        "check": ("urdfkin.cli.check", "Lint URDF files; every finding has a code, a line and a remedy."),
+        "explain": ("urdfkin.cli.explain", "Explain a finding's code, an equation, or a common question."),
+    },
+    "Shell": {
+        "completion": ("urdfkin.cli.completion", "Print a completion script for bash, zsh or fish."),
+        "warm": ("urdfkin.cli.warm", "Compile everything now, for container images and CI."),
+    },
 }
-_AFTER: dict[str, tuple[str, str]] = {
-    "analytical-jacobian": (
-        "urdfkin.cli.analytical_jacobian",
-        "derivatives of a frame's position and orientation angles",
-    ),
-    "imu": ("urdfkin.cli.imu", "what an accelerometer and a gyroscope in a frame read"),
-    "manipulability": (
-        "urdfkin.cli.manipulability",
-        "singular values of a Jacobian between bounds; their product",
-    ),
-    "chain": ("urdfkin.cli.chain", "the joint axes between two frames: where they stand and how they point"),
-    "dh": ("urdfkin.cli.dh", "Denavit-Hartenberg tables, checked, compared, in many forms"),
-    "diff": ("urdfkin.cli.diff", "what changed between two versions of a description, and what that moves"),
-    "calibrate": ("urdfkin.cli.calibrate", "a robot's numbers from measured poses, in its own text"),
-    "same": ("urdfkin.cli.same", "whether two models are the same robot, proven"),
-    "export": ("urdfkin.cli.export", "kinematics as code in many languages, with its proof"),
-    "screws": ("urdfkin.cli.screws", "product of exponentials: home pose and screws, checked"),
-    "structure": ("urdfkin.cli.structure", "what kind of arm it is, and what can be solved in closed form"),
-    "validate": ("urdfkin.cli.validate", "compare everything with Pinocchio on many samples"),
-    "campaign": ("urdfkin.cli.campaign", "validations kept in a folder: how far they are, merged"),
-    "check": ("urdfkin.cli.check", "check URDFs like a linter: coded findings, each with its place"),
-    "explain": ("urdfkin.cli.explain", "what a finding's code means, an equation, or a question"),
-    "report": ("urdfkin.cli.report", "show or write the report of an earlier validation"),
-    "plot": ("urdfkin.cli.plot", "a frame's motion along a trajectory, as a picture"),
-    "view": ("urdfkin.cli.view", "a robot in a browser tab, with sliders and arrows"),
-    "completion": ("urdfkin.cli.completion", "makes bash, zsh or fish complete names as they are typed"),
-    "warm": ("urdfkin.cli.warm", "compile everything now: for container images and CI"),
-    "compare": ("urdfkin.cli.compare", "what changed between two validations"),
-}
-#: The module that makes a command of a row of the quantities' table; rows whose command has more to it.
+#: The module that makes a command of a row of the table, and the modules of rows that have their own.
 _QUANTITY, _OWN = "urdfkin.cli.quantity", {"placement": "urdfkin.cli.placement"}
+
+
+def groups() -> dict[str, dict[str, tuple[str, str]]]:
+    """Every command's module and summary, by heading of the help page."""
+    rows = {
+        name: (_OWN.get(name, _QUANTITY), f"Compute the {row.summary}.") for name, row in by_command().items()
+    }
+    return _GROUPS | {_COMPUTE: rows | _GROUPS[_COMPUTE]}
 
 
 def commands() -> dict[str, tuple[str, str]]:
     """Every command's module and summary."""
-    rows = by_command().items()
-    return _BEFORE | {name: (_OWN.get(name, _QUANTITY), row.summary) for name, row in rows} | _AFTER
+    return {name: entry for entries in groups().values() for name, entry in entries.items()}
 
 
 class LazyGroup(click.Group):
     """A group whose commands are imported when they are asked for."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names in the order of the table, which is the order of the work."""
+        """Names in the order of the help page."""
         return list(commands())
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import one command's file."""
+        """Import one command's module."""
         if (found := commands().get(cmd_name)) is None:
             return None
         module = importlib.import_module(found[0])
@@ -102,9 +128,11 @@ class LazyGroup(click.Group):
         return names + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The table of commands, from the summaries alone."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, summary) for name, (_, summary) in commands().items()])
+        """Write the commands with their summaries, grouped by task."""
+        width = max(map(len, commands()))
+        for heading, entries in groups().items():
+            with formatter.section(heading):
+                formatter.write_dl([(name.ljust(width), summary) for name, (_, summary) in entries.items()])
 
 
 def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
@@ -126,7 +154,11 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     help="Show the versions of urdfkin and Pinocchio and exit.",
 )  # fmt: skip
 def cli() -> None:
-    """Textbook kinematics from any URDF, every number checked against Pinocchio."""
+    """Textbook kinematics from any URDF, every number checked against Pinocchio.
+
+    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. `urdfkin COMMAND --help` shows
+    a command's options and examples.
+    """
 
 
 def main() -> None:

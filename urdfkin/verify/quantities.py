@@ -231,7 +231,7 @@ JACOBIAN = Quantity(
     factors=2,
     head="J",
     command="jacobian",
-    summary="velocity Jacobian of a frame",
+    summary="Jacobian of a frame",
     page="A row of the table for each rate: the velocity it alone causes.",
     example="urdfkin jacobian panda --q random --seed 1 --frame panda_hand",
 )
@@ -248,7 +248,7 @@ JACOBIAN_RATE = Quantity(
     factors=3,
     head="J-dot",
     command="jacobian-rate",
-    summary="rate of a frame's velocity Jacobian",
+    summary="time derivative of a frame's Jacobian",
     page="Its time derivative for rates --v: a row of the table for each rate. In local_world_aligned,"
     " J a + J' v is the acceleration that `urdfkin acceleration` gives; in local and world it is the spatial"
     " acceleration.",
@@ -268,7 +268,7 @@ HESSIAN = Quantity(
     validated=False,
     head="H",
     command="hessian",
-    summary="derivatives of a frame's velocity Jacobian by each rate",
+    summary="derivatives of a frame's Jacobian by each joint coordinate",
     page="For each column of the Jacobian, a row of the table for each rate: how fast that rate changes the"
     " column. Summed over the rates, each times its --v, that is `urdfkin jacobian-rate`.",
     example="urdfkin hessian panda --q random --seed 1 --frame panda_hand",
