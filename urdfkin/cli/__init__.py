@@ -23,8 +23,8 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Heading of the help page -> command name -> (module that holds `command`, one-line summary). The rows of the table
-#: of quantities come first under `_COMPUTE`.
+#: Heading of the help page -> command name -> (module that holds `command`, one-line summary). The rows of the
+#: table of quantities come first under `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -156,8 +156,8 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
 def cli() -> None:
     """Textbook kinematics from any URDF, every number checked against Pinocchio.
 
-    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. `urdfkin COMMAND --help` shows
-    a command's options and examples.
+    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. `urdfkin COMMAND --help`
+    shows a command's options and examples.
     """
 
 
