@@ -147,31 +147,22 @@ class _Judge:
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
         """The limits of a mimic joint must leave the mimicked joint its range."""
         rule, leader = self.resolved(mimic)
-        limits = _range_of(joint)
-        if leader is None or limits is None or rule.multiplier == 0.0:
+        limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
+        if leader is None or moving is None or limits is None or joint.kind == "continuous":
             return
-        moving = _range_of(leader)
-        if moving is None:
-            if leader.kind != "continuous":
-                return
-            lost = f"the mimic joint leaves its limits: {leader.name!r} has none"
-            remedy = f"give {leader.name!r} limits: type=\"revolute\""
-        else:
-            low, high = kept_range(rule, Limit(*limits, math.inf, math.inf), *moving)
-            if high - low >= (1.0 - LEAST_LOST) * (moving[1] - moving[0]):
-                return
-            held = f"from {range_words((low, high))} only" if low < high else "nowhere"
-            lost = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
-            lost += f"they hold {held}"
-            reached = sorted(rule.multiplier * end + rule.offset for end in moving)
-            remedy = f'write lower="{reached[0]:.6g}" upper="{reached[1]:.6g}", the range that the rule gives'
+        low, high = kept_range(rule, Limit(*limits, math.inf, math.inf), *moving)
+        if rule.multiplier == 0.0 or high - low >= (1.0 - LEAST_LOST) * (moving[1] - moving[0]):
+            return
+        held = f"from {range_words((low, high))} only" if low < high else "nowhere"
+        message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
+        ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
             MIMIC_RANGE,
-            lost,
+            f"{message}they hold {held}",
             limit.element,
             attribute="lower",
             found=f'lower="{limits[0]:g}" upper="{limits[1]:g}"',
-            remedy=remedy,
+            remedy=f'write lower="{ends[0]:.6g}" upper="{ends[1]:.6g}", the range that the rule gives',
             severity=None if self.obeyed else Severity.NOTE,
         )
 
@@ -189,11 +180,12 @@ class _Judge:
 
 
 def _range_of(joint: JointRecord) -> tuple[float, float] | None:
-    """The limits of a joint that has some, in order; None where there are none, or no numbers."""
-    limit = joint.limit
-    if limit is None or joint.kind not in ("revolute", "prismatic"):
+    """What a joint ranges over: its limits, or a turn; None where the limits are none."""
+    if joint.kind == "continuous":
+        return -math.pi, math.pi
+    if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
         return None
-    low, high = (0.0 if end is None else end for end in (limit.lower, limit.upper))
+    low, high = (0.0 if end is None else end for end in (joint.limit.lower, joint.limit.upper))
     return (low, high) if low < high else None
 
 
