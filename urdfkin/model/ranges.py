@@ -1,4 +1,4 @@
-"""Ranges of the coordinates: each joint's own limits, and what the limits of its mimic joints leave of them."""
+"""Ranges of the coordinates: each joint's own limits, and where its mimic joints keep theirs."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def _kept(joint: Joint) -> str:
         return ""
     if kept["lower"] is None or kept["upper"] is None:
         return (
-            f"{joint['name']}: nowhere do its mimic joints keep all their limits ({', '.join(kept['by'])})."
+            f"{joint['name']}: nowhere do its mimic joints keep their limits ({', '.join(kept['by'])})."
         )
     unit = "m" if joint["kind"] == "prismatic" else "rad"
     ends = f"{range_words((kept['lower'], kept['upper']))} {unit}"
