@@ -8,7 +8,7 @@ from urdfkin.errors.printable import markdown_text as text
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.words import counted
 from urdfkin.sameness.changes import Change, Changes, word
-from urdfkin.sameness.result import up_to
+from urdfkin.sameness.result import length, up_to
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,7 +21,7 @@ def headline(found: Changes) -> str:
     head = counted(len(found.changes), "change")
     if found.total is None:
         return f"{head}, nothing moves otherwise" if not any(c.moves for c in found.changes) else head
-    far = up_to(found.total.lower, found.total.upper)
+    far = up_to(length, found.total.lower, found.total.upper)
     return f"{head}; together they move {found.total.frame} by up to {far}"
 
 

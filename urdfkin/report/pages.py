@@ -100,9 +100,7 @@ def _kept(joint: Joint) -> str:
     if kept is None:
         return ""
     if kept["lower"] is None or kept["upper"] is None:
-        return (
-            f"{joint['name']}: nowhere do its mimic joints keep their limits ({', '.join(kept['by'])})."
-        )
+        return f"{joint['name']}: nowhere do its mimic joints keep their limits ({', '.join(kept['by'])})."
     unit = "m" if joint["kind"] == "prismatic" else "rad"
     ends = f"{range_words((kept['lower'], kept['upper']))} {unit}"
     return f"{joint['name']}: its mimic joints keep their limits from {ends} only ({', '.join(kept['by'])})."

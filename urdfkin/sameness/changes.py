@@ -13,7 +13,7 @@ from urdfkin.loading import load
 from urdfkin.model.tree import Joint, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.sameness.judging import same
-from urdfkin.sameness.result import Interval, angle, up_to
+from urdfkin.sameness.result import Interval, angle, length, up_to
 from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source
 from urdfkin.urdf.writer import to_urdf
@@ -78,7 +78,7 @@ class Effect:
         if frame.lower == 0.0:
             turned = f"{angle(frame.radians_seen)} (at most {angle(frame.radians)})"
             return f"turns {frame.frame} by up to {turned}"
-        return f"moves {frame.frame} by up to {up_to(frame.lower, frame.upper)}"
+        return f"moves {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
 
     def __str__(self) -> str:
         return f"alone {self.words}"
