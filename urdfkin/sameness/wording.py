@@ -59,9 +59,9 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
         beside = (frame.a, frame.b) in around
         if frame.differs and (beside or tables or _is_tool(found, frame)):
             found.frames[k] = frame.put_right()
-        tool = found.frames[k].tool
-        as_it_was = rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b]))
-        if tool is not IDENTITY and not (beside and as_it_was):  # that the base moves is said already
+            if beside and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b])):
+                continue  # seen from the root it is where it was: the line of the base says all
+        if (tool := found.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield "tools", f"frame {links[1][frame.b]} is A's {links[0][frame.a]} moved by {moved}"
 
