@@ -226,3 +226,15 @@ def test_what_is_renamed_is_held_to_what_is_asked_too() -> None:
     assert len(found.links) == 5
     assert not found.within(1e-4)
     assert found.within(1.001e-3)
+
+
+def test_diff_says_radians_where_nothing_is_moved() -> None:
+    from urdfkin.report.changes import headline as of  # noqa: PLC0415
+
+    a, b = arm(), arm(tool='<origin xyz="0 0 0.1" rpy="0 0 0.02"/>')
+    assert of(urdfkin.diff(a, b)) == "1 change; together they turn tcp by up to 20 mrad"
+
+
+def test_what_is_printed_of_it_is_in_standard_words() -> None:
+    found = urdfkin.same(arm(), arm(tool='<origin xyz="0 0 0.15"/>', shoulder="0 0 0.5"), bounds=False)
+    assert repr(found) == "<Sameness arm, arm: equivalent up to zeros, tools>"

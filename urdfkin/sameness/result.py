@@ -20,7 +20,7 @@ _TENTH, _NINE = 0.09995, 9.0
 
 
 class Verdict(Enum):
-    """How two models move."""
+    """How two models move: alike, alike up to what `Sameness.up_to` names, or not."""
 
     SAME = "same"
     SAME_AFTER = "same after"
@@ -160,14 +160,17 @@ class Sameness:
         return self.verdict is not Verdict.DIFFERS
 
     def __repr__(self) -> str:
-        return f"<Sameness {self.names[0]}, {self.names[1]}: {self.verdict.value}>"
+        after = self.verdict is Verdict.SAME_AFTER
+        how = f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
+        return f"<Sameness {self.names[0]}, {self.names[1]}: {how}>"
 
     @property
     def worst(self) -> Interval | None:
-        """The frame whose distance may be largest; None where none is further apart than rounding."""
+        """The frame whose distance may be largest, or its angle; None where none is off beyond rounding."""
+        metres, radians = self.rounding
         return max(
-            (frame for frame in self.frames if frame.lower > 0.0 or frame.upper > self.rounding[0]),
-            key=lambda frame: (frame.upper, frame.lower),
+            (one for one in self.frames if one.lower > 0.0 or one.upper > metres or one.radians > radians),
+            key=lambda one: (one.upper, one.lower, one.radians),
             default=None,
         )
 
