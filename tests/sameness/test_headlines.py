@@ -202,8 +202,13 @@ def test_the_page_follows_the_question_and_says_where_it_comes_from(tmp_path: Pa
     other = tmp_path / "c.urdf"
     other.write_text(arm(tool='<origin xyz="0 0 0.15"/>'))
     (tmp_path / "d.urdf").write_text(arm())
-    assert run("same", str(other), str(tmp_path / "d.urdf"), "--strict", "--html", page).code == 1
+    both = str(other), str(tmp_path / "d.urdf")
+    assert run("same", *both, "--strict", "--html", page).code == 1
     assert 'class="verdict bad"' in Path(page).read_text()
+    assert run("same", *both, "--within", "0.01", "--html", page).code == 1
+    text = Path(page).read_text()
+    assert "<h2>Where tcp is 50 mm off as written</h2>" in text
+    assert 'class="gap"' in text
 
 
 def test_a_table_is_held_to_the_frames_that_both_name() -> None:

@@ -29,6 +29,7 @@ from urdfkin.report.sameness import (
     where,
 )
 from urdfkin.robot import Robot
+from urdfkin.sameness.judging import base_as_written
 from urdfkin.sameness.result import Interval, Question, Sameness, length
 from urdfkin.validation.results import versions
 
@@ -60,7 +61,8 @@ def as_html(
     """
     moment = started or datetime.now(UTC)
     frames = far_frames(found)
-    worst = frames[0] if frames and frames[0].q_a else None
+    written = question.within is not None and found.as_written is not None
+    worst = found.as_written if written else frames[0] if frames and frames[0].q_a else None
     return (
         environment()
         .get_template("same.html.j2")
@@ -79,9 +81,10 @@ def as_html(
             as_written=as_written(found),
             renamed=renamed(found),
             where=where(found, worst) if worst else "",
-            pictures=pictures(found, robots, worst),
-            worst=worst,
-            off=attained(worst) if worst else "",
+            pictures=pictures(found, robots, worst, written=written),
+            title=f"Where {worst.frame} is {attained(worst)} off{' as written' if written else ''}"
+            if worst and attained(worst)
+            else "Both, at the zero configuration",
             style=as_is(asset("report.css")),
         )
     )
@@ -95,16 +98,28 @@ def _command(robots: tuple[Robot, Robot], question: Question, options: Sequence[
     return " ".join(["urdfkin same", *words, *map(shlex.quote, options)])
 
 
-def pictures(found: Sameness, robots: tuple[Robot, Robot], worst: Interval | None) -> list[dict[str, Any]]:
-    """Both robots' skeletons from two sides, and the frame close by: lines (x, y, x, y) for A and for B."""
+def pictures(
+    found: Sameness, robots: tuple[Robot, Robot], worst: Interval | None, *, written: bool = False
+) -> list[dict[str, Any]]:
+    """Both robots' skeletons from two sides, and the frame close by: lines (x, y, x, y) for A and for B.
+
+    Args:
+        found: What `same` found.
+        robots: A and B.
+        worst: The frame and the configurations; None: the zero configuration.
+        written: Whether B stands as it is written, not where it is equivalent to A.
+    """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
     q_b = np.array(worst.q_b) if worst else found.to_b(a.neutral())
     T_a = a.placement(q_a, a.link_frames, verify=False)
     T_b = b.placement(q_b, b.link_frames, verify=False)
-    i, j = a.tree.link_index(found.base_links[0]), b.tree.link_index(found.base_links[1])
-    moved = T_a[i] @ inverse(Mechanism(a.tree).homes[i])
-    T_b = moved @ found.base @ Mechanism(b.tree).homes[j] @ inverse(T_b[j]) @ T_b
+    ours, theirs = Mechanism(a.tree), Mechanism(b.tree)
+    if written:
+        T_b = T_a[0] @ base_as_written(ours, theirs) @ inverse(T_b[0]) @ T_b
+    else:
+        i, j = a.tree.link_index(found.base_links[0]), b.tree.link_index(found.base_links[1])
+        T_b = T_a[i] @ inverse(ours.homes[i]) @ found.base @ theirs.homes[j] @ inverse(T_b[j]) @ T_b
     bones = _bones(a, T_a), _bones(b, T_b)
     drawn = [_drawn(title, turn, tip, bones) for title, turn, tip in VIEWS]
     if worst is not None:

@@ -194,12 +194,8 @@ class Judge:
         table, whose other frames are its convention's, only links of one name count.
         """
         a, b = self.mechanisms
-        X = IDENTITY
-        if (root := a.tree.links[0]) in b.tree.links and not b.body_of[link := b.tree.link_index(root)]:
-            X = inverse(b.homes[link])
-        elif (root := b.tree.links[0]) in a.tree.links and not a.body_of[link := a.tree.link_index(root)]:
-            X = a.homes[link]
-        written = align(a, b, found.names, replace(AS_WRITTEN, X=X, orders=found.b.orders))
+        gauge = replace(AS_WRITTEN, X=base_as_written(a, b), orders=found.b.orders)
+        written = align(a, b, found.names, gauge)
         written.frames = written.frames_of(self._counted(found))
         return written
 
@@ -368,6 +364,15 @@ def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
         for i, joint in enumerate(tree.joints)
         if not joint.kind.nv and (joint.name in moving or tree.links[i + 1] in children)
     }
+
+
+def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
+    """(4, 4) B's root in A's root frame: on it, or so that links are one of which either is a root."""
+    if (root := a.tree.links[0]) in b.tree.links and not b.body_of[link := b.tree.link_index(root)]:
+        return inverse(b.homes[link])
+    if (root := b.tree.links[0]) in a.tree.links and not a.body_of[link := a.tree.link_index(root)]:
+        return a.homes[link]
+    return IDENTITY
 
 
 def digest(robot: Robot) -> str:
