@@ -243,3 +243,15 @@ def test_diff_says_radians_where_nothing_is_moved() -> None:
 def test_what_is_printed_of_it_is_in_standard_words() -> None:
     found = urdfkin.same(arm(), arm(tool='<origin xyz="0 0 0.15"/>', shoulder="0 0 0.5"), bounds=False)
     assert repr(found) == "<Sameness arm, arm: equivalent up to zeros, tools>"
+
+
+def test_a_link_that_moved_on_a_body_without_joints_is_a_difference() -> None:
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><joint name="ab" type="fixed">'
+        '<parent link="a"/><child link="b"/><origin xyz="{} 0 0"/></joint><joint name="bc" type="fixed">'
+        '<parent link="b"/><child link="c"/><origin xyz="{} 0 0"/></joint></robot>'
+    )
+    found = urdfkin.same(text.format(0, 1), text.format(0.5, 0.5))
+    assert found.verdict is Verdict.DIFFERS
+    assert found.worst is not None
+    assert found.worst.lower == pytest.approx(0.5)

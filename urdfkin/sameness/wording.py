@@ -88,7 +88,10 @@ def _around(found: Alignment) -> set[tuple[int, int]]:
 
 
 def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Links of the root's body that stand before all of it that carry moving joints; that carry none."""
+    """Links of the root's body before all of them that carry moving joints; those that carry none.
+
+    None of either where no joint moves: then there is nothing that could stand elsewhere.
+    """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
     children = [list[int]() for _ in tree.links]
@@ -97,7 +100,7 @@ def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
         carried[joint.parent] += 1 if moves else carried[i + 1]
         if not moves:
             children[joint.parent].append(i + 1)
-    body = mechanism.bodies[0]
+    body = mechanism.bodies[0] if carried[0] else []
     before = {link for link in body if any(carried[child] == carried[0] for child in children[link])}
     return before, {link for link in body if not carried[link]}
 
