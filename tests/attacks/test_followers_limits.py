@@ -62,9 +62,7 @@ def test_a_validation_covers_the_files_limits_where_a_mimic_joint_leaves_its_own
 
 def test_info_and_the_data_say_what_mimic_joints_leave_of_a_range() -> None:
     robot = gripper("prismatic", (-0.005, 0.055), (-1.0, 0.0, -0.005, 0.055))
-    said = (
-        "joint leader ranges over -0.005 to 0.055 m; its mimic joints keep their limits from -0.005 to "
-    )
+    said = "joint leader ranges over -0.005 to 0.055 m; its mimic joints keep their limits from -0.005 to "
     assert f"{said}0.005 only (f1)" in robot._sheet().text()
     kept = [joint["kept"] for joint in describe(robot)["joints"]]
     assert kept == [{"lower": pytest.approx(-0.005), "upper": pytest.approx(0.005), "by": ["f1"]}, None]
