@@ -34,6 +34,7 @@ REMARKS = {
     "URDF405": "A slash in a name is legal; urdfkin never uses names as paths.",
     "URDF508": "Limits were left out or set to zero, so samples within them leave the joint at rest.",
     "URDF510": "The value has no effect, and none is expected.",
+    "URDF527": "A mirrored finger has the limits of the one that it mimics; kinematics obeys the rule.",
     "URDF702": "No body has these moments of inertia; kinematics does not use them.",
     "URDF706": "The address of the mesh is wrong or points into another machine; kinematics needs no mesh.",
     "URDF708": "Only a colour is missing.",

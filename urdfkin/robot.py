@@ -279,7 +279,7 @@ class Robot(Shown):
     def limits(self) -> FloatArray:
         """(2, nq) lower and upper bounds of `q`, rad and m; infinite where a joint has none.
 
-        They are the joints' own; `limit_violations` asks the followers' too.
+        They are the joints' own; `limit_violations` checks those of mimic joints too.
         """
         return configuration.limits(self.tree)
 

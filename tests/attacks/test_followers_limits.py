@@ -1,18 +1,25 @@
-"""Samples are within limits, those of followers too, and where nothing cuts them they are what they were."""
+"""Samples keep all limits, of mimic joints too; a validation covers each joint's own limits."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import warnings
 
+import jsonschema
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
+from urdfkin.model.ranges import narrowed_ranges
+from urdfkin.report.document import asset
+from urdfkin.report.html import as_html
 from urdfkin.robot import Robot
+from urdfkin.validation.campaign import validate
+from urdfkin.validation.description import describe
 from urdfkin.verify.sampling import draw
 
 
@@ -38,12 +45,39 @@ def test_a_leader_stays_where_its_follower_keeps_its_limits(
 ) -> None:
     middle = 0.3 * multiplier + offset  # where the follower stands with its leader at 0.3
     robot = gripper(kind, (-1.0, 1.0), (multiplier, offset, middle - 0.2, middle + 0.9))
-    drawn = draw(robot.tree, 2000, np.random.default_rng(0), with_special=True).q
-    assert robot.limit_violations(drawn[1:]) == []  # the first is neutral, wherever that is
-    assert robot.limit_violations(robot.sample(2000)) == []
-    reached = np.ptp(drawn[1:])
+    drawn = robot.sample(2000)
+    assert robot.limit_violations(drawn) == []
+    reached = np.ptp(drawn)
     wanted = min(1.1 / abs(multiplier), 2.0)
     assert reached >= 0.4 * wanted, "the range that is left is used"
+
+
+def test_a_validation_covers_the_files_limits_where_a_mimic_joint_leaves_its_own() -> None:
+    robot = gripper("prismatic", (-0.005, 0.055), (-1.0, 0.0, -0.005, 0.055))
+    drawn = draw(robot.tree, 2000, np.random.default_rng(0), with_special=True).q
+    assert drawn[1:3].tolist() == [[-0.005], [0.055]]
+    assert np.ptp(drawn[3:]) > 0.059
+    assert np.ptp(robot.sample(2000)) <= 0.01
+
+
+def test_info_and_the_data_say_what_mimic_joints_leave_of_a_range() -> None:
+    robot = gripper("prismatic", (-0.005, 0.055), (-1.0, 0.0, -0.005, 0.055))
+    said = "joint leader ranges over -0.005 to 0.055 m; its mimic joints keep their limits from -0.005 to "
+    assert f"{said}0.005 only (f1)" in robot._sheet().text()
+    kept = [joint["kept"] for joint in describe(robot)["joints"]]
+    assert kept == [{"lower": pytest.approx(-0.005), "upper": pytest.approx(0.005), "by": ["f1"]}, None]
+    (none,) = narrowed_ranges(gripper("prismatic", (0.0, 1.0), (1.0, 0.0, 3.0, 4.0)).tree)
+    assert str(none).endswith("nowhere do its mimic joints keep all their limits (f1)")
+
+
+@pytest.mark.slow
+def test_the_report_shows_what_mimic_joints_leave_of_a_range() -> None:
+    robot = gripper("prismatic", (-0.005, 0.055), (-1.0, 0.0, -0.005, 0.055))
+    document = json.loads(json.dumps(validate([robot], samples=8).as_dict()))
+    jsonschema.validate(document, json.loads(asset("validation-1.schema.json")))
+    page = as_html(document)
+    assert "leader: its mimic joints keep their limits from -0.005 to 0.005 m only (f1)." in page
+    assert "URDF527" in page
 
 
 @pytest.mark.slow

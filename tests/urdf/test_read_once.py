@@ -7,7 +7,7 @@ import pytest
 import urdfkin
 from tests.lint.cases.arm import arm, axis
 
-FOLLOWS = arm(follow='<mimic joint="j1" multiplier="-2"/>')
+FOLLOWS = arm(follow='<mimic joint="j1" multiplier="-0.5"/>')
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ ARM = """<robot name="r">
 <joint name="b" type="prismatic"><parent link="l1"/><child link="l2"/><axis xyz="1 0 0"/>
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
 <joint name="c" type="prismatic"><parent link="l2"/><child link="l3"/><axis xyz="1 0 0"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="b" multiplier="-2"/></joint></robot>"""
+<limit lower="-2" upper="2" effort="1" velocity="1"/><mimic joint="b" multiplier="-2"/></joint></robot>"""
 P, W, VEL, ALPHA, ACC, JOINTS = 3.0, 5.0, 7.0, 11.0, 13.0, 4.0
 LOCAL, WORLD, ALIGNED = Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED
 

@@ -17,7 +17,7 @@ from urdfkin.errors.printable import json_text
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
-    from urdfkin.sameness.result import Sameness
+    from urdfkin.sameness.result import Question, Sameness
 
 EXAMPLE = "urdfkin same ur5 ur5_limited --certificate same.json"
 _PATH = click.Path(path_type=Path, dir_okay=False)
@@ -36,12 +36,12 @@ _PATH = click.Path(path_type=Path, dir_okay=False)
 @click.option(
     "--strict",
     is_flag=True,
-    help="Exit 1 too where they are the same only after something, or limits differ.",
+    help="Exit 1 too where they are equivalent only up to something, or limits differ.",
 )
 @click.option(
     "--within",
     type=NumberFrom(0.0),
-    help="Exit 0 too where no frame is ever off by more, metres and radians: by the proven bound.",
+    help="Exit 0 only if no frame is ever off by more, metres and radians, as both are written: proven.",
 )
 @click.option(
     "--boxes",
@@ -78,8 +78,8 @@ def command(
     joint's screw and every link's place at home agree, up to where the base stands, joints' zeros and senses,
     fixed links, names and order. Where they differ, the largest distance over all configurations within
     limits is enclosed: a configuration that attains it, and a proven bound.
-    Exit 0: the same, or after what is printed, or as near as --within asks. 1: they differ; with --strict
-    also where something has to be done. 2: bad input.
+    Exit 0: the same, or equivalent up to what is printed. 1: they differ; with --strict also where they are
+    equivalent only. With --within: 0 if no frame is ever off by more as written, else 1. 2: bad input.
     """
     from urdfkin.report.certificates import read_certificate, schema_text  # noqa: PLC0415  keeps --help fast
 
@@ -104,16 +104,28 @@ def command(
             context.exit(1 if against or document["verdict"] == "differs" else 0)
         from urdfkin.sameness.boxes import MOST  # noqa: PLC0415
         from urdfkin.sameness.judging import parse_map, same  # noqa: PLC0415
+        from urdfkin.sameness.result import Question  # noqa: PLC0415
 
-        found = same(*robots, map=parse_map(pairs), boxes=MOST if boxes is None else boxes)
-    _write(found, robots, format_, paths, all_=all_)
-    context.exit(found.exit_code(strict=strict, within=within))
+        how_many = MOST if boxes is None else boxes
+        found = same(*robots, map=parse_map(pairs), boxes=how_many, within=within)
+    question = Question(within, strict)
+    words = [word for pair in pairs for word in ("--map", pair)]
+    words += ["--boxes", str(boxes)] if boxes is not None else []
+    _write(found, robots, question, format_, paths, words, all_=all_)
+    context.exit(int(not found.holds(question)))
 
 
 def _write(
-    found: Sameness, robots: tuple[Robot, Robot], format_: str, paths: dict[str, Path | None], *, all_: bool
+    found: Sameness,
+    robots: tuple[Robot, Robot],
+    question: Question,
+    format_: str,
+    paths: dict[str, Path | None],
+    words: list[str],
+    *,
+    all_: bool,
 ) -> None:
-    """Every form that was asked for."""
+    """Every form that was asked for; `words` are the command's options besides the question."""
     from urdfkin.report.sameness import markdown_of, print_sameness  # noqa: PLC0415
     from urdfkin.sameness.certificate import certificate  # noqa: PLC0415
 
@@ -121,12 +133,12 @@ def _write(
     if (path := paths["certificate"]) is not None:
         write_file(path, data.encode())
     if (path := paths["markdown"]) is not None:
-        write_file(path, markdown_of(found).encode())
+        write_file(path, markdown_of(found, question).encode())
     if (path := paths["html"]) is not None:
         from urdfkin.report.sameness_html import as_html  # noqa: PLC0415
 
-        write_file(path, as_html(found, robots).encode())
+        write_file(path, as_html(found, robots, question, words).encode())
     if format_ == "json":
         say_file(data)
     else:
-        print_sameness(found, console(), all_=all_)
+        print_sameness(found, console(), question, all_=all_)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from urdfkin.errors.showing import Sheet, Table
+from urdfkin.model.ranges import narrowed_ranges
 from urdfkin.model.tree import KinematicTree
 
 #: What is said of a joint, in rad and rad/s, of prismatic joints in m and m/s.
@@ -36,6 +37,7 @@ def described(tree: KinematicTree, base: str, tip: str, order: str) -> Sheet:
         (
             f"root {tree.links[0]}, default base {base}, default tip {tip}",
             Table(("link", "joint", *columns), rows, left=WORDS),
+            *map(str, narrowed_ranges(tree)),
             f"frames: {len(tree.frame_names)}, every link and joint by its name; tips: {tips}",
             order,
         ),

@@ -1,8 +1,9 @@
-"""Between which values a coordinate keeps its joint, and the followers of it, within their limits."""
+"""Ranges of the coordinates: each joint's own limits, and where its mimic joints keep theirs."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,24 +14,84 @@ from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit, Mimic
 WIDEST = 10.0
 
 
+@dataclass(frozen=True, slots=True)
+class NarrowedRange:
+    """A joint whose mimic joints leave their limits before it reaches its own.
+
+    Attributes:
+        joint: Name of the joint that is mimicked.
+        own: Its own range.
+        kept: The part of it in which its mimic joints keep their limits; None where there is none.
+        by: Names of these mimic joints.
+        unit: Of the ranges, "rad" or "m".
+    """
+
+    joint: str
+    own: tuple[float, float]
+    kept: tuple[float, float] | None
+    by: tuple[str, ...]
+    unit: str
+
+    def __str__(self) -> str:
+        names = ", ".join(self.by)
+        own = f"joint {self.joint} ranges over {range_words(self.own)} {self.unit}"
+        if self.kept is None:
+            return f"{own}; nowhere do its mimic joints keep all their limits ({names})"
+        return f"{own}; its mimic joints keep their limits from {range_words(self.kept)} only ({names})"
+
+
+def range_words(ends: tuple[float, float]) -> str:
+    """Both ends of a range.
+
+    >>> range_words((-0.005, 0.055))
+    '-0.005 to 0.055'
+    """
+    return f"{ends[0]:.6g} to {ends[1]:.6g}"
+
+
+def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
+    """The range of each joint with one coordinate of its own: the file's limits of that joint alone."""
+    return {joint.name: _own_range(joint) for joint in tree.joints if joint.nq == 1}
+
+
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """For each joint with one coordinate of its own, the range that it is drawn from in samples."""
-    ranges = {joint.name: _own_range(joint) for joint in tree.joints if joint.nq == 1}
-    followers: dict[str, list[tuple[Mimic, Limit]]] = {}
+    """The same where mimic joints keep their limits too, if there is such a part of the range."""
+    ranges = own_ranges(tree)
+    narrowed = {one.joint: one.kept for one in narrowed_ranges(tree)}
+    return {name: narrowed.get(name) or own for name, own in ranges.items()}
+
+
+def narrowed_ranges(tree: KinematicTree) -> tuple[NarrowedRange, ...]:
+    """The ranges that limits of mimic joints narrow."""
+    followers: dict[str, list[Joint]] = {}
     for joint in tree.joints:
         if joint.mimic is not None and joint.limit is not None:
-            followers.setdefault(joint.mimic.leader, []).append((joint.mimic, joint.limit))
-    for leader, rules in followers.items():
-        lower, upper = ranges[leader]
-        for rule, limit in rules:
-            lower, upper = _kept(rule, limit, lower, upper)
-        if lower < upper:
-            ranges[leader] = lower, upper
-    return ranges
+            followers.setdefault(joint.mimic.leader, []).append(joint)
+    ranges = own_ranges(tree)
+    found = (
+        _narrowed(tree.joints[tree.joint_index(name)], ranges[name], joints)
+        for name, joints in followers.items()
+    )
+    return tuple(one for one in found if one is not None)
 
 
-def _kept(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
-    """The part of a leader's range in which a follower keeps its limits; empty if none does."""
+def _narrowed(leader: Joint, own: tuple[float, float], joints: list[Joint]) -> NarrowedRange | None:
+    lower, upper = own
+    by = list[str]()
+    for joint in joints:
+        assert joint.mimic is not None
+        assert joint.limit is not None
+        if kept_range(joint.mimic, joint.limit, *own) != own:
+            by.append(joint.name)
+        lower, upper = kept_range(joint.mimic, joint.limit, lower, upper)
+    if not by:
+        return None
+    kept = (lower, upper) if lower < upper else None
+    return NarrowedRange(leader.name, own, kept, tuple(by), "rad" if leader.kind.turns else "m")
+
+
+def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
+    """The part of a joint's range in which its mimic joint keeps its limits; empty if there is none."""
 
     def keeps(leader: float) -> bool:
         # As `configuration.limit_violations` counts: a bound printed in decimal is rounded.

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 from urdfkin.errors.printable import markdown_text as text
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.words import counted
-from urdfkin.sameness.changes import Change, Changes, word
-from urdfkin.sameness.result import up_to
+from urdfkin.sameness.changes import Change, Changes, motion_words, word
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,8 +20,7 @@ def headline(found: Changes) -> str:
     head = counted(len(found.changes), "change")
     if found.total is None:
         return f"{head}, nothing moves otherwise" if not any(c.moves for c in found.changes) else head
-    far = up_to(found.total.lower, found.total.upper)
-    return f"{head}; together they move {found.total.frame} by up to {far}"
+    return f"{head}; together they {motion_words(found.total)}"
 
 
 def _by_element(found: Changes) -> dict[str, list[Change]]:

@@ -31,6 +31,14 @@ class Mimic(TypedDict):
     offset: float
 
 
+class Kept(TypedDict):
+    """The part of a joint's range in which its mimic joints keep their limits; None where there is none."""
+
+    lower: float | None
+    upper: float | None
+    by: list[str]
+
+
 class Joint(TypedDict):
     """A joint, fixed ones too."""
 
@@ -44,6 +52,7 @@ class Joint(TypedDict):
     v: int | None
     limit: Limit | None
     mimic: Mimic | None
+    kept: NotRequired[Kept | None]
 
 
 class Model(TypedDict):

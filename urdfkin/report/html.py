@@ -133,7 +133,7 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
             document=document,
             outcome=outcome_of(document),
             summary=summary(document),
-            when=_when(document["started"]),
+            when=when(document["started"]),
             pinocchio=pinocchio(document),
             totals=_totals(document),
             verdicts=verdict_counts(document),
@@ -218,7 +218,7 @@ def _plot(robot: Robot, index: int, document: Document) -> str:
     return distributions(robot, document["histogram_edges"], f"p{index}-")
 
 
-def _when(started: str) -> str:
+def when(started: str) -> str:
     """The moment in words; as it stands if it is no ISO date."""
     try:
         moment = datetime.fromisoformat(started)

@@ -9,6 +9,7 @@ from typing import Any
 
 from urdfkin.dh.units import Units as DisplayUnits
 from urdfkin.model.described import axis_words
+from urdfkin.model.ranges import range_words
 from urdfkin.report.document import Chain, Check, Joint, Judgement, Limit, Model, Robot, Row, Units
 from urdfkin.report.words import (
     SIDES,
@@ -87,9 +88,22 @@ def joint_rows(model: Model) -> list[dict[str, Any]]:
             "q": _coordinate(joint),
             "axis": axis_words(joint["axis"]) if joint["axis"] else "",
             **_limits(joint["limit"], joint["kind"]),
+            "kept": _kept(joint),
         }
         for joint in model["joints"]
     ]
+
+
+def _kept(joint: Joint) -> str:
+    """What limits of mimic joints leave of a joint's range; empty where they leave all of it."""
+    kept = joint.get("kept")
+    if kept is None:
+        return ""
+    if kept["lower"] is None or kept["upper"] is None:
+        return f"{joint['name']}: nowhere do its mimic joints keep their limits ({', '.join(kept['by'])})."
+    unit = "m" if joint["kind"] == "prismatic" else "rad"
+    ends = f"{range_words((kept['lower'], kept['upper']))} {unit}"
+    return f"{joint['name']}: its mimic joints keep their limits from {ends} only ({', '.join(kept['by'])})."
 
 
 def _coordinate(joint: Joint) -> str:

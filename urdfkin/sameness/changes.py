@@ -13,7 +13,7 @@ from urdfkin.loading import load
 from urdfkin.model.tree import Joint, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.sameness.judging import same
-from urdfkin.sameness.result import Interval, angle, up_to
+from urdfkin.sameness.result import Interval, angle, length, up_to
 from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source
 from urdfkin.urdf.writer import to_urdf
@@ -64,6 +64,13 @@ def word(value: Value | None) -> str:
     return "none" if value is None else value
 
 
+def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
+    """How far changes move a frame; where they do not, how far they turn it."""
+    if frame.lower == 0.0:
+        return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
+    return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
+
+
 @dataclass(frozen=True, slots=True)
 class Effect:
     """The frame that one joint's changes alone move most, and the interval of its distance."""
@@ -74,11 +81,7 @@ class Effect:
     @property
     def words(self) -> str:
         """What they do."""
-        frame = self.interval
-        if frame.lower == 0.0:
-            turned = f"{angle(frame.radians_seen)} (at most {angle(frame.radians)})"
-            return f"turns {frame.frame} by up to {turned}"
-        return f"moves {frame.frame} by up to {up_to(frame.lower, frame.upper)}"
+        return motion_words(self.interval, "moves", "turns")
 
     def __str__(self) -> str:
         return f"alone {self.words}"

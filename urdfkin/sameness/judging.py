@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -12,21 +12,22 @@ import numpy as np
 
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.errors.demands import whole_number
+from urdfkin.errors.demands import real_number, whole_number
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.loading import load
 from urdfkin.model.mechanisms.aligning import align
-from urdfkin.model.mechanisms.alignment import AS_WRITTEN, Alignment, FramePair
+from urdfkin.model.mechanisms.alignment import AS_WRITTEN, IDENTITY, Alignment, FramePair
 from urdfkin.model.mechanisms.mechanism import Mechanism, Tolerance, tolerance_of
 from urdfkin.model.mechanisms.rigid import apart
 from urdfkin.model.mechanisms.upper import FINE, upper_bounds
 from urdfkin.model.mechanisms.variables import Variables, variables_of
-from urdfkin.model.ranges import WIDEST
+from urdfkin.model.pose import inverse
+from urdfkin.model.ranges import WIDEST, narrowed_ranges
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.sameness.boxes import MOST, tightened
 from urdfkin.sameness.lower import Search, pinocchios
-from urdfkin.sameness.result import Interval, JointMap, Sameness, Verdict, demand_joint_names
+from urdfkin.sameness.result import FREE, Interval, JointMap, Sameness, Verdict, demand_joint_names
 from urdfkin.sameness.wording import differences, put_right, remarks
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.choosing import checked_choice
@@ -47,6 +48,7 @@ def same(
     map: Mapping[str, str] | None = None,
     bounds: bool = True,
     boxes: int = MOST,
+    within: float | None = None,
 ) -> Sameness:
     """Whether two models move alike in every configuration, proven.
 
@@ -62,6 +64,7 @@ def same(
         bounds: Whether the largest distances are bounded, which takes longest where models differ.
         boxes: How many boxes of configurations may be looked at at a time, for sharper bounds where many
             things differ; 0: none.
+        within: Metres and radians that `Sameness.within` will be asked for: `boxes` are then spent on it.
 
     Returns:
         The verdict with the map that it found, the first difference, and for every frame an interval in
@@ -82,10 +85,12 @@ def same(
     robots = _robot(a), _robot(b)
     given = _demand_map(map)
     whole_number(boxes, "boxes", 0)
+    if within is not None:
+        within = real_number(within, "within")
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
     # Copies, whose accounts are their own: what is computed here nobody was handed.
-    return Judge((copy(robots[0]), copy(robots[1])), given, bounds, boxes).judged()
+    return Judge((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
 
 
 def _demand_map(given: Mapping[str, str] | None) -> dict[str, str]:
@@ -107,9 +112,15 @@ class Judge:
     """Two robots on their way to a verdict."""
 
     def __init__(
-        self, robots: tuple[Robot, Robot], given: dict[str, str], bounds: bool, boxes: int = MOST
+        self,
+        robots: tuple[Robot, Robot],
+        given: dict[str, str],
+        bounds: bool,
+        boxes: int = MOST,
+        within: float | None = None,
     ) -> None:
         self.robots, self.given, self.bounds, self.boxes = robots, given, bounds, boxes
+        self.asked = within
         trees = robots[0].tree, robots[1].tree
         parting = _fixed_here(trees[0], trees[1]), _fixed_here(trees[1], trees[0])
         self.mechanisms = Mechanism(trees[0], parting[0]), Mechanism(trees[1], parting[1])
@@ -123,12 +134,18 @@ class Judge:
         variables = variables_of(found, self.tolerance)
         said = self.said(found, variables)
         frames = self._intervals(found, variables)
-        as_written = None
+        as_written, most = None, said.written
+        if self.bounds:
+            most = _largest([(frame.upper, frame.radians) for frame in frames])
         if said.after and self.bounds:
             written = self.as_written(found)
-            as_written = self._farthest(written, variables_of(written, self.tolerance))
+            moving = variables_of(written, self.tolerance)
+            as_written = self._farthest(written, moving)
+            most = self._most(written, moving, as_written)
+            if len(written.frames) < len(self._counted(found)):
+                most = (math.inf, math.inf)
         checked = self._confirmed(found, variables, frames)
-        return replace(said, frames=frames, as_written=as_written, checked=checked)
+        return replace(said, frames=frames, as_written=as_written, written=most, checked=checked)
 
     def said(self, found: Alignment, variables: Variables) -> Sameness:
         """What follows from how the models are laid on each other; intervals and Pinocchio do not.
@@ -139,13 +156,15 @@ class Judge:
         links = self.trees[0].links, self.trees[1].links
         tables = any(robot.origin.table for robot in self.robots)
         after = put_right(found, self.tolerance, tables=tables)
+        free = {what for what, _ in after}
         wrong = differences(found, variables)
         return Sameness(
             names=(self.robots[0].name, self.robots[1].name),
             sources=(self.robots[0].source, self.robots[1].source),
             digests=(digest(self.robots[0]), digest(self.robots[1])),
             verdict=Verdict.DIFFERS if wrong else Verdict.SAME_AFTER if after else Verdict.SAME,
-            after=after,
+            after=tuple(dict.fromkeys(words for _, words in after)),
+            up_to=tuple(what for what in FREE if what in free),
             differences=wrong,
             remarks=remarks(found, variables, self.tolerance),
             joints=tuple(
@@ -158,14 +177,34 @@ class Judge:
             rounding=self.rounding(found, variables),
             frames=(),
             as_written=None,
+            written=(math.inf, math.inf),
+            narrowed=tuple(
+                f"{which}: {one}"
+                for which, tree in zip("AB", self.trees, strict=True)
+                for one in narrowed_ranges(tree)
+            ),
             checked="",
             trees=self.trees,
         )
 
     def as_written(self, found: Alignment) -> Alignment:
-        """The same joints and links laid on each other with nothing put right."""
-        written = replace(AS_WRITTEN, orders=found.b.orders)
-        return align(*self.mechanisms, found.names, written)
+        """The same joints and links laid on each other with nothing put right: root on root.
+
+        Where only one model has the other's root, the two links of that name are laid on each other. Of a
+        table, whose other frames are its convention's, only links of one name count.
+        """
+        a, b = self.mechanisms
+        gauge = replace(AS_WRITTEN, X=base_as_written(a, b), orders=found.b.orders)
+        written = align(a, b, found.names, gauge)
+        written.frames = written.frames_of(self._counted(found))
+        return written
+
+    def _counted(self, found: Alignment) -> list[tuple[int, int]]:
+        """The links of both that count as written."""
+        tables = any(robot.origin.table for robot in self.robots)
+        links = self.trees[0].links, self.trees[1].links
+        pairs = ((frame.a, frame.b) for frame in found.frames)
+        return [(a, b) for a, b in pairs if not tables or links[0][a] == links[1][b]]
 
     def _demand_the_map(self, found: Alignment) -> None:
         """Raise InputError for a pair that was given and cannot be."""
@@ -204,27 +243,51 @@ class Judge:
         metres, radians = self.rounding(found, variables)
         if not self.bounds:
             return ()
+        uppers = self._uppers(found, variables)
+        off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
+        search = self.search(found, variables)
+        seen = dict(zip(off, search.worst([frames[k] for k in off]), strict=True)) if off else {}
+        self._sharpen(uppers, frames, search, NEAR * max((way for way, _ in seen.values()), default=0.0))
+        return tuple(
+            self._interval(found, frame, search, seen.get(k), (uppers[k][0] + metres, uppers[k][1] + radians))
+            for k, frame in enumerate(frames)
+        )
+
+    def _most(
+        self, written: Alignment, variables: Variables, farthest: Interval | None
+    ) -> tuple[float, float]:
+        """(m, rad) that any frame is off at most; sharper only if that is needed for what was asked."""
+        metres, radians = self.rounding(written, variables)
+        uppers = self._uppers(written, variables)
+        target = 0.0 if self.asked is None else self.asked - metres
+        if farthest is not None and farthest.lower <= target:
+            self._sharpen(uppers, written.frames, self.search(written, variables), target)
+        most = _largest(uppers)
+        return most[0] + metres, most[1] + radians
+
+    def _uppers(self, found: Alignment, variables: Variables) -> list[tuple[float, float]]:
+        """(m, rad) that each frame is off at most, more closely where it is most."""
+        frames = found.frames
         uppers = [upper_bounds(found, variables, frame) for frame in frames]
         off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
         fine = set[int]()
         while len(fine) < FARTHEST and off and (widest := max(off, key=lambda k: uppers[k])) not in fine:
             uppers[widest] = upper_bounds(found, variables, frames[widest], FINE)
             fine.add(widest)
-        search = self.search(found, variables)
-        seen = dict(zip(off, search.worst([frames[k] for k in off]), strict=True)) if off else {}
-        target = NEAR * max((way for way, _ in seen.values()), default=0.0)
-        for _ in off:  # whichever is widest now
-            widest = max(off, key=lambda k: uppers[k])
+        return uppers
+
+    def _sharpen(
+        self, uppers: list[tuple[float, float]], frames: Sequence[FramePair], search: Search, target: float
+    ) -> None:
+        """Prove that no frame is off by more than a target (m), the widest first, as far as boxes go."""
+        for _ in uppers:
+            widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
                 break
             sharper = tightened(search, frames[widest], target, uppers[widest][0], self.boxes)
             uppers[widest] = sharper, uppers[widest][1]
             if sharper > target:
                 break
-        return tuple(
-            self._interval(found, frame, search, seen.get(k), (uppers[k][0] + metres, uppers[k][1] + radians))
-            for k, frame in enumerate(frames)
-        )
 
     def _farthest(self, found: Alignment, variables: Variables) -> Interval | None:
         """The interval of the frame that a search finds farthest."""
@@ -253,10 +316,13 @@ class Judge:
         if seen is None:
             return Interval(*names, 0.0, *upper, 0.0, (), ())
         metres, z = seen
+        rounding = self.rounding(found, search.variables)
+        if metres <= rounding[0] and upper[1] > rounding[1]:
+            z = search.most_turned(frame)
         poses = search.poses(z[np.newaxis], [frame])
         turned = apart(poses[0][0, 0], poses[1][0, 0])[0]
         q_a, q_b = search.configurations(z[np.newaxis])
-        lower = max(0.0, metres - self.rounding(found, search.variables)[0])
+        lower = max(0.0, metres - rounding[0])
         return Interval(*names, lower, *upper, turned, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
 
     def _confirmed(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> str:
@@ -281,6 +347,11 @@ class Judge:
         return f"Pinocchio {version()} finds at most {seen} at {CONFIRMED} configurations, within the bounds"
 
 
+def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """The largest of metres and of radians."""
+    return max((way for way, _ in bounds), default=0.0), max((turn for _, turn in bounds), default=0.0)
+
+
 def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
     """Fixed joints of a tree whose namesakes, or whose child link's joints, move in the other."""
     moving = {joint.name for joint in other.joints if joint.kind.nv}
@@ -293,6 +364,15 @@ def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
         for i, joint in enumerate(tree.joints)
         if not joint.kind.nv and (joint.name in moving or tree.links[i + 1] in children)
     }
+
+
+def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
+    """(4, 4) B's root in A's root frame: on it, or so that links are one of which either is a root."""
+    if (root := a.tree.links[0]) in b.tree.links and not b.body_of[link := b.tree.link_index(root)]:
+        return inverse(b.homes[link])
+    if (root := b.tree.links[0]) in a.tree.links and not a.body_of[link := a.tree.link_index(root)]:
+        return a.homes[link]
+    return IDENTITY
 
 
 def digest(robot: Robot) -> str:

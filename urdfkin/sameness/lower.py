@@ -15,6 +15,7 @@ import numpy as np
 from urdfkin.kinematics.roundings import EPS, FOLLOWER
 from urdfkin.model.configuration import neutral
 from urdfkin.model.mechanisms.alignment import Alignment, FramePair
+from urdfkin.model.mechanisms.rigid import apart
 from urdfkin.model.mechanisms.variables import Line, Variables
 from urdfkin.model.pose import inverse
 from urdfkin.model.ranges import WIDEST
@@ -161,6 +162,13 @@ class Search:
             found += self._climbed(some, z[np.argsort(-off, axis=0)[:STARTS].T])
         return found
 
+    def most_turned(self, frame: FramePair) -> FloatArray:
+        """(variables,) of random values and corners of the ranges those at which a frame is turned most."""
+        z = self.seen([frame])[1]
+        Ts_a, Ts_b = self.poses(z, [frame])
+        turned = [apart(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
+        return np.asarray(z[int(np.argmax(turned))])
+
     def _climbed(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
         """The best that going along one coordinate after the other leads to.
 
@@ -213,6 +221,10 @@ class Search:
             for line in (pair.a, pair.b)
             if line.slope
         }
+        trees = self.robots[0].tree, self.robots[1].tree
+        for step in (self.found.steps[i] for i in steps):
+            if step.unlike == "kind":
+                names |= {f"a:{trees[0].joints[step.a].name}", f"b:{trees[1].joints[step.b].name}"}
         return [i for i, name in enumerate(self.names) if name in names]
 
 

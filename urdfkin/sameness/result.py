@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -19,11 +20,31 @@ _TENTH, _NINE = 0.09995, 9.0
 
 
 class Verdict(Enum):
-    """How two models move."""
+    """How two models move: alike, alike up to what `Sameness.up_to` names, or not."""
 
     SAME = "same"
     SAME_AFTER = "same after"
     DIFFERS = "differs"
+
+
+#: What B may differ in from A and still be equivalent, in the order in which it is named.
+FREE = ("base", "zeros", "senses", "free joints", "tools")
+#: What a difference may be of if each frame that both have is still bounded.
+BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What is asked of two models.
+
+    Attributes:
+        within: Metres and radians by which frames may be off as written; None: whether the models are
+            equivalent.
+        strict: Whether being equivalent only, and remarks, count as differences.
+    """
+
+    within: float | None = None
+    strict: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +115,7 @@ class Sameness:
         digests: SHA-256 of the two texts.
         verdict: `Verdict.SAME`, `SAME_AFTER` what `after` says, or `DIFFERS`.
         after: What has to be done for them to agree, a line each; also where they differ even then.
+        up_to: Of what these are, in standard words: "base", "zeros", "senses", "free joints", "tools".
         differences: Where they do differ, from the base outwards; the first is the first place.
         remarks: What is no matter of where things move: limits, kinds, links that only one has.
         joints: Joints of A and of B that are each other's.
@@ -104,7 +126,11 @@ class Sameness:
         rounding: (m, rad) that frames may lie apart where nothing is said to differ.
         frames: Of each link that both have, after what `after` says.
         as_written: The same without it: of the frame that is then farthest; None where nothing has to be
-        done.
+            done.
+        written: (m, rad) by which any frame of both is off at most as written, proven; infinite where
+            there is no bound. Of a table, frames that it names as the robot does.
+        narrowed: Joints whose mimic joints leave their limits, a line each; intervals cover all of a joint's
+            own range.
         checked: What Pinocchio confirmed, or why it did not.
     """
 
@@ -113,6 +139,7 @@ class Sameness:
     digests: tuple[str, str]
     verdict: Verdict
     after: tuple[str, ...]
+    up_to: tuple[str, ...]
     differences: tuple[Difference, ...]
     remarks: tuple[Difference, ...]
     joints: tuple[JointMap, ...]
@@ -123,6 +150,8 @@ class Sameness:
     rounding: tuple[float, float]
     frames: tuple[Interval, ...]
     as_written: Interval | None
+    written: tuple[float, float]
+    narrowed: tuple[str, ...]
     checked: str
     trees: tuple[KinematicTree, KinematicTree]
 
@@ -131,14 +160,17 @@ class Sameness:
         return self.verdict is not Verdict.DIFFERS
 
     def __repr__(self) -> str:
-        return f"<Sameness {self.names[0]}, {self.names[1]}: {self.verdict.value}>"
+        after = self.verdict is Verdict.SAME_AFTER
+        how = f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
+        return f"<Sameness {self.names[0]}, {self.names[1]}: {how}>"
 
     @property
     def worst(self) -> Interval | None:
-        """The frame whose distance may be largest; None where none is further apart than rounding."""
+        """The frame whose distance may be largest, or its angle; None where none is off beyond rounding."""
+        metres, radians = self.rounding
         return max(
-            (frame for frame in self.frames if frame.lower > 0.0 or frame.upper > self.rounding[0]),
-            key=lambda frame: (frame.upper, frame.lower),
+            (one for one in self.frames if one.lower > 0.0 or one.upper > metres or one.radians > radians),
+            key=lambda one: (one.upper, one.lower, one.radians),
             default=None,
         )
 
@@ -148,23 +180,27 @@ class Sameness:
         return self.as_written or self.worst
 
     def within(self, most: float) -> bool:
-        """Whether every link of either is one of both, and none is ever off by more, m and rad: proven.
+        """Whether no frame of both is ever off by more (m and rad) as both models are written: proven.
 
-        It is for models whose files keep fewer digits than a double, which do differ, and do not matter.
+        Roots are laid on each other, and equal coordinates are compared: a base, a zero or a tool that is
+        elsewhere counts. Models with joints of another kind, or that only one has, are never within.
         """
-        moved = {one.what for one in self.differences} - {"axis", "place", "frame", "mimic rule", "fixed"}
-        return not moved and all(max(frame.upper, frame.radians) <= most for frame in self.frames)
+        return {one.what for one in self.differences} <= BOUNDED and max(self.written) <= most
+
+    def holds(self, question: Question) -> bool:
+        """Whether the answer to a question is yes."""
+        if not (bool(self) if question.within is None else self.within(question.within)):
+            return False
+        return not (question.strict and (self.verdict is Verdict.SAME_AFTER or self.remarks))
 
     def exit_code(self, *, strict: bool = False, within: float | None = None) -> int:
-        """0: the same, or after what is said, unless that is not wanted either; 1: they differ.
+        """0: equivalent, or within what is asked; 1: not.
 
         Args:
-            strict: Whether what has to be done, and remarks, count as differences.
-            within: Metres and radians by which they may differ, proven.
+            strict: Whether being equivalent only, and remarks, count as differences.
+            within: Metres and radians by which frames may be off as written, proven.
         """
-        if self.verdict is Verdict.DIFFERS and not (within is not None and self.within(within)):
-            return 1
-        return int(strict and (self.verdict is Verdict.SAME_AFTER or bool(self.remarks)))
+        return int(not self.holds(Question(within, strict)))
 
     def to_b(self, q: ArrayLike) -> FloatArray:
         """(..., nq) of B for A's configurations (..., nq): there both stand alike, but for `base`.
@@ -209,13 +245,13 @@ def length(metres: float) -> str:
     return _with_prefix(metres, "m")
 
 
-def up_to(lower: float, upper: float) -> str:
-    """An interval of lengths: what is attained, and what is proven where that reads otherwise.
+def up_to(words: Callable[[float], str], lower: float, upper: float) -> str:
+    """An interval of lengths or angles: what is attained, and what is proven where that reads otherwise.
 
-    >>> up_to(0.025, 0.025), up_to(0.4297, 0.4327), up_to(1.0, math.inf)
-    ('25 mm', '429.7 mm (at most 432.7 mm)', '1 m (without bound)')
+    >>> up_to(length, 0.025, 0.025), up_to(angle, 0.4297, 0.4327), up_to(length, 1.0, math.inf)
+    ('25 mm', '429.7 mrad (at most 432.7 mrad)', '1 m (without bound)')
     """
-    attained, most = length(lower), length(upper)
+    attained, most = words(lower), words(upper)
     if attained == most:
         return attained
     return f"{attained} ({most})" if math.isinf(upper) else f"{attained} (at most {most})"

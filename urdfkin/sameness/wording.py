@@ -10,31 +10,32 @@ from urdfkin.dh.units import units_of
 from urdfkin.kinematics.rotation.euler import rpy_of
 from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step
 from urdfkin.model.mechanisms.conversion import Conversion
-from urdfkin.model.mechanisms.mechanism import Tolerance, tolerance_of
+from urdfkin.model.mechanisms.mechanism import Mechanism, Tolerance, tolerance_of
+from urdfkin.model.mechanisms.rigid import apart
 from urdfkin.model.mechanisms.variables import Variables, limits
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
 from urdfkin.sameness.result import Difference, angle, length
 
 
-def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[str, ...]:
-    """What makes B as A is, a line each; frames that are tools, set elsewhere, are put right in `found`.
+def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[tuple[str, str], ...]:
+    """What makes B as A is: of `result.FREE` what it is, and a line. Tools are put right in `found`.
 
     Args:
         found: How they lie on each other.
         rounding: What counts as none.
         tables: Whether either is a table, whose frames are its convention's and no more than looked at.
     """
-    lines = list[str]()
+    lines = list[tuple[str, str]]()
     tree_a, tree_b = found.a.tree, found.b.tree
     for which, mechanism, link in (("A", found.a, found.base[0]), ("B", found.b, found.base[1])):
         if mechanism.body_of[link]:
             root, base = mechanism.tree.links[0], mechanism.tree.links[link]
-            lines.append(f"{which}'s root is {root}: seen from {base}, joints between run back")
+            lines.append(("base", f"{which}'s root is {root}: seen from {base}, joints between run back"))
     if found.X is not IDENTITY:
-        lines.append(f"B's root stands in A's root frame at {pose_words(found.X, rounding)}")
+        lines.append(("base", f"B's root stands in A's root frame at {pose_words(found.X, rounding)}"))
     for step in found.steps:
         if step.conversion is not None:
-            lines.append(_conversion_words(found, step, step.conversion, rounding))
+            lines.append(("free joints", _conversion_words(found, step, step.conversion, rounding)))
         if step.sense < 0 or step.offset:
             sign = "-" if step.sense < 0 else ""
             least = rounding.angle if step.kind == "turns" else rounding.way
@@ -45,16 +46,63 @@ def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) ->
             else:
                 size = repr(abs(offset))
             constant = f" {'-' if offset < 0 else '+'} {size}" if offset else ""
-            lines.append(f"q[{tree_b.joints[step.b].name}] = {sign}q[{tree_a.joints[step.a].name}]{constant}")
+            words = f"q[{tree_b.joints[step.b].name}] = {sign}q[{tree_a.joints[step.a].name}]{constant}"
+            lines += [("zeros", words)] if step.offset else []
+            lines += [("senses", words)] if step.sense < 0 else []
+    return (*lines, *_tools_put_right(found, rounding, tables=tables))
+
+
+def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
+    """Take frames on which nothing hangs, and those around the base, for tools; a line of each."""
+    around, links = _around(found), (found.a.tree.links, found.b.tree.links)
     for k, frame in enumerate(found.frames):
-        if frame.differs and (tables or _is_tool(found, frame)):
+        beside = (frame.a, frame.b) in around
+        if frame.differs and (beside or tables or _is_tool(found, frame)):
             found.frames[k] = frame.put_right()
-        if found.frames[k].tool is IDENTITY:
-            continue
-        names = tree_b.links[frame.b], tree_a.links[frame.a]
-        moved = pose_words(found.frames[k].tool, rounding)
-        lines.append(f"frame {names[0]} is A's {names[1]} moved by {moved}")
-    return tuple(lines)
+            if beside and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b])):
+                continue  # seen from the root it is where it was: the line of the base says all
+        if (tool := found.frames[k].tool) is not IDENTITY:
+            moved = pose_words(tool, rounding)
+            yield "tools", f"frame {links[1][frame.b]} is A's {links[0][frame.a]} moved by {moved}"
+
+
+def _around(found: Alignment) -> set[tuple[int, int]]:
+    """Frames of both on the body that either robot stands on, that say no more than where it stands.
+
+    Of a link before all that carry joints, and of another that stands in the root's frame as in the other
+    model and carries none: a world, a table.
+    """
+    if found.a.body_of[found.base[0]] or found.b.body_of[found.base[1]]:
+        return set()
+    (before_a, idle_a), (before_b, idle_b) = (_beside_the_joints(m) for m in (found.a, found.b))
+    rounding = tolerance_of(found.a, found.b)
+    return {
+        (frame.a, frame.b)
+        for frame in found.frames
+        if (frame.a in before_a and frame.b in before_b)
+        or (
+            (frame.a in before_a | idle_a and frame.b in before_b | idle_b)
+            and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b]))
+        )
+    }
+
+
+def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
+    """Links of the root's body before all of them that carry moving joints; those that carry none.
+
+    None of either where no joint moves: then there is nothing that could stand elsewhere.
+    """
+    tree = mechanism.tree
+    carried = [0] * len(tree.links)
+    children = [list[int]() for _ in tree.links]
+    for i, joint in reversed(list(enumerate(tree.joints))):
+        moves = mechanism.body_of[i + 1] != mechanism.body_of[joint.parent]
+        carried[joint.parent] += 1 if moves else carried[i + 1]
+        if not moves:
+            children[joint.parent].append(i + 1)
+    body = mechanism.bodies[0] if carried[0] else []
+    before = {link for link in body if any(carried[child] == carried[0] for child in children[link])}
+    return before, {link for link in body if not carried[link]}
 
 
 def _conversion_words(found: Alignment, step: Step, made: Conversion, rounding: Tolerance) -> str:

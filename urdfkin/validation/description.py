@@ -6,6 +6,8 @@ import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from urdfkin.model.ranges import NarrowedRange, narrowed_ranges
+
 if TYPE_CHECKING:
     from urdfkin.model.tree import Joint
     from urdfkin.robot import Robot
@@ -20,6 +22,7 @@ def describe(robot: Robot) -> dict[str, Any]:
     (6, True)
     """
     tree = robot.tree
+    narrowed = {one.joint: one for one in narrowed_ranges(tree)}
     return {
         "name": robot.name,
         "source": robot.source,
@@ -35,11 +38,11 @@ def describe(robot: Robot) -> dict[str, Any]:
         "rates": list(robot.rate_names),
         "frames": list(robot.frame_names),
         "links": list(robot.link_names),
-        "joints": [_joint(robot, i) for i in range(len(tree.joints))],
+        "joints": [_joint(robot, i, narrowed) for i in range(len(tree.joints))],
     }
 
 
-def _joint(robot: Robot, i: int) -> dict[str, Any]:
+def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str, Any]:
     tree = robot.tree
     joint = tree.joints[i]
     return {
@@ -53,7 +56,16 @@ def _joint(robot: Robot, i: int) -> dict[str, Any]:
         "v": tree.v_index[i] if joint.kind.nv else None,
         "limit": _limit(joint),
         "mimic": asdict(joint.mimic) if joint.mimic else None,
+        "kept": _kept(narrowed.get(joint.name)),
     }
+
+
+def _kept(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
+    """The part of a joint's range in which its mimic joints keep their limits, where they narrow it."""
+    if narrowed is None:
+        return None
+    lower, upper = narrowed.kept or (None, None)
+    return {"lower": lower, "upper": upper, "by": list(narrowed.by)}
 
 
 def _limit(joint: Joint) -> dict[str, float | None] | None:

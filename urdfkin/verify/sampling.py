@@ -10,7 +10,7 @@ import numpy as np
 from urdfkin.kinematics.rotation.quaternion import rotation_of
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import neutral
-from urdfkin.model.ranges import coordinate_ranges
+from urdfkin.model.ranges import coordinate_ranges, own_ranges
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: How far a planar or floating joint is moved from its place: m.
@@ -34,8 +34,13 @@ def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
     within their limits too; if it has no room there, where it is within its own, and
     `configuration.limit_violations` names the followers.
     """
+    return _uniform(tree, n, rng, coordinate_ranges(tree))
+
+
+def _uniform(
+    tree: KinematicTree, n: int, rng: np.random.Generator, ranges: dict[str, tuple[float, float]]
+) -> FloatArray:
     q = np.empty((n, tree.nq))
-    ranges = coordinate_ranges(tree)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if joint.nq == 1:
             q[:, at] = rng.uniform(*ranges[joint.name], (n, 1))[:, 0]
@@ -57,9 +62,9 @@ def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
 
 
 def special(tree: KinematicTree) -> FloatArray:
-    """(3, nq): neutral, every joint at its lower bound, every joint at its upper bound."""
+    """(3, nq): neutral, every joint at its own lower bound, every joint at its own upper bound."""
     q = np.tile(neutral(tree), (3, 1))
-    ranges = coordinate_ranges(tree)
+    ranges = own_ranges(tree)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if joint.nq == 1:
             q[1, at], q[2, at] = ranges[joint.name]
@@ -80,10 +85,11 @@ def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
 def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
     """Samples for a validation: `n` random ones, and the special configurations if asked for.
 
+    They cover each joint's own limits, also where a mimic joint leaves its limits: the equations hold there.
     Rates are standard normal; every eighth sample has rates a hundred times as large, where the terms of
     7.129 and 7.130 that are quadratic in them dominate.
     """
-    q = sample(tree, n, rng)
+    q = _uniform(tree, n, rng, own_ranges(tree))
     if with_special:
         q = np.concatenate((special(tree), q))
     v, a = rng.standard_normal((2, len(q), tree.nv))

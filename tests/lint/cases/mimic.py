@@ -32,8 +32,13 @@ CASES = [
     Case(
         "mimic-continuous-leader",
         arm(attributes='type="continuous"', limit="", follow='<mimic joint="j1"/>'),
-        ACCEPT,
+        WARN,
+        [("URDF527", 7)],
     ),
+    Case("mimic-beyond-its-limits", arm(follow='<mimic joint="j1" offset="1"/>'), WARN, [("URDF527", 7)]),
+    Case("mimic-nowhere-within", arm(follow='<mimic joint="j1" offset="5"/>'), WARN, [("URDF527", 7)]),
+    Case("mimic-mirrored-within", arm(follow='<mimic joint="j1" multiplier="-1"/>'), ACCEPT),
+    Case("mimic-beyond-by-a-digit", arm(follow='<mimic joint="j1" multiplier="1.0005"/>'), ACCEPT),
     Case(
         "mimic-prismatic-of-revolute",
         arm(second='type="prismatic"', follow='<mimic joint="j1"/>'),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from urdfkin.lint.escape import quoted
@@ -10,7 +11,9 @@ from urdfkin.lint.fixes import Fix
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
 from urdfkin.lint.rules import joints
-from urdfkin.urdf.records import AXIAL, JointRecord, MimicRecord, RobotRecord
+from urdfkin.model.ranges import kept_range, range_words
+from urdfkin.model.tree import Limit, Mimic
+from urdfkin.urdf.records import AXIAL, JointRecord, LimitRecord, MimicRecord, RobotRecord
 
 MIMIC_UNKNOWN = Rule("URDF520", "mimic-unknown", ERROR)
 MIMIC_LOOP = Rule("URDF521", "mimic-loop", ERROR)
@@ -19,9 +22,12 @@ MIMIC_CONSTANT = Rule("URDF523", "mimic-constant", WARNING)
 MIMIC_CONTINUOUS = Rule("URDF524", "mimic-continuous", WARNING)
 MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
+MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest multiplier, and offset in rad or m, that is taken for real.
 LARGEST = 1e6
+#: Share of a joint's range that limits of its mimic joint may leave out: limits are written with few digits.
+LEAST_LOST = 1e-3
 
 
 def check_mimic(report: Reporter, robot: RobotRecord, *, obeyed: bool) -> None:
@@ -135,6 +141,52 @@ class _Judge:
                 "joint",
                 "name the joint that moves, for readers that resolve one step only",
             )
+        if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= LARGEST:
+            self.check_range(joint, mimic, joint.limit)
+
+    def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
+        """The limits of a mimic joint must leave the mimicked joint its range."""
+        rule, leader = self.resolved(mimic)
+        limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
+        if leader is None or moving is None or limits is None or joint.kind == "continuous":
+            return
+        low, high = kept_range(rule, Limit(*limits, math.inf, math.inf), *moving)
+        if rule.multiplier == 0.0 or high - low >= (1.0 - LEAST_LOST) * (moving[1] - moving[0]):
+            return
+        held = f"from {range_words((low, high))} only" if low < high else "nowhere"
+        message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
+        ends = sorted(rule.multiplier * end + rule.offset for end in moving)
+        self.report.add(
+            MIMIC_RANGE,
+            f"{message}they hold {held}",
+            limit.element,
+            attribute="lower",
+            found=f'lower="{limits[0]:g}" upper="{limits[1]:g}"',
+            remedy=f'write lower="{ends[0]:.6g}" upper="{ends[1]:.6g}", the range that the rule gives',
+            severity=None if self.obeyed else Severity.NOTE,
+        )
+
+    def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
+        """The rule along a chain of mimic joints, and the joint that moves; None where there is none."""
+        rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
+        leader = self.joints.get(rule.leader)
+        while leader is not None and (next_ := leader.mimic) is not None:
+            if leader.name in self.looped:
+                return rule, None
+            offset = rule.multiplier * next_.offset + rule.offset
+            rule = Mimic(next_.leader, rule.multiplier * next_.multiplier, offset)
+            leader = self.joints.get(rule.leader)
+        return rule, leader
+
+
+def _range_of(joint: JointRecord) -> tuple[float, float] | None:
+    """What a joint ranges over: its limits, or a turn; None where the limits are none."""
+    if joint.kind == "continuous":
+        return -math.pi, math.pi
+    if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
+        return None
+    low, high = (0.0 if end is None else end for end in (joint.limit.lower, joint.limit.upper))
+    return (low, high) if low < high else None
 
 
 def _looped(joints: dict[str, JointRecord]) -> set[str]:

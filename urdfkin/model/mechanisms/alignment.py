@@ -13,13 +13,14 @@ nothing does, but for turns that screws on one line share.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from urdfkin.model.mechanisms.conversion import Conversion
-from urdfkin.model.mechanisms.mechanism import Mechanism, Screw, size_of
+from urdfkin.model.mechanisms.mechanism import Mechanism, Screw, size_of, tolerance_of
+from urdfkin.model.mechanisms.rigid import apart
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 
@@ -182,6 +183,25 @@ class Alignment:
             for other in some[k + 1 :]:
                 if other.previous == one.previous and other.kind == one.kind:
                     yield frozenset(((one.a, one.b), (other.a, other.b)))
+
+    def frames_of(self, pairs: Sequence[tuple[int, int]]) -> list[FramePair]:
+        """Links (of A, of B) on bodies that are laid on each other, as frames."""
+        on = {(self.a.body_of[frame.a], self.b.body_of[frame.b]): frame for frame in self.frames}
+        rounding = tolerance_of(self.a, self.b)
+        found = []
+        for a, b in pairs:
+            if (known := on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
+                continue
+            # What moves B's home to where it lies on A's body, from any two links there.
+            laid = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
+            home, at = self.a.homes[a], laid @ self.b.homes[b]
+            tilt, shift = apart(home, at)
+            if rounding.holds(tilt, shift):
+                found.append(FramePair(a, b, known.previous, home, IDENTITY, 0.0, 0.0))
+            else:
+                end = at @ inverse(home)
+                found.append(FramePair(a, b, known.previous, home, end, tilt, shift))
+        return found
 
     def indices(self, previous: int) -> list[int]:
         """The steps from the base to one of them, itself too."""

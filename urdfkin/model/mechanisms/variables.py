@@ -170,21 +170,36 @@ class _Maker:
         return same and max(off) <= self.tolerance.angle * max(1.0, abs(a.slope), abs(a.constant))
 
     def _ranges(self, pairs: list[Pair | None]) -> dict[str, tuple[float, float]]:
-        """What keeps every joint of both within its limits; of the coordinate's own alone if nothing does."""
-        ranges: dict[str, tuple[float, float]] = {}
-        held: dict[str, tuple[float, float]] = {}
+        """The limits of each coordinate, in both models where it moves both; A's where they share nothing.
+
+        A mimic joint obeys its rule, not its limits: those count only where the coordinate has none.
+        """
+        first: dict[str, tuple[float, float]] = {}
+        own: dict[str, tuple[float, float]] = {}
+        mimic: dict[str, tuple[float, float]] = {}
         for step, pair in zip(self.found.steps, pairs, strict=True):
-            if pair is None:
-                continue
-            for tree, j, line in ((self.trees[0], step.a, pair.a), (self.trees[1], step.b, pair.written)):
-                if not line.slope:
+            for k, j in enumerate((step.a, step.b)):
+                joint = self.trees[k].joints[j]
+                if pair is None:  # joints of two kinds, each moved by its own coordinate
+                    if step.unlike and joint.nq == 1:
+                        own[f"{'ab'[k]}:{joint.name}"] = limits(joint)
                     continue
-                ends = sorted((end - line.constant) / line.slope for end in limits(tree.joints[j]))
+                if not (line := (pair.a, pair.written)[k]).slope:
+                    continue
+                ends = sorted((end - line.constant) / line.slope for end in limits(joint))
+                held = own if joint.mimic is None else mimic
                 low, high = held.get(line.variable, (-math.inf, math.inf))
                 held[line.variable] = max(low, ends[0]), min(high, ends[1])
-                if line.variable == f"a:{tree.joints[j].name}" or line.variable not in ranges:
-                    ranges[line.variable] = ends[0], ends[1]
-        return {name: held[name] if held[name][0] < held[name][1] else own for name, own in ranges.items()}
+                if joint.mimic is None and (k == 0 or line.variable not in first):
+                    first[line.variable] = ends[0], ends[1]
+        ranges = dict[str, tuple[float, float]]()
+        for name in own | mimic:
+            found, other = own.get(name, (-math.inf, math.inf)), mimic.get(name, (-math.inf, math.inf))
+            if not found[0] < found[1]:
+                found = first.get(name, found)
+            without = math.isinf(found[0]) and math.isinf(found[1]) and other[0] < other[1]
+            ranges[name] = other if without else found
+        return ranges
 
 
 def limits(joint: Joint) -> tuple[float, float]:
