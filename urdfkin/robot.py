@@ -44,7 +44,7 @@ from urdfkin.system.asking import ask
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.joint_order import order_words
 from urdfkin.urdf.origin import Origin
-from urdfkin.verify.bounds import nearest_singularity
+from urdfkin.verify.bounds import movable, nearest_singularity
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.choosing import Verify
@@ -807,9 +807,10 @@ class Robot(Shown):
     ) -> SingularValues:
         """The singular values of `jacobian` with guaranteed bounds, their condition and manipulability.
 
-        They are the same in LOCAL and LOCAL_WORLD_ALIGNED. Of "all" rows, metres and radians are mixed as SI
-        units mix them. How far J can be off, and what the decomposition rounds, is in the bounds. Their
-        product's gradient is `found.manipulability_gradient(robot.hessian(q, frame))`.
+        They are the same in LOCAL and LOCAL_WORLD_ALIGNED. Columns that are 0 for every q are left out. Of
+        "all" rows, metres and radians are mixed as SI units mix them. How far J can be off, and what the
+        decomposition rounds, is in the bounds. Their product's gradient is
+        `found.manipulability_gradient(robot.hessian(q, frame))`.
 
         Args:
             q: (..., nq) rad, m.
@@ -841,7 +842,7 @@ class Robot(Shown):
         size = magnitudes(call.plan, call.q, None, None, call.state)
         bound = JACOBIAN.bound(call.plan, size, _ALIGNED)
         error = (EPS * bound.k * bound.scale)[:, 0].reshape(*call.shape, 6, self.nv)
-        moving = np.asarray((bound.scale[:, 0, which] > 0.0).any(axis=(0, 1)))
+        moving = np.asarray(movable(call.plan)[0, which].any(axis=0))
         return singular_values(J, error, moving, which)
 
     def analytical_jacobian(
