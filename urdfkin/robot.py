@@ -36,7 +36,7 @@ from urdfkin.model import configuration, steps
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.described import described
-from urdfkin.model.frame_names import LinkFrame
+from urdfkin.model.frame_names import FrameName, LinkFrame
 from urdfkin.model.given import Given, listed
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
@@ -504,7 +504,8 @@ class Robot(Shown):
         True
         """
         name = word(relative_to, "relative_to")
-        call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=str(name))
+        name = name if isinstance(name, FrameName) else str(name)  # a replay line has no words for NumPy's
+        call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
         self.verifier.ready(verify)
         T_world = call.compute(PLACEMENT.ours, call.plan, (call.q,), None, threads=threads)

@@ -66,6 +66,10 @@ class Question:
         self.reference, self.base = reference, base
         self._given = inputs
 
+    def read(self) -> None:
+        """Read the numbers now, before what they may be views of is written to."""
+        _ = self._inputs
+
     @cached_property
     def _inputs(self) -> tuple[FloatArray, ...]:
         return tuple(np.asarray(x, dtype=np.float64) for x in self._given)

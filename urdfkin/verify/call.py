@@ -22,6 +22,9 @@ from urdfkin.verify.asked import Question, Rows
 
 T = TypeVar("T")
 
+#: Arrays whose methods are NumPy's own.
+_PLAIN = np.ndarray, np.memmap
+
 
 class Part(NamedTuple):
     """Some configurations of a call, as urdfkin sees them and as the user asked for them.
@@ -121,16 +124,24 @@ class Call:
         return self.n * len(self.links)
 
     def flat(self, out: FloatArray | None, own: tuple[int, ...]) -> FloatArray | None:
-        """`out` as the kernels write it, (n, frames, ...); raises InputError if it cannot take the result."""
+        """`out` as the kernels write it, (n, frames, ...); raises InputError if it cannot take the result.
+
+        A subclass of NumPy's array may reshape to another shape than it is asked for, as a matrix does, and a
+        kernel would then write past its end.
+        """
         if out is None:
             return None
         wanted = (*self.shape, *((len(self.links),) if self.several else ()), *own)
-        good = isinstance(out, np.ndarray) and out.dtype == np.float64 and out.flags.c_contiguous
-        if not good or out.shape != wanted or not out.flags.writeable:
+        good = type(out) in _PLAIN and out.dtype == np.float64 and out.flags.carray
+        if not good or out.shape != wanted:
             raise InputError(
                 f"out must be a writable C-contiguous float64 array of shape {wanted}",
-                found=f"{getattr(out, 'dtype', type(out).__name__)} {getattr(out, 'shape', '')}",
+                found=_described(out),
+                remedy="np.asarray(out) is a plain array"
+                if isinstance(out, np.ndarray) and type(out) not in _PLAIN
+                else None,
             )
+        self.question.read()  # lists may hold views of out
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a: they are read again for the check")
         return out.reshape(self.n, len(self.links), *own)
@@ -158,6 +169,19 @@ class Call:
     def index(self, k: int) -> tuple[int, ...]:
         """Flat sample `k` as an index into the caller's batch."""
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
+
+
+def _described(out: object) -> str:
+    """What was given as `out`: its type, and of an array all that matters to a kernel."""
+    if not isinstance(out, np.ndarray):
+        return type(out).__name__
+    flags = {
+        "read-only": out.flags.writeable,
+        "not C-contiguous": out.flags.c_contiguous,
+        "not aligned": out.flags.aligned,
+    }
+    faults = (fault for fault, good in flags.items() if not good)
+    return ", ".join((f"{type(out).__name__} of {out.dtype} {out.shape}", *faults))
 
 
 def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
