@@ -218,6 +218,36 @@ def test_a_hessian_is_enclosed_where_it_is_asked_for(name: str) -> None:
         assert one.error(robot.hessian(x[0], robot.tip_frame, reference)).max() < 1e-14
 
 
+#: A joint that turns, one that follows it by -2.5 and one that follows that by 0.3.
+FOLLOWERS = (
+    '<robot name="followers"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>'
+    '<joint name="x" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    '<joint name="y" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.5 0.1 0"/>'
+    '<axis xyz="0 1 0"/><mimic joint="x" multiplier="-2.5" offset="0.2"/>'
+    '<limit lower="-3" upper="3" effort="1" velocity="3"/></joint>'
+    '<joint name="z" type="prismatic"><parent link="c"/><child link="d"/><origin xyz="0.3 0 0.2"/>'
+    '<axis xyz="1 0 0"/><mimic joint="y" multiplier="0.3"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+)
+
+
+@pytest.mark.parametrize("reference", list(Reference))
+def test_a_hessian_behind_mimic_joints_is_enclosed_and_counts_both_their_multipliers(
+    reference: Reference,
+) -> None:
+    robot = urdfkin.load(FOLLOWERS)
+    q, v, a = [0.3], [1.0], [0.5]
+    one = robot.enclose(q, v, a, "d", reference, hessian=True).hessian
+    assert one is not None
+    assert one.error(robot.hessian(q, "d", reference)).max() < 1e-14
+    # The rate of the Jacobian by the robot's own recursion: with one rate, J-dot = H v.
+    motion = at_fifty_digits(robot, tuple(np.array(x) for x in (q, v, a)), None)
+    link = robot.tree.frame_link("d")
+    rate = QUANTITIES["jacobian rate"].truth(motion, link, reference)
+    assert np.abs((one.lower[..., 0] - rate).astype(float)).max() < 1e-15
+
+
 def test_a_robot_that_pinocchio_refuses_is_enclosed_all_the_same() -> None:
     robot = robot_of("panda")
     robot.verifier.unverifiable = "it was told to"

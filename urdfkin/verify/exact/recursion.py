@@ -231,7 +231,8 @@ def hessian_values(motion: Motion, link: int, reference: Reference) -> NDArray[n
         for j, by in enumerate(columns):
             before = order[id(by.carrier)] <= order[id(column.carrier)]
             change = _seen(s, reference, *_change(ends[i], ends[j], reference, before=before))
-            out[column.place, by.place] += column.factor * by.factor * _array(change)
+            factor = column.factor * by.factor  # an interval multiplies numbers, no arrays
+            out[column.place, by.place] += _array([factor * number for number in change])
     return out.transpose(2, 0, 1)
 
 
