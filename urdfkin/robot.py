@@ -310,11 +310,19 @@ class Robot(Shown):
         `limit_violations` names the follower.
 
         Raises:
-            InputError: `n` or `seed` is no whole number from 0 on.
+            InputError: `n` or `seed` is no whole number from 0 on, or `n` configurations do not fit into memory.
         """
         n = whole_number(n, "n", 0, _MOST_NUMBERS // max(1, self.nq))
         seed = whole_number(seed, "seed", 0)
-        return sample(self.tree, n, np.random.default_rng(seed))
+        try:
+            return sample(self.tree, n, np.random.default_rng(seed))
+        except MemoryError:
+            raise InputError(
+                "so many configurations do not fit into memory",
+                where=self.name,
+                found=f"n = {n}, which are {8 * n * self.nq // 10**9} GB",
+                remedy="draw them in parts, each with a seed of its own",
+            ) from None
 
     def limit_violations(self, q: Given) -> list[str]:
         """One line for each joint that leaves its bounds somewhere in `q` (..., nq)."""
