@@ -310,7 +310,7 @@ class Robot(Shown):
         `limit_violations` names the follower.
 
         Raises:
-            InputError: `n` or `seed` is no whole number from 0 on, or `n` configurations do not fit into memory.
+            InputError: `n` or `seed` is no whole number from 0 on; `n` configurations do not fit into memory.
         """
         n = whole_number(n, "n", 0, _MOST_NUMBERS // max(1, self.nq))
         seed = whole_number(seed, "seed", 0)

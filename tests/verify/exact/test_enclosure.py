@@ -237,12 +237,12 @@ def test_a_hessian_behind_mimic_joints_is_enclosed_and_counts_both_their_multipl
     reference: Reference,
 ) -> None:
     robot = urdfkin.load(FOLLOWERS)
-    q, v, a = [0.3], [1.0], [0.5]
+    q, v, a = np.array([0.3]), np.array([1.0]), np.array([0.5])
     one = robot.enclose(q, v, a, "d", reference, hessian=True).hessian
     assert one is not None
     assert one.error(robot.hessian(q, "d", reference)).max() < 1e-14
     # The rate of the Jacobian by the robot's own recursion: with one rate, J-dot = H v.
-    motion = at_fifty_digits(robot, tuple(np.array(x) for x in (q, v, a)), None)
+    motion = at_fifty_digits(robot, (q, v, a), None)
     link = robot.tree.frame_link("d")
     rate = QUANTITIES["jacobian rate"].truth(motion, link, reference)
     assert np.abs((one.lower[..., 0] - rate).astype(float)).max() < 1e-15
