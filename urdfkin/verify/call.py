@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.errors.demands import shown
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.configuration import checked, numbers, shaped
-from urdfkin.model.given import Given
+from urdfkin.model.given import Given, by_name
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.asked import Question, Rows
@@ -81,7 +81,7 @@ class Call:
             raise InputError("base is a BaseMotion or None", found=type(base).__name__)
         # By name they are told from the tree, whose names and order the oracle compares with its own.
         inputs: list[ArrayLike] = [
-            numbers(tree, x, name) if isinstance(x, Mapping | str) else x
+            cast("ArrayLike", x) if by_name(x, name) is None else numbers(tree, x, name)
             for x, name in zip(given, "qva", strict=False)
         ]
         self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
