@@ -223,7 +223,7 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
 
 
 def _labels(value: object) -> list[Any]:
-    """Names as pandas' `keys()`, polars' `columns` or Arrow's `column_names` have them; none if they count."""
+    """A table's labels (pandas' `keys()`, `columns`, `column_names`); none where they only count."""
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []
