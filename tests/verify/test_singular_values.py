@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import urdfkin
 from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -18,7 +19,7 @@ from urdfkin.verify.exact.decimals import read_exact
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.exact.vectors import exact, mp
 from urdfkin.verify.quantities import JACOBIAN
-from urdfkin.verify.singular_values import Between, SingularValues, singular_values
+from urdfkin.verify.singular_values import Between, SingularValues, _skew, singular_values
 
 ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 
@@ -135,6 +136,7 @@ def test_a_singular_arm_of_any_size_is_never_proven_to_be_regular(size: float) -
         ((1e-200, 1e-200, 1e200, 1e200), mp.mpf(1)),
         ((1e200, 1e200, 1e-300), mp.mpf("1e100")),
         ((1e200, 1e200), mp.mpf("1e400")),
+        ((2e-162, 1.5e-162), mp.mpf("3e-324")),
     ],
 )
 def test_a_product_lies_between_where_a_part_of_it_is_beyond_all_numbers(
@@ -145,6 +147,99 @@ def test_a_product_lies_between_where_a_part_of_it_is_beyond_all_numbers(
     found = SingularValues(slice(None), bounds, np.eye(len(sizes)), np.eye(len(sizes)))
     assert holds(Between(*(np.array([x]) for x in found.manipulability)), [product])
     assert holds(Between(*(np.array([x]) for x in found.condition)), [exact(values[0]) / exact(values[-1])])
+
+
+# -- each term of the bounds is needed -----------------------------------------------------------------
+
+
+def test_what_the_matrix_may_be_off_by_is_in_the_bounds() -> None:
+    A, off = np.diag([2.0, 1.0]), np.full((2, 2), 1e-6)
+    found = singular_values(A, off, np.ones(2, dtype=bool))
+    for sign in (1.0, -1.0):
+        true = true_values(np.vectorize(exact, otypes=[object])(A + sign * off))
+        assert holds(found.values, true)
+    # All of it: what is off by the same in every number moves one of them by its norm.
+    alone = singular_values(np.zeros((2, 2)), off, np.ones(2, dtype=bool))
+    assert holds(alone.values, true_values(np.vectorize(exact, otypes=[object])(off)))
+    assert alone.values.upper[0] == pytest.approx(2e-6, rel=1e-12)
+
+
+def decomposed(seed: int, values: tuple[float, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rotations that are right to rounding, and values between them."""
+    generator = np.random.default_rng(seed)
+    U, V = (np.linalg.qr(generator.standard_normal((3, 3)))[0] for _ in range(2))
+    return U, np.array(values), V.T.copy()
+
+
+def holds_with(
+    monkeypatch: pytest.MonkeyPatch, A: FloatArray, svd: tuple[FloatArray, FloatArray, FloatArray]
+) -> bool:
+    """Whether the true values lie between the bounds that are made of this decomposition of a matrix."""
+    true = true_values(np.vectorize(exact, otypes=[object])(A))
+    with monkeypatch.context() as patched:
+        patched.setattr(np.linalg, "svd", lambda *_, **__: svd)
+        return holds(singular_values(A, np.zeros(A.shape), np.ones(A.shape[1], dtype=bool)).values, true)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_decomposition_that_leaves_a_residual_is_not_believed(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    U, s, Vt = decomposed(seed, (3.0, 2.0, 1.0))
+    A = (U * s) @ Vt
+    for wrong in ([1e-9, 0.0, 0.0], [0.0, -1e-9, 0.0], [0.0, 0.0, 1e-9]):
+        assert holds_with(monkeypatch, A, (U, s + np.array(wrong), Vt))
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("size", [1.0 + 1e-9, 1.0 - 1e-9])
+def test_a_decomposition_that_is_askew_is_not_believed(
+    seed: int, side: int, size: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    U, s, Vt = decomposed(seed, (3.0, 2.0, 1.0))
+    A = (U * s) @ Vt
+    scaled = (U * size, s / size, Vt) if side == 0 else (U, s / size, Vt * size)
+    assert holds_with(monkeypatch, A, scaled)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_the_residual_itself_is_rounded_by_is_in_the_bounds(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    U, s, Vt = decomposed(seed, (1.0, 1e-12, 1e-13))
+    A = (U * s[np.newaxis, :]) @ Vt
+    assert not np.abs(A - (U * s[np.newaxis, :]) @ Vt).any(), "the residual, as it is computed, is 0"
+    assert holds_with(monkeypatch, A, (U, s, Vt))
+
+
+def test_products_that_underflow_are_in_the_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    # 256 times a sixteenth of 1,607 of the smallest numbers, 100.4375, is as many times 100.
+    least = 5e-324
+    A, svd = np.full((1, 256), 100 * least), (np.eye(1), np.array([1607 * least]), np.full((1, 256), 1 / 16))
+    monkeypatch.setattr(np.linalg, "svd", lambda *_, **__: svd)
+    values = singular_values(A, np.zeros(A.shape), np.ones(256, dtype=bool)).values
+    assert values.lower[0] <= 1600 * least <= values.upper[0]
+
+
+def test_the_product_that_shows_what_is_askew_rounds_too() -> None:
+    # Of three columns and rows: five eps for the sum of each number's terms, here 1 or 0.
+    assert _skew(np.eye(3)) == pytest.approx(5.0 * EPS * np.sqrt(3.0), rel=1e-12, abs=0.0)
+
+
+def test_the_bounds_are_rounded_outward() -> None:
+    # A norm of three equal numbers, a product, a quotient: each is rounded either way.
+    generator = np.random.default_rng(1)
+    for x, y in generator.uniform(1.0, 2.0, (50, 2)):
+        off = singular_values(np.zeros((1, 3)), np.full((1, 3), x), np.ones(3, dtype=bool))
+        assert exact(float(off.values.upper[0])) ** 2 >= 3 * exact(x) ** 2
+        values = np.array([max(x, y), min(x, y)])
+        found = SingularValues(slice(None), Between(values, values, values), np.eye(2), np.eye(2))
+        for between, true in (
+            (found.manipulability, exact(x) * exact(y)),
+            (found.condition, exact(values[0]) / exact(values[1])),
+        ):
+            assert exact(float(between.lower)) < true < exact(float(between.upper))
 
 
 def test_what_is_beyond_all_numbers_bounds_nothing() -> None:

@@ -4,6 +4,7 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import redirect_stdout
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -201,6 +202,17 @@ def test_an_error_is_what_a_number_can_be_off_by_at_most() -> None:
     assert (velocity.error(off) <= 1e-3 + 2.0 * velocity.width + 1e-15).all()
     assert (velocity.error(velocity.lower) >= velocity.width).all()
     assert not velocity.contains(off).any()
+
+
+def test_an_error_is_rounded_outward() -> None:
+    generator = np.random.default_rng(3)
+    x, lower = generator.normal(size=(2, 200)) * 10.0 ** generator.integers(-9, 9, (2, 200))
+    upper = np.nextafter(lower, np.inf)
+    errors = Enclosure("velocity", lower, upper, x, None).error(x)
+    for error, *numbers in zip(errors, x, lower, upper, strict=True):
+        number, low, high = map(Fraction, numbers)
+        assert Fraction(error) >= max(abs(number - low), abs(number - high))
+    assert Enclosure("velocity", x, x, x, None).error(x).tolist() == [0.0] * 200
 
 
 @pytest.mark.slow
