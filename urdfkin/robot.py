@@ -397,7 +397,10 @@ class Robot(Shown):
         return self.verifier.model(mimic=switch(mimic, "mimic"))
 
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
-        """The inverse of `to_pinocchio`; angles of continuous joints come back in (-pi, pi]."""
+        """The inverse of `to_pinocchio`; angles of continuous joints come back in [-pi, pi].
+
+        Of both ends the double nearest to them comes back as it is.
+        """
         return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=switch(mimic, "mimic"))
 
     # -- what it computes ----------------------------------------------------------------------------
@@ -667,9 +670,13 @@ class Robot(Shown):
 
         J-dot of 7.126 is the sum over j of H[..., j] v[j], and v^T H v what the acceleration has of the rates
         alone. Where rate j comes before column i, its z_j turns the column, z_j x (z_i x d_i); where it comes
-        behind, it moves the end of its arm, z_i x (z_j x d_j): in LOCAL_WORLD_ALIGNED the linear rows are
-        symmetric in i and j but for the rates of one planar or floating joint, the angular ones never are.
-        WORLD has the first kind alone, LOCAL the second.
+        behind, it moves the end of its arm, z_i x (z_j x d_j). WORLD has the first kind alone, LOCAL the
+        second.
+
+        In LOCAL_WORLD_ALIGNED, but for the rates of one floating joint, the angular rows at [i, j] and [j, i]
+        differ by w_j x w_i, the angular rows of the Jacobian: not at all where these are parallel, and on a
+        planar arm the angular rows are 0. The linear rows are symmetric in i and j, but for the rates of one
+        planar or floating joint.
 
         Args:
             q: (..., nq) rad, m.

@@ -319,7 +319,7 @@ def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> 
 
 
 def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
-    """(..., nq) for (..., nq_pinocchio); angles of continuous and planar joints come back in (-pi, pi].
+    """(..., nq) for (..., nq_pinocchio); angles of continuous and planar joints come back in [-pi, pi].
 
     Raises:
         InputError: wrong length, a (cos, sin) pair that is no unit vector, or a follower that does not
