@@ -328,3 +328,70 @@ def test_names_that_stand_for_two_numbers_never_set_one_of_them_to_zero() -> Non
     twice = Places("q", ("a", "a"), ("rad", "rad"))
     with pytest.raises(InputError, match="no value for a"):
         twice.read({"a": 0.5})
+
+
+def swapped(places: Places, values: Any, where: str, rest: Any, *, right: Any = Places._by_name) -> Any:
+    """What a reading by name gives, its first two numbers exchanged."""
+    found = right(places, values, where, rest)
+    found[..., [0, 1]] = found[..., [1, 0]]
+    return found
+
+
+NAMED: dict[str, Any] = {
+    "a mapping": {"lift": 0.1, "shoulder": "30deg", "elbow": 1.0},
+    "a mapping with a batch": {"elbow": [1.0, 1.1], "lift": 0.1, "shoulder": [[0.2], [0.3]]},
+    "a text": "lift=100mm, shoulder = 30 deg, elbow=pi/3",
+    "a text with blanks": "elbow=pi / 3 lift=.1 shoulder=30 deg",
+    "a text with brackets": "[shoulder=30deg,lift=5mm,elbow=1]",
+    "a pose and a name": "ready, lift=.3",
+    "a series": Series([1.0, 0.1, -0.5], SHUFFLED),
+    "a data frame": DataFrame([[1.0, 0.1, -0.5], [1.1, 0.2, -0.6]], SHUFFLED),
+}
+
+
+@pytest.mark.parametrize("given", NAMED)
+def test_a_name_that_is_read_as_another_coordinate_is_a_disagreement(
+    given: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = urdfkin.load(ARM)
+    robot.placement(NAMED[given], "e")
+    assert robot.certificate().verified
+    monkeypatch.setattr(Places, "_by_name", swapped)
+    with pytest.raises(urdfkin.VerificationError):
+        robot.placement(NAMED[given], "e")
+
+
+@pytest.mark.parametrize("root_joint", ["planar", "floating"])
+def test_so_is_one_of_the_numbers_of_a_joint_that_has_several(
+    root_joint: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = urdfkin.load(ARM, root_joint=root_joint)
+    of_joint: dict[str, Any] = {
+        "root_joint": [0.1, 0.2, 0.3, *([0.0, 0.0, 0.6, 0.8] * (root_joint != "planar"))]
+    }
+    texts = "neutral, root_joint.x=0.1, root_joint.y=20mm", "neutral,root_joint.y=.5"
+    for q in (*texts, {"lift": 0.0, "shoulder": 0.1, "elbow": 1.0, **of_joint}):
+        robot.placement(q, "e")
+    v = "neutral, root_joint.vx=0.1, root_joint.wz=3deg/s"
+    robot.velocity("neutral", v, "e")
+    assert robot.certificate().verified
+    monkeypatch.setattr(Places, "_by_name", swapped)
+    for q in (*texts, {"lift": 0.0, "shoulder": 0.1, "elbow": 1.0, **of_joint}):
+        with pytest.raises(urdfkin.VerificationError):
+            robot.placement(q, "e")
+    with pytest.raises(urdfkin.VerificationError):
+        robot.velocity(robot.neutral(), v, "e")
+
+
+def test_names_that_are_hard_to_tell_from_the_text_around_are_found_by_both() -> None:
+    hard = {"lift": "a=b", "shoulder": "a", "elbow": "b (left).x"}
+    text = ARM
+    for name, other in hard.items():
+        text = text.replace(f'"{name}"', f'"{other}"')
+    robot = urdfkin.load(text)
+    q = robot.coordinate_names
+    assert set(q) == set(hard.values())
+    for written in ("a=b=5mm, a=1deg, b (left).x=1.0", "neutral, a=1", "neutral,b (left).x=pi/4,a=b=.1"):
+        robot.placement(written, "e")
+    assert robot.certificate().verified
+    assert urdfkin.load(ALIKE).placement({"a:x": 0.1, "a:y": 0.2, "a:angle": 0.3, "a.x": 0.4}, "s").any()

@@ -79,14 +79,15 @@ class Call:
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
             raise InputError("base is a BaseMotion or None", found=type(base).__name__)
-        # By name they are told from the tree, whose names and order the oracle compares with its own.
+        named = [by_name(x, name) for x, name in zip(given, "qva", strict=False)]
         inputs: list[ArrayLike] = [
-            cast("ArrayLike", x) if by_name(x, name) is None else numbers(tree, x, name)
-            for x, name in zip(given, "qva", strict=False)
+            cast("ArrayLike", x) if by is None else numbers(tree, by, name)
+            for x, by, name in zip(given, named, "qva", strict=False)
         ]
         self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
         self.several, self.frames = _frames(frame)
-        self.question = Question(frame, reference, base, inputs)
+        joints = [(joint.name, joint.nv) for joint in tree.joints if joint.nv] if any(named) else ()
+        self.question = Question(frame, reference, base, inputs, named, joints)
         self.reference = Reference.of(reference)
         self.links = tuple(tree.frame_link(name) for name in self.frames)
         self.plan = plan((*self.links, *(tree.frame_link(name) for name in also)))
