@@ -202,10 +202,10 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
     >>> by_name([0.5, 0.1], "q"), by_name("ready", "q"), by_name({"elbow": 0.5}, "q")
     (None, 'ready', {'elbow': 0.5})
     """
-    if isinstance(value, Mapping | str):
-        return value
     if isinstance(value, np.ndarray):
         return None
+    if isinstance(value, Mapping | str):
+        return value
     if isinstance(value, list | tuple):
         if any(_labels(item) for item in value):
             raise InputError(
