@@ -131,6 +131,7 @@ class Question:
         named: Sequence[str | Mapping[str, ArrayLike] | None] = (),
         joints: Sequence[tuple[str, int]] = (),
     ) -> None:
+        self._is_one = isinstance(frame, str)
         self.frames = (frame,) if isinstance(frame, str) else tuple(frame)
         self.reference, self.base = reference, base
         self._given, self._named, self._joints = inputs, named or [None] * len(inputs), joints
@@ -189,7 +190,7 @@ class Question:
         Raises:
             OracleError: it has another shape than the question.
         """
-        own = result.shape[result.ndim - axes :]
-        if result.shape not in ((*self.shape, *own), (*self.shape, len(self.frames), *own)):
+        own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
+        if result.shape != (*self.shape, *several, *own):
             raise OracleError("a result has another batch shape than what was asked", found=str(result.shape))
         return result.reshape(self.n, len(self.frames), *own)
