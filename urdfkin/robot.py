@@ -36,7 +36,7 @@ from urdfkin.model import configuration, steps
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.described import described
-from urdfkin.model.frame_names import LinkFrame
+from urdfkin.model.frame_names import FrameName, LinkFrame
 from urdfkin.model.given import Given, listed
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
@@ -44,7 +44,7 @@ from urdfkin.system.asking import ask
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.joint_order import order_words
 from urdfkin.urdf.origin import Origin
-from urdfkin.verify.bounds import nearest_singularity
+from urdfkin.verify.bounds import movable, nearest_singularity
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.choosing import Verify
@@ -310,11 +310,19 @@ class Robot(Shown):
         `limit_violations` names the follower.
 
         Raises:
-            InputError: `n` or `seed` is no whole number from 0 on.
+            InputError: `n` or `seed` is no whole number from 0 on; `n` configurations do not fit into memory.
         """
         n = whole_number(n, "n", 0, _MOST_NUMBERS // max(1, self.nq))
         seed = whole_number(seed, "seed", 0)
-        return sample(self.tree, n, np.random.default_rng(seed))
+        try:
+            return sample(self.tree, n, np.random.default_rng(seed))
+        except MemoryError:
+            raise InputError(
+                "so many configurations do not fit into memory",
+                where=self.name,
+                found=f"n = {n}, which are {8 * n * self.nq // 10**9} GB",
+                remedy="draw them in parts, each with a seed of its own",
+            ) from None
 
     def limit_violations(self, q: Given) -> list[str]:
         """One line for each joint that leaves its bounds somewhere in `q` (..., nq)."""
@@ -389,7 +397,10 @@ class Robot(Shown):
         return self.verifier.model(mimic=switch(mimic, "mimic"))
 
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
-        """The inverse of `to_pinocchio`; angles of continuous joints come back in (-pi, pi]."""
+        """The inverse of `to_pinocchio`; angles of continuous joints come back in [-pi, pi].
+
+        Of both ends the double nearest to them comes back as it is.
+        """
         return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=switch(mimic, "mimic"))
 
     # -- what it computes ----------------------------------------------------------------------------
@@ -504,7 +515,8 @@ class Robot(Shown):
         True
         """
         name = word(relative_to, "relative_to")
-        call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=str(name))
+        name = name if isinstance(name, FrameName) else str(name)  # a replay line has no words for NumPy's
+        call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
         self.verifier.ready(verify)
         T_world = call.compute(PLACEMENT.ours, call.plan, (call.q,), None, threads=threads)
@@ -658,9 +670,13 @@ class Robot(Shown):
 
         J-dot of 7.126 is the sum over j of H[..., j] v[j], and v^T H v what the acceleration has of the rates
         alone. Where rate j comes before column i, its z_j turns the column, z_j x (z_i x d_i); where it comes
-        behind, it moves the end of its arm, z_i x (z_j x d_j): in LOCAL_WORLD_ALIGNED the linear rows are
-        symmetric in i and j but for the rates of one planar or floating joint, the angular ones never are.
-        WORLD has the first kind alone, LOCAL the second.
+        behind, it moves the end of its arm, z_i x (z_j x d_j). WORLD has the first kind alone, LOCAL the
+        second.
+
+        In LOCAL_WORLD_ALIGNED, but for the rates of one floating joint, the angular rows at [i, j] and [j, i]
+        differ by w_j x w_i, the angular rows of the Jacobian: not at all where these are parallel, and on a
+        planar arm the angular rows are 0. The linear rows are symmetric in i and j, but for the rates of one
+        planar or floating joint.
 
         Args:
             q: (..., nq) rad, m.
@@ -807,9 +823,10 @@ class Robot(Shown):
     ) -> SingularValues:
         """The singular values of `jacobian` with guaranteed bounds, their condition and manipulability.
 
-        They are the same in LOCAL and LOCAL_WORLD_ALIGNED. Of "all" rows, metres and radians are mixed as SI
-        units mix them. How far J can be off, and what the decomposition rounds, is in the bounds. Their
-        product's gradient is `found.manipulability_gradient(robot.hessian(q, frame))`.
+        They are the same in LOCAL and LOCAL_WORLD_ALIGNED. Columns that are 0 for every q are left out. Of
+        "all" rows, metres and radians are mixed as SI units mix them. How far J can be off, and what the
+        decomposition rounds, is in the bounds. Their product's gradient is
+        `found.manipulability_gradient(robot.hessian(q, frame))`.
 
         Args:
             q: (..., nq) rad, m.
@@ -841,7 +858,7 @@ class Robot(Shown):
         size = magnitudes(call.plan, call.q, None, None, call.state)
         bound = JACOBIAN.bound(call.plan, size, _ALIGNED)
         error = (EPS * bound.k * bound.scale)[:, 0].reshape(*call.shape, 6, self.nv)
-        moving = np.asarray((bound.scale[:, 0, which] > 0.0).any(axis=(0, 1)))
+        moving = np.asarray(movable(call.plan)[0, which].any(axis=0))
         return singular_values(J, error, moving, which)
 
     def analytical_jacobian(

@@ -50,7 +50,8 @@ from urdfkin.urdf.origin import Origin
 #: Where a user's numbers pass on their way to the result, and on their way to Pinocchio.
 MODULES = (
     "verify.asked", "verify.call", "model.chain", "model.configuration", "model.coupling", "dh.to_tree",
-    "verify.followers", "model.frame_names", "verify.made_of_table", "kinematics.bodies.representation",
+    "model.given", "verify.followers", "model.frame_names", "verify.made_of_table",
+    "kinematics.bodies.representation",
     "verify.pinocchio", "verify.pinocchio_base", "verify.pinocchio_frames", "verify.pinocchio_layout",
     "model.base_motion", "compiled.batch", "compiled.evaluate", "compiled.plan", "compiled.program",
     "model.reference", "robot", "kinematics.rotation.aligning", "kinematics.inputs",
@@ -95,6 +96,13 @@ URDF = (
 )
 
 
+#: What its coordinates are called, in order.
+COORDINATES = (
+    "b", "slide", "turn", *(f"free.{x}" for x in ("x", "y", "z", "qx", "qy", "qz", "qw")),
+    *(f"table.{x}" for x in ("x", "y", "angle")),
+)  # fmt: skip
+
+
 def results() -> Iterator[tuple[str, Callable[[Robot], FloatArray]]]:
     """Every way to be handed a result, by name; the same inputs each time."""
     generator = np.random.default_rng(3)
@@ -125,6 +133,17 @@ def results() -> Iterator[tuple[str, Callable[[Robot], FloatArray]]]:
     yield "accelerations", lambda r: r.acceleration(q, v, a, ["f", "g", "link:b"], "world", base=moves)
     yield "analytical jacobian", lambda r: r.analytical_jacobian(q, "f", "xyz", base=moves)
     yield "of a quaternion", lambda r: r.analytical_jacobian(one[0], "link:b", "quaternion", base=stands)
+    named = dict(zip(COORDINATES, np.moveaxis(q, -1, 0), strict=True))
+    yield "placement by names", lambda r: r.placement(named, "f")
+    of_joint = {
+        "table": q[..., 10:],
+        **{name: x for name, x in named.items() if not name.startswith("table.")},
+    }
+    yield "placement by a joint's name", lambda r: r.placement(of_joint, "h")
+    written = "neutral, turn=0.3rad, table.y=5mm, free.x = 0.25, slide=-0.5, b=30deg, table.angle=pi/5"
+    yield "placements by a text", lambda r: r.placement(written, r.link_frames)
+    rates = "neutral, table.vx=5mm/s, free.wy=0.25, slide=-0.5, b=30deg/s"
+    yield "velocities by a text", lambda r: r.velocity(one[0], rates, ["f", "h", "g"])
     yield "breakdown", lambda r: r.acceleration_breakdown(q, v, a, "f", base=moves).total
     yield "table", lambda r: _by_table(r, q)
     yield "robot of a table", lambda r: _of_table(q[..., :3])

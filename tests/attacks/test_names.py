@@ -71,6 +71,14 @@ def test_an_exact_name_wins() -> None:
     assert robot.certificate().verified
 
 
+def test_a_placement_relative_to_a_link_frame_is_relative_to_that_link() -> None:
+    robot = loaded(LIKE_OURS)
+    seen = robot.relative_placement([0.0, 0.0], "base", LinkFrame.of("foo"))
+    assert seen[:3, 3].tolist() == [-1.0, 0.0, 0.0]
+    assert robot.relative_placement([0.0, 0.0], "base", "link:foo")[:3, 3].tolist() == [-1.0, -2.0, 0.0]
+    assert robot.certificate().verified
+
+
 def test_pinocchio_resolves_names_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     # As it was once: a prefix first.
     right = KinematicTree.frame_link

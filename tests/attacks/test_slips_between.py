@@ -38,6 +38,12 @@ FRAGMENTS = [
     ("verify.call", "base.state(self.shape)", "base.state(self.shape)[::-1]"),
     ("verify.call", "self.reference = Reference.of(reference)",
      "self.reference = Reference.LOCAL_WORLD_ALIGNED"),
+    ("verify.call", "result.shape[1 if self.several else 2 :]", "result.shape[1:]"),
+    ("verify.call", "return False, (frame,)", "return True, (frame,)"),
+    # numbers by name
+    ("model.given", "return {at + k: x[..., k] for k in range(size)}",
+     "return {at + k: x[..., -1 - k] for k in range(size)}"),
+    ("model.given", "            out[..., i] = x\n", "            out[..., i - 1] = x\n"),
     # configurations, coordinates, followers
     ("model.configuration", "quaternion[...] = unit_quaternions(", "_ = unit_quaternions("),
     ("kinematics.rotation.quaternion", "normalised: FloatArray = quat / norms",

@@ -18,8 +18,9 @@ from urdfkin.dh.make import dh_table
 from urdfkin.dh.row import Convention
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.kinematics.rotation.euler import rotation_from_rpy
 from urdfkin.model.chain import FrameChain, chain
-from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit
 
 EPS = float(np.finfo(np.float64).eps)
 CONVENTIONS = ("standard", "modified")
@@ -71,6 +72,25 @@ def test_on_many_more_chains_the_table_is_exact_and_short(
     assert max(residual(table, path, configurations(len(path.joint_names)))) <= 1.0
     longest = max((max(abs(row.a), abs(row.d)) for row in table.rows), default=0.0)
     assert longest <= LENGTH_BOUND * reach_of(path)
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+@pytest.mark.parametrize("tilt", [0.0101, 0.0129, 0.02, 0.04, 0.2])
+def test_a_first_axis_close_to_the_bases_x_keeps_within_the_tables_tolerance(
+    tilt: float, convention: str
+) -> None:
+    for k in range(100):
+        T = np.eye(4)
+        T[:3, :3] = rotation_from_rpy([np.pi / 2, 0.0, np.pi / 2 + tilt * (1.0 + k * 1e-8)])
+        z = np.array([0.0, 0.0, 1.0])
+        turn = Joint("turn", JointKind.REVOLUTE, 1, np.eye(4), z, Limit(-1.0, 1.0, 1.0, 1.0))
+        joints = Joint("tilt", JointKind.FIXED, 0, T, z), turn, Joint("end", JointKind.FIXED, 2, np.eye(4), z)
+        tree = KinematicTree("tilted", ("base", "mount", "link", "tip"), joints)
+        for ends in (("tip", "base"), ("base", "tip")):
+            path, table = chain(tree, *ends), dh_table(tree, *ends, convention)
+            q = configurations(1)
+            off = np.abs(table.placement(q) - path.placement(q))[:, :3, :3].max(axis=(1, 2))
+            assert (off <= table.tolerance(q)[1]).all()
 
 
 @pytest.mark.slow

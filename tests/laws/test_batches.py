@@ -1,9 +1,12 @@
 """A batch is its samples, whatever its shape, its memory and the thread that computes it."""
 
+import math
 import tracemalloc
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -196,6 +199,62 @@ def test_an_out_that_cannot_be_used_is_refused_and_left_alone() -> None:
     with pytest.raises(InputError, match="share memory"):
         six.velocity(six.sample(3, 8), v, "tool0", out=v)
     assert (v == 1.0).all()
+
+
+class Subclass(np.ndarray):
+    """An array whose methods might do anything."""
+
+
+#: What has the kind, the shape and the order of a plain array.
+NOT_PLAIN: dict[str, Callable[[tuple[int, ...]], Any]] = {
+    "matrix": lambda shape: np.matrix(np.zeros(shape)),
+    "masked": np.ma.zeros,
+    "subclass": lambda shape: np.zeros(shape).view(Subclass),
+    "not aligned": lambda shape: (
+        np.zeros(8 * math.prod(shape) + 8, np.uint8)[1:-7].view(float).reshape(shape)
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", NOT_PLAIN)
+@pytest.mark.filterwarnings("ignore:the matrix subclass:PendingDeprecationWarning")
+def test_an_out_that_is_no_plain_array_is_refused_before_a_kernel_writes(kind: str) -> None:
+    robot = load("ur5", verify=False)
+    q, one, table = robot.sample(1, 1)[0], NOT_PLAIN[kind]((6, 6)), NOT_PLAIN[kind]((4, 4))
+    prepared, compiled = robot.prepare("tool0"), robot.compiled("tool0")
+    calls = [
+        lambda: robot.jacobian(q, "tool0", out=one),
+        lambda: robot.jacobian(q, "tool0", out=one, threads=1),
+        lambda: robot.jacobian_rate(q, q, "tool0", out=one),
+        lambda: robot.analytical_jacobian(q, "tool0", out=one),
+        lambda: robot.velocity(np.tile(q, (6, 1)), q, "tool0", out=one),
+        lambda: robot.relative_placement(q, "tool0", "base_link", out=table),
+        lambda: prepared.jacobian(q, out=one),
+        lambda: prepared.placement(q, out=table),
+        lambda: compiled.jacobian(q, out=one),
+        lambda: compiled.placement(q, out=table),
+    ]
+    for call in calls:
+        with pytest.raises(InputError, match="out must be a writable C-contiguous float64 array"):
+            call()
+    assert not np.asarray(one).any()
+    assert not np.asarray(table).any()
+
+
+def test_an_out_may_be_a_file_in_memory(tmp_path: Path) -> None:
+    robot = load("ur5")
+    q = robot.sample(5, 1)
+    out = np.memmap(tmp_path / "jacobians", np.float64, "w+", shape=(5, 6, 6))
+    assert robot.jacobian(q, "tool0", out=out) is out
+    assert (out == robot.jacobian(q, "tool0")).all()
+
+
+def test_a_q_of_views_of_out_is_read_before_out_is_written() -> None:
+    robot = load("ur5")
+    expected = robot.velocity(robot.sample(2, 1), np.ones(6), "tool0")
+    out = robot.sample(2, 1)
+    assert robot.velocity([out[0], out[1]], np.ones(6), "tool0", out=out) is out
+    assert (out == expected).all()
 
 
 @pytest.mark.slow

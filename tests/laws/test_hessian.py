@@ -116,6 +116,14 @@ def test_which_of_two_joints_turns_first_does_matter_by_the_product_of_their_axe
     np.testing.assert_allclose(H[:, 3:] - H[:, 3:].swapaxes(-1, -2), curl, rtol=0, atol=1e-14)
 
 
+def test_on_a_planar_arm_the_angular_rows_are_zero() -> None:
+    arm = urdfkin.load("planar_two_link", verify=False)
+    assert not arm.hessian(arm.sample(5), arm.tip_frame)[:, 3:].any()
+    spatial = urdfkin.load("ur5", verify=False)
+    H = spatial.hessian(spatial.sample(5), "tool0")[:, 3:]
+    assert np.abs(H - H.swapaxes(-1, -2)).max() > 0.1
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_from_one_reference_to_the_other_the_axes_and_the_point_move_too(name: str) -> None:
     robot = robot_of(name)

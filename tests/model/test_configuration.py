@@ -83,6 +83,19 @@ def test_pinocchios_layout_leads_back(mimic: bool) -> None:
     np.testing.assert_allclose(from_pinocchio(tree, there, mimic=mimic), q, atol=1e-14)
 
 
+@pytest.mark.parametrize("turns", [0, 1, -3])
+@pytest.mark.parametrize("angle", [-math.pi, math.pi, np.nextafter(-math.pi, 0.0), 3.0, -0.0])
+def test_an_angle_comes_back_in_one_turn_whose_two_ends_are_in_it(angle: float, turns: int) -> None:
+    tree = with_everything()
+    there = to_pinocchio(tree, np.full(4, angle + turns * math.tau), mimic=True)
+    back = from_pinocchio(tree, there, mimic=True)
+    found = back[[0, 3]]  # the wheel's, and the planar joint's
+    assert (np.abs(found) <= math.pi).all()
+    np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * angle), atol=1e-14)
+    if not turns:
+        assert (found == angle).all()
+
+
 @pytest.mark.parametrize(("off", "refused"), [(1e-12, False), (1e-8, True), (-1e-3, True), (0.5, True)])
 @pytest.mark.parametrize("name", ["slide", "gear"])
 def test_a_follower_that_does_not_follow_is_refused(name: str, off: float, refused: bool) -> None:

@@ -16,6 +16,7 @@ from tests.robots.odd_urdfs import urdf_of
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 from urdfkin.errors.measured import in_radians, measured
 from urdfkin.model.configuration import places
+from urdfkin.model.given import Places
 from urdfkin.robot import Robot
 
 #: The limits of echo narrow those of elbow, which a test relies on.
@@ -211,3 +212,189 @@ def test_a_text_of_any_length_is_refused_at_once(arm: Robot) -> None:
     ):
         with pytest.raises((InputError, UnknownNameError)):
             q_of(arm, text)
+
+
+class Series:
+    """As much of pandas' Series as matters here: labels, the number of each, and an array in order."""
+
+    def __init__(self, data: Any, index: Any) -> None:
+        self._data, self._index = np.array(data), list(index)
+
+    def keys(self) -> list[Any]:
+        return self._index
+
+    def __getitem__(self, label: Any) -> Any:
+        return self._data[self._index.index(label)]
+
+    def __len__(self) -> int:
+        return len(self._data)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
+        return np.array(self._data, dtype=dtype)
+
+
+class DataFrame(Series):
+    """Likewise: a column for each label."""
+
+    def __getitem__(self, label: Any) -> Any:
+        return self._data[:, self._index.index(label)]
+
+
+class Columns:
+    """A table of another library, such as polars', whose names are its columns'."""
+
+    def __init__(self, data: Any, columns: Any) -> None:
+        self._data, self.columns = np.array(data), list(columns)
+
+    def __getitem__(self, label: Any) -> Any:
+        return self._data[:, self.columns.index(label)]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
+        return np.array(self._data, dtype=dtype)
+
+
+SHUFFLED = ["elbow", "lift", "shoulder"]
+
+
+def test_a_series_is_read_by_its_labels_in_whatever_order(arm: Robot) -> None:
+    named = Series([1.25, 0.1, -0.5], SHUFFLED)
+    expected = arm.jacobian([0.1, -0.5, 1.25], "e")
+    np.testing.assert_array_equal(arm.jacobian(named, "e"), expected)
+    np.testing.assert_array_equal(arm.prepare("e").jacobian(named), expected)
+    np.testing.assert_array_equal(
+        arm.chain("e", "a").placement(named), arm.chain("e", "a").placement([0.1, -0.5, 1.25])
+    )
+    with pytest.raises(InputError, match="no value for elbow"):
+        arm.jacobian(Series([0.1, -0.5], ["lift", "shoulder"]), "e")
+    with pytest.raises(UnknownNameError, match="unknown coordinate 'elbo'; did you mean elbow"):
+        arm.jacobian(Series([0.1, -0.5, 1.0], ["lift", "shoulder", "elbo"]), "e")
+
+
+@pytest.mark.parametrize("kind", [DataFrame, Columns])
+def test_a_data_frame_is_a_batch_whose_columns_have_names(kind: Any, arm: Robot) -> None:
+    q = arm.sample(5, 3)
+    found = arm.placement(kind(q[:, [2, 0, 1]], SHUFFLED), "e")
+    np.testing.assert_array_equal(found, arm.placement(q, "e"))
+
+
+def test_labels_that_only_count_stand_for_the_order(arm: Robot) -> None:
+    expected = arm.placement([0.1, -0.5, 1.25], "e")
+    np.testing.assert_array_equal(arm.placement(Series([0.1, -0.5, 1.25], range(3)), "e"), expected)
+    np.testing.assert_array_equal(arm.placement(DataFrame([[0.1, -0.5, 1.25]], range(3)), "e")[0], expected)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (Series([1.25, 0.1, -0.5], [2, 0, 1]), "a coordinate is called by its name: found 2"),
+        (Series([0.1, -0.5, 1.25], ["lift", "shoulder", "lift"]), "q: a label stands twice: found 'lift'"),
+        ([Series([1.25, 0.1, -0.5], SHUFFLED)] * 2, "q: a list of tables with labels"),
+    ],
+    ids=["numbers in another order", "a label twice", "a list of them"],
+)
+def test_labels_that_cannot_be_meant_are_refused(given: Any, message: str, arm: Robot) -> None:
+    with pytest.raises(InputError) as caught:
+        arm.placement(given, "e")
+    assert message in str(caught.value)
+
+
+#: A planar joint `a`, whose first coordinate would be called as the joint `a.x` is.
+ALIKE = (
+    '<robot name="alike"><link name="o"/><link name="p"/><link name="s"/>'
+    '<joint name="a" type="planar"><parent link="o"/><child link="p"/><axis xyz="0 0 1"/></joint>'
+    '<joint name="a.x" type="revolute"><parent link="p"/><child link="s"/><origin xyz="1 0 0"/>'
+    '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+)
+
+
+def test_no_name_stands_for_two_coordinates() -> None:
+    robot = urdfkin.load(ALIKE)
+    assert robot.coordinate_names == ("a:x", "a:y", "a:angle", "a.x")
+    assert robot.rate_names == ("a.vx", "a.vy", "a.wz", "a.x")
+    moved = robot.placement("neutral, a.x=0.5", "s")
+    np.testing.assert_array_equal(moved, robot.placement([0.0, 0.0, 0.0, 0.5], "s"))
+    all_named = {"a:x": 0.1, "a:y": 0.2, "a:angle": 0.3, "a.x": 0.4}
+    np.testing.assert_array_equal(robot.placement(all_named, "s"), robot.placement([0.1, 0.2, 0.3, 0.4], "s"))
+    together: dict[str, Any] = {"a": [0.1, 0.2, 0.3], "a.x": 0.4}
+    np.testing.assert_array_equal(robot.placement(together, "s"), robot.placement([0.1, 0.2, 0.3, 0.4], "s"))
+    with pytest.raises(UnknownNameError, match=r"unknown coordinate 'a\.y'; did you mean .*a:y"):
+        robot.placement({"a.x": 0.5, "a.y": 1.0, "a.angle": 0.0}, "s")
+
+
+def test_a_joint_called_as_the_other_spelling_gets_another_one_still() -> None:
+    text = ALIKE.replace("</robot>", '<link name="t"/><joint name="a:y" type="fixed"><parent link="s"/>'
+                         '<child link="t"/></joint></robot>')  # fmt: skip
+    assert urdfkin.load(text).coordinate_names == ("a::x", "a::y", "a::angle", "a.x")
+
+
+def test_names_that_stand_for_two_numbers_never_set_one_of_them_to_zero() -> None:
+    twice = Places("q", ("a", "a"), ("rad", "rad"))
+    with pytest.raises(InputError, match="no value for a"):
+        twice.read({"a": 0.5})
+
+
+def swapped(places: Places, values: Any, where: str, rest: Any, *, right: Any = Places._by_name) -> Any:
+    """What a reading by name gives, its first two numbers exchanged."""
+    found = right(places, values, where, rest)
+    found[..., [0, 1]] = found[..., [1, 0]]
+    return found
+
+
+NAMED: dict[str, Any] = {
+    "a mapping": {"lift": 0.1, "shoulder": "30deg", "elbow": 1.0},
+    "a mapping with a batch": {"elbow": [1.0, 1.1], "lift": 0.1, "shoulder": [[0.2], [0.3]]},
+    "a text": "lift=100mm, shoulder = 30 deg, elbow=pi/3",
+    "a text with blanks": "elbow=pi / 3 lift=.1 shoulder=30 deg",
+    "a text with brackets": "[shoulder=30deg,lift=5mm,elbow=1]",
+    "a pose and a name": "ready, lift=.3",
+    "a series": Series([1.0, 0.1, -0.5], SHUFFLED),
+    "a data frame": DataFrame([[1.0, 0.1, -0.5], [1.1, 0.2, -0.6]], SHUFFLED),
+}
+
+
+@pytest.mark.parametrize("given", NAMED)
+def test_a_name_that_is_read_as_another_coordinate_is_a_disagreement(
+    given: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = urdfkin.load(ARM)
+    robot.placement(NAMED[given], "e")
+    assert robot.certificate().verified
+    monkeypatch.setattr(Places, "_by_name", swapped)
+    with pytest.raises(urdfkin.VerificationError):
+        robot.placement(NAMED[given], "e")
+
+
+@pytest.mark.parametrize("root_joint", ["planar", "floating"])
+def test_so_is_one_of_the_numbers_of_a_joint_that_has_several(
+    root_joint: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = urdfkin.load(ARM, root_joint=root_joint)
+    of_joint: dict[str, Any] = {
+        "root_joint": [0.1, 0.2, 0.3, *([0.0, 0.0, 0.6, 0.8] * (root_joint != "planar"))]
+    }
+    texts = "neutral, root_joint.x=0.1, root_joint.y=20mm", "neutral,root_joint.y=.5"
+    for q in (*texts, {"lift": 0.0, "shoulder": 0.1, "elbow": 1.0, **of_joint}):
+        robot.placement(q, "e")
+    v = "neutral, root_joint.vx=0.1, root_joint.wz=3deg/s"
+    robot.velocity("neutral", v, "e")
+    assert robot.certificate().verified
+    monkeypatch.setattr(Places, "_by_name", swapped)
+    for q in (*texts, {"lift": 0.0, "shoulder": 0.1, "elbow": 1.0, **of_joint}):
+        with pytest.raises(urdfkin.VerificationError):
+            robot.placement(q, "e")
+    with pytest.raises(urdfkin.VerificationError):
+        robot.velocity(robot.neutral(), v, "e")
+
+
+def test_names_that_are_hard_to_tell_from_the_text_around_are_found_by_both() -> None:
+    hard = {"lift": "a=b", "shoulder": "a", "elbow": "b (left).x"}
+    text = ARM
+    for name, other in hard.items():
+        text = text.replace(f'"{name}"', f'"{other}"')
+    robot = urdfkin.load(text)
+    q = robot.coordinate_names
+    assert set(q) == set(hard.values())
+    for written in ("a=b=5mm, a=1deg, b (left).x=1.0", "neutral, a=1", "neutral,b (left).x=pi/4,a=b=.1"):
+        robot.placement(written, "e")
+    assert robot.certificate().verified
+    assert urdfkin.load(ALIKE).placement({"a:x": 0.1, "a:y": 0.2, "a:angle": 0.3, "a.x": 0.4}, "s").any()

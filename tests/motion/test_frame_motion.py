@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.verify.test_singular_values import SLIDE
 from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.robot import Robot
 from urdfkin.verify.pinocchio import Oracle
@@ -61,3 +62,26 @@ def test_a_frame_that_nothing_moves_has_no_manipulability() -> None:
     q = robot.sample(N, 0)
     still = np.zeros_like(q)
     assert not frame_motion(robot, q, still, still, "base_link").manipulability().any()
+
+
+@pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
+@pytest.mark.parametrize("rows", [slice(0, 6), slice(0, 3), slice(3, 6)], ids=["all", "linear", "angular"])
+def test_one_configuration_alone_and_in_a_batch_have_the_same_manipulability(
+    rows: slice, reference: str
+) -> None:
+    robot = urdfkin.load(SLIDE)
+    q, still = np.array([[0.3, 0.0], [0.3, 1.0]]), np.zeros((2, 2))
+    both = frame_motion(robot, q, still, still, "c", reference).manipulability(rows)
+    for k in range(2):
+        one = slice(k, k + 1)
+        alone = frame_motion(robot, q[one], still[one], still[one], "c", reference).manipulability(rows)
+        assert alone.tolist() == both[one].tolist()
+
+
+@pytest.mark.parametrize("rows", ["all", "linear", "angular"])
+def test_manipulability_is_the_robots_own(rows: str) -> None:
+    robot, part = urdfkin.load(SLIDE), {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
+    q, still = np.array([[0.3, 0.0], [0.3, 1.0]]), np.zeros((2, 2))
+    found = frame_motion(robot, q, still, still, "c").manipulability(part[rows])
+    expected = robot.singular_values(q, "c", rows).manipulability.value
+    np.testing.assert_allclose(found, expected, rtol=1e-14)

@@ -8,10 +8,12 @@ from urdfkin.compiled.plan import Plan
 from urdfkin.kinematics.roundings import EPS, of_joints
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify import bounds
+from urdfkin.verify import bounds, imu, relative
 from urdfkin.verify.bounds import Bound
-from urdfkin.verify.magnitudes import Magnitudes
+from urdfkin.verify.call import Call
+from urdfkin.verify.magnitudes import Magnitudes, magnitudes
 from urdfkin.verify.quantities import ACCELERATION, HESSIAN, JACOBIAN, JACOBIAN_RATE, PLACEMENT, VELOCITY
+from urdfkin.verify.witnesses import PINOCCHIO
 
 #: A turning joint, one that slides twice as far as the coordinate before it says.
 ARM = """<robot name="r">
@@ -110,6 +112,56 @@ def test_a_hessian_has_three_for_each_product_that_a_pair_is_summed_from(
 def test_an_imus_reading_has_gravity_as_one_term_more(plan: Plan) -> None:
     scale = bounds.imu_scale(sizes(), np.array([3.0, 0.0, 4.0]))[0, 0]
     assert scale.tolist() == [*[ACC + W * VEL + 5.0] * 3, *[W] * 3]
+
+
+def test_an_imus_reading_is_held_to_that_scale_and_to_an_accelerations_factors() -> None:
+    robot = urdfkin.load(ARM)
+    inputs = np.array([[0.3, 0.5], [1.5, -2.0], [0.7, 0.2]])
+    call = Call(robot.tree, robot.plan, "l3", LOCAL, None, list(inputs), gravity=[3.0, 0.0, 4.0])
+    part = call.part(slice(0, 1))
+    _, bound = imu.held_against(robot.verifier.oracle(), part, np.zeros((1, 1, 6)), PINOCCHIO)
+    v, a = part.rates
+    size = magnitudes(part.plan, part.q, v, a, part.state)
+    linear, angular, k = six(bound)
+    assert linear == size.acc[0, 0] + size.w[0, 0] * size.vel[0, 0] + 5.0
+    assert angular == size.w[0, 0]
+    assert k == 24.0 * JOINTS * 4
+
+
+def test_a_relative_placement_is_held_to_both_paths() -> None:
+    robot = urdfkin.load(ARM)
+    call = Call(robot.tree, robot.plan, "l3", ALIGNED, None, ([0.3, 0.5],), also=("l2",), relative_to="l2")
+    part = call.part(slice(0, 1))
+    _, bound = relative.held_against(
+        PLACEMENT.bound, robot.verifier.oracle(), part, np.zeros((1, 1, 4, 4)), PINOCCHIO
+    )
+    size = magnitudes(part.plan, part.q, None, None, part.state)
+    assert (bound.scale[0, 0, :3, 3] == size.p.sum()).all()
+    assert (bound.scale[0, 0, :3, :3] == 1.0).all()
+    assert bound.k.ravel().tolist() == [24.0 * (JOINTS + 2.0 * (JOINTS - 1.0))]
+
+
+@pytest.mark.parametrize(
+    ("frame", "reference", "linear"),
+    [
+        ("l1", ALIGNED, [False, False]),  # on the axis of the turn, with no length behind it
+        ("l2", ALIGNED, [True, True]),
+        ("l3", LOCAL, [True, True]),
+        ("l3", WORLD, [False, True]),  # the axis of the turn goes through the world's origin
+        ("l0", ALIGNED, [False, False]),
+    ],
+)
+def test_which_columns_can_be_anything_but_0_is_the_robots(
+    frame: str, reference: Reference, linear: list[bool]
+) -> None:
+    robot = urdfkin.load(ARM)
+    found = bounds.movable(robot.plan([robot.tree.frame_link(frame)]), reference)
+    assert found.shape == (1, 6, 2)
+    assert found[0, :3].tolist() == [linear] * 3
+    assert found[0, 3:].tolist() == [[frame != "l0", False]] * 3
+    J = robot.jacobian(robot.sample(20, 1) + 0.01, frame, reference)
+    assert (found[0] | (J == 0.0)).all()
+    assert (np.abs(J).max(axis=(0, 1))[found[0].any(axis=0)] > 0.0).all()
 
 
 def test_rates_of_angles_grow_as_the_square_of_the_distance_from_the_singularity(plan: Plan) -> None:

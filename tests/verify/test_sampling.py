@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from urdfkin.errors import InputError
 from urdfkin.verify.sampling import draw, draw_base, special
 
 
@@ -40,3 +41,14 @@ def test_a_base_is_placed_and_moves_otherwise_in_every_sample() -> None:
         sizes = np.sqrt((rates**2).mean(axis=-1))
         assert 80.0 < sizes[::8].mean() < 120.0
         assert 0.8 < np.delete(sizes, np.s_[::8]).mean() < 1.2
+
+
+def test_more_configurations_than_memory_holds_are_refused_in_one_line() -> None:
+    robot = urdfkin.load("ur5", verify=False)
+    with pytest.raises(InputError) as caught:
+        robot.sample(10**15)
+    assert str(caught.value) == (
+        "ur5: so many configurations do not fit into memory: found n = 1000000000000000, which are "
+        "48000000 GB; draw them in parts, each with a seed of its own"
+    )
+    assert caught.value.__cause__ is None

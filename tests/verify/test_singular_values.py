@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import urdfkin
 from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -18,7 +19,7 @@ from urdfkin.verify.exact.decimals import read_exact
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.exact.vectors import exact, mp
 from urdfkin.verify.quantities import JACOBIAN
-from urdfkin.verify.singular_values import Between, SingularValues, singular_values
+from urdfkin.verify.singular_values import Between, SingularValues, _skew, singular_values
 
 ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 
@@ -90,11 +91,200 @@ def test_any_matrixs_lie_between_whatever_their_size_and_rank(
     assert (found.values.upper - found.values.lower <= 1e-12 * found.values.value[0]).all()
 
 
+@pytest.mark.parametrize("exponent", [-1040, -700, -500, 500, 900])
+@pytest.mark.parametrize("deficient", [False, True])
+def test_they_lie_between_however_small_or_large_the_matrix_is(exponent: int, deficient: bool) -> None:
+    A = np.random.default_rng(5).standard_normal((3, 4))
+    if deficient:
+        A[2] = A[0] + A[1]
+    A = np.ldexp(A, exponent)
+    found = singular_values(A, np.abs(A) * 2.0**-52, np.ones(4, dtype=bool))
+    unit = mp.mpf(2) ** exponent
+    scaled = np.vectorize(lambda x: exact(x) / unit, otypes=[object])(A)
+    true = [x * unit for x in true_values(scaled)]
+    assert holds(found.values, true)
+    assert holds(Between(*(np.array([x]) for x in found.manipulability)), [mp.fprod(true)])
+    room = 1e-12 * found.values.value[0] + 1e-306  # below, the smallest normal number hides digits
+    assert (found.values.upper - found.values.lower <= room).all()
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-147, 1e-160, 1e-200, 1e-300])
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+def test_a_singular_arm_of_any_size_is_never_proven_to_be_regular(size: float) -> None:
+    # Both levers point the same way where the second joint is at 0.
+    joint = (
+        '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/><origin xyz="{4!r} {5!r} 0"/>'
+        '<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'
+    )
+    joints = [
+        joint.format("j", "revolute", "a", "b", 0.0, 0.0),
+        joint.format("k", "revolute", "b", "c", 0.7 * size, 0.3 * size),
+        joint.format("t", "fixed", "c", "d", 1.4 * size, 0.6 * size),
+    ]
+    links = "".join(f'<link name="{name}"/>' for name in "abcd")
+    robot = urdfkin.load(f'<robot name="r">{links}{"".join(joints)}</robot>')
+    q = np.stack([np.linspace(-3.0, 3.0, 200), np.zeros(200)], axis=-1)
+    found = robot.singular_values(q, "d", "linear")
+    assert (found.values.lower[:, 1] == 0.0).all()
+    assert (found.values.lower[:, 0] > 1.5 * size).all()
+
+
+@pytest.mark.parametrize(
+    ("sizes", "product"),
+    [
+        ((1e-200, 1e-200), mp.mpf("1e-400")),
+        ((1e-200, 1e-200, 1e200, 1e200), mp.mpf(1)),
+        ((1e200, 1e200, 1e-300), mp.mpf("1e100")),
+        ((1e200, 1e200), mp.mpf("1e400")),
+        ((2e-162, 1.5e-162), mp.mpf("3e-324")),
+    ],
+)
+def test_a_product_lies_between_where_a_part_of_it_is_beyond_all_numbers(
+    sizes: tuple[float, ...], product: mpmath.mpf
+) -> None:
+    values = np.array(sorted(sizes, reverse=True))
+    bounds = Between(values, values * (1.0 - 1e-15), values * (1.0 + 1e-15))
+    found = SingularValues(slice(None), bounds, np.eye(len(sizes)), np.eye(len(sizes)))
+    assert holds(Between(*(np.array([x]) for x in found.manipulability)), [product])
+    assert holds(Between(*(np.array([x]) for x in found.condition)), [exact(values[0]) / exact(values[-1])])
+
+
+# -- each term of the bounds is needed -----------------------------------------------------------------
+
+
+def test_what_the_matrix_may_be_off_by_is_in_the_bounds() -> None:
+    A, off = np.diag([2.0, 1.0]), np.full((2, 2), 1e-6)
+    found = singular_values(A, off, np.ones(2, dtype=bool))
+    for sign in (1.0, -1.0):
+        true = true_values(np.vectorize(exact, otypes=[object])(A + sign * off))
+        assert holds(found.values, true)
+    # All of it: what is off by the same in every number moves one of them by its norm.
+    alone = singular_values(np.zeros((2, 2)), off, np.ones(2, dtype=bool))
+    assert holds(alone.values, true_values(np.vectorize(exact, otypes=[object])(off)))
+    assert alone.values.upper[0] == pytest.approx(2e-6, rel=1e-12)
+
+
+def decomposed(seed: int, values: tuple[float, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rotations that are right to rounding, and values between them."""
+    generator = np.random.default_rng(seed)
+    U, V = (np.linalg.qr(generator.standard_normal((3, 3)))[0] for _ in range(2))
+    return U, np.array(values), V.T.copy()
+
+
+def holds_with(
+    monkeypatch: pytest.MonkeyPatch, A: FloatArray, svd: tuple[FloatArray, FloatArray, FloatArray]
+) -> bool:
+    """Whether the true values lie between the bounds that are made of this decomposition of a matrix."""
+    true = true_values(np.vectorize(exact, otypes=[object])(A))
+    with monkeypatch.context() as patched:
+        patched.setattr(np.linalg, "svd", lambda *_, **__: svd)
+        return holds(singular_values(A, np.zeros(A.shape), np.ones(A.shape[1], dtype=bool)).values, true)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_decomposition_that_leaves_a_residual_is_not_believed(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    U, s, Vt = decomposed(seed, (3.0, 2.0, 1.0))
+    A = (U * s) @ Vt
+    for wrong in ([1e-9, 0.0, 0.0], [0.0, -1e-9, 0.0], [0.0, 0.0, 1e-9]):
+        assert holds_with(monkeypatch, A, (U, s + np.array(wrong), Vt))
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("size", [1.0 + 1e-9, 1.0 - 1e-9])
+def test_a_decomposition_that_is_askew_is_not_believed(
+    seed: int, side: int, size: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    U, s, Vt = decomposed(seed, (3.0, 2.0, 1.0))
+    A = (U * s) @ Vt
+    scaled = (U * size, s / size, Vt) if side == 0 else (U, s / size, Vt * size)
+    assert holds_with(monkeypatch, A, scaled)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_the_residual_itself_is_rounded_by_is_in_the_bounds(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    U, s, Vt = decomposed(seed, (1.0, 1e-12, 1e-13))
+    A = (U * s[np.newaxis, :]) @ Vt
+    assert not np.abs(A - (U * s[np.newaxis, :]) @ Vt).any(), "the residual, as it is computed, is 0"
+    assert holds_with(monkeypatch, A, (U, s, Vt))
+
+
+def test_products_that_underflow_are_in_the_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    # 256 times a sixteenth of 1,607 of the smallest numbers, 100.4375, is as many times 100.
+    least = 5e-324
+    A, svd = np.full((1, 256), 100 * least), (np.eye(1), np.array([1607 * least]), np.full((1, 256), 1 / 16))
+    monkeypatch.setattr(np.linalg, "svd", lambda *_, **__: svd)
+    values = singular_values(A, np.zeros(A.shape), np.ones(256, dtype=bool)).values
+    assert values.lower[0] <= 1600 * least <= values.upper[0]
+
+
+def test_the_product_that_shows_what_is_askew_rounds_too() -> None:
+    # Of three columns and rows: five eps for the sum of each number's terms, here 1 or 0.
+    assert _skew(np.eye(3)) == pytest.approx(5.0 * EPS * np.sqrt(3.0), rel=1e-12, abs=0.0)
+
+
+def test_the_bounds_are_rounded_outward() -> None:
+    # A norm of three equal numbers, a product, a quotient: each is rounded either way.
+    generator = np.random.default_rng(1)
+    for x, y in generator.uniform(1.0, 2.0, (50, 2)):
+        off = singular_values(np.zeros((1, 3)), np.full((1, 3), x), np.ones(3, dtype=bool))
+        assert exact(float(off.values.upper[0])) ** 2 >= 3 * exact(x) ** 2
+        values = np.array([max(x, y), min(x, y)])
+        found = SingularValues(slice(None), Between(values, values, values), np.eye(2), np.eye(2))
+        for between, true in (
+            (found.manipulability, exact(x) * exact(y)),
+            (found.condition, exact(values[0]) / exact(values[1])),
+        ):
+            assert exact(float(between.lower)) < true < exact(float(between.upper))
+
+
 def test_what_is_beyond_all_numbers_bounds_nothing() -> None:
     huge = singular_values(np.full((2, 2), 1e200), np.full((2, 2), np.inf), np.ones(2, dtype=bool))
     assert (huge.values.lower == 0.0).all()
     assert np.isinf(huge.values.upper).all()
     assert np.isinf(huge.condition.upper)
+
+
+#: A joint that turns, one that slides outward from it; at slide 0 the frame lies on the first one's axis.
+SLIDE = (
+    '<robot name="slide"><link name="a"/><link name="b"/><link name="c"/>'
+    '<joint name="turn" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    '<limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'
+    '<joint name="slide" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="1 0 0"/>'
+    '<limit lower="0" upper="2" effort="1" velocity="1"/></joint></robot>'
+)
+
+
+@pytest.mark.parametrize("rows", ROWS)
+def test_one_configuration_alone_and_in_a_batch_have_the_same_singular_values(rows: str) -> None:
+    robot = urdfkin.load(SLIDE)
+    alone = robot.singular_values([0.3, 0.0], "c", rows)
+    batch = robot.singular_values([[0.3, 0.0], [0.3, 1.0]], "c", rows)
+    for one, many in ((alone.values, batch.values), (alone.condition, batch.condition)):
+        np.testing.assert_array_equal(np.stack(one), np.stack(many)[:, 0])
+    np.testing.assert_array_equal(np.stack(alone.manipulability), np.stack(batch.manipulability)[:, 0])
+    H = robot.hessian([0.3, 0.0], "c")
+    np.testing.assert_array_equal(
+        alone.manipulability_gradient(H), batch.manipulability_gradient(np.stack([H, H]))[0]
+    )
+
+
+def test_at_the_pole_of_a_slide_the_manipulability_is_zero() -> None:
+    found = urdfkin.load(SLIDE).singular_values([0.3, 0.0], "c", "linear")
+    assert found.values.value.tolist() == pytest.approx([1.0, 0.0], abs=1e-15)
+    assert found.manipulability.lower == 0.0
+    assert np.isinf(found.condition.upper)
+
+
+@pytest.mark.parametrize("base", [None, BaseMotion(np.block([[np.eye(3), np.ones((3, 1))], [0, 0, 0, 1]]))])
+def test_which_columns_count_does_not_depend_on_where_the_base_stands(base: BaseMotion | None) -> None:
+    robot = urdfkin.load(SLIDE)
+    assert robot.singular_values([0.3, 0.0], "b", "linear", base=base).values.value.shape == (0,)
+    assert robot.singular_values([0.3, 0.0], "c", "linear", base=base).values.value.shape == (2,)
 
 
 def test_a_frame_that_no_rate_moves_has_none() -> None:

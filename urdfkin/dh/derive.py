@@ -300,7 +300,8 @@ def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, 
     base[:3, 3] = [cleaned_length(component, reach, noise.metres) for component in p - offset * z]
     if tilt_of(A) <= noise.radians:  # the base's own z, either way up
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    x = np.array([1.0, 0.0, 0.0]) - z[0] * z
+    # (1, 0, 0) - z_0 z for a unit vector z: the difference itself would cancel where z is close to x.
+    x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
     if np.linalg.norm(x) < NEARLY_PARALLEL:  # the axis runs along the base's x, whose shadow is a point
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)

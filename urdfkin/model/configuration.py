@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from typing import cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.errors.questions import Question
 from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, unit_quaternions
-from urdfkin.model.given import Given, Instead, Places
+from urdfkin.model.given import Given, Instead, Places, by_name
 from urdfkin.model.ranges import coordinate_ranges
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, frozen
 
@@ -26,17 +28,20 @@ _FOLLOWS_TO = 1e-9
 
 #: What is put behind the name of a joint that has several numbers, and what they are measured in.
 _OF_Q = {
-    JointKind.PLANAR: {".x": "m", ".y": "m", ".angle": "rad"},
-    JointKind.FLOATING: {".x": "m", ".y": "m", ".z": "m", ".qx": "", ".qy": "", ".qz": "", ".qw": ""},
+    JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
+    JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
 }
 _OF_RATES = {
-    JointKind.PLANAR: {".vx": "m", ".vy": "m", ".wz": "rad"},
-    JointKind.FLOATING: {".vx": "m", ".vy": "m", ".vz": "m", ".wx": "rad", ".wy": "rad", ".wz": "rad"},
+    JointKind.PLANAR: {"vx": "m", "vy": "m", "wz": "rad"},
+    JointKind.FLOATING: {"vx": "m", "vy": "m", "vz": "m", "wx": "rad", "wy": "rad", "wz": "rad"},
 }
 
 
 def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """A name for each number of `q`: the joint's, with a suffix where a joint has several."""
+    """A name for each number of `q`: the joint's, with a suffix where a joint has several.
+
+    They are `base.x`, `base.y`, ...; where another joint is itself called so, `base:x`, `base:y`, ...
+    """
     return tuple(name for name, _ in _named(tree, _OF_Q))
 
 
@@ -46,11 +51,20 @@ def rate_names(tree: KinematicTree) -> tuple[str, ...]:
 
 
 def _named(tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]) -> Iterator[tuple[str, str]]:
-    """A name and a unit for each number."""
+    """A name and a unit for each number; no two have the same name, nor one that of another joint."""
+    taken = set[str]()
     for joint in tree.joints:
-        if joint.nv:
-            own = of.get(joint.kind, {"": "rad" if joint.kind.turns else "m"})
-            yield from ((joint.name + suffix, unit) for suffix, unit in own.items())
+        if not joint.nv:
+            continue
+        if joint.kind not in of:
+            yield joint.name, "rad" if joint.kind.turns else "m"
+            continue
+        taken = taken or {other.name for other in tree.joints}
+        suffixes, separator = of[joint.kind], "."
+        while not taken.isdisjoint(names := [f"{joint.name}{separator}{suffix}" for suffix in suffixes]):
+            separator = ":" if separator == "." else separator + ":"
+        taken.update(names)
+        yield from zip(names, suffixes.values(), strict=True)
 
 
 def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
@@ -182,9 +196,9 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
 
 def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
     """q, v or a as float64 with the right last axis, as they are given (`urdfkin.model.given`)."""
-    if isinstance(value, Mapping | str):
-        return places(tree, what).read(value)
-    array, width = floats(value, what), tree.nq if what == "q" else tree.nv
+    if (named := by_name(value, what)) is not None:
+        return places(tree, what).read(named)
+    array, width = floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv
     if array.shape[-1:] != (width,):
         names = ", ".join(_names(tree, what)) or "none, nothing moves"
         instead = _other_lengths(tree, what).get(array.shape[-1]) if array.ndim else None
@@ -305,7 +319,7 @@ def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> 
 
 
 def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
-    """(..., nq) for (..., nq_pinocchio); angles of continuous and planar joints come back in (-pi, pi].
+    """(..., nq) for (..., nq_pinocchio); angles of continuous and planar joints come back in [-pi, pi].
 
     Raises:
         InputError: wrong length, a (cos, sin) pair that is no unit vector, or a follower that does not

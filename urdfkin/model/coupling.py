@@ -7,7 +7,7 @@ when the leader itself lies elsewhere on the robot.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,7 +16,7 @@ import numpy as np
 from urdfkin.errors import InputError
 from urdfkin.errors.questions import Question
 from urdfkin.model.configuration import numbers
-from urdfkin.model.given import Given, Instead, Places
+from urdfkin.model.given import Given, Instead, Places, by_name
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, frozen
 
 
@@ -91,8 +91,8 @@ class Coupling:
 
     def checked(self, array: Given, what: str) -> FloatArray:
         """`array`, "q", "v" or "a", as float64 with the path's number of coordinates on its last axis."""
-        if isinstance(array, Mapping | str):
-            return self.places(what).read(array)
+        if (named := by_name(array, what)) is not None:
+            return self.places(what).read(named)
         values = np.asarray(array, dtype=np.float64)
         if values.ndim == 0 or values.shape[-1] != len(self.names):
             raise InputError(

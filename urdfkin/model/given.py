@@ -2,15 +2,17 @@
 
 Text is numbers between commas or blanks (`0.3, 30deg, pi/2`, brackets allowed), or `NAME=NUMBER` between
 commas (`shoulder=30deg, elbow=pi/2`), or a pose (`ready`), which `NAME=NUMBER` behind it changes. A mapping
-has a number, an array of a batch, or such a text for each name. A missing name is an error, never 0.
+has a number, an array of a batch, or such a text for each name. A pandas Series or DataFrame, and any other
+table whose labels or columns have names, is read as a mapping. A missing name is an error, never 0.
 """
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -125,7 +127,7 @@ keeps: 'neutral, elbow=...'
                 found[i] = floats(number, place)
             else:
                 found |= self._of_a_joint(name, value, where)
-        missing = [name for name in self.names if index[name] not in found]
+        missing = [name for i, name in enumerate(self.names) if i not in found]
         if missing and rest is None:
             raise self._missing(missing, values, where)
         shapes = [x.shape for x in found.values()]
@@ -189,6 +191,47 @@ keeps: 'neutral, elbow=...'
                 remedy=f"it is in {kinds}{per}",
             )
         return value
+
+
+def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
+    """`value` where it gives its numbers by name, a table with labels as a mapping; None where by order.
+
+    Raises:
+        InputError: a label that stands twice; a list of tables with labels.
+
+    >>> by_name([0.5, 0.1], "q"), by_name("ready", "q"), by_name({"elbow": 0.5}, "q")
+    (None, 'ready', {'elbow': 0.5})
+    """
+    if isinstance(value, np.ndarray):
+        return None
+    if isinstance(value, Mapping | str):
+        return value
+    if isinstance(value, list | tuple):
+        if any(_labels(item) for item in value):
+            raise InputError(
+                "a list of tables with labels",
+                where=where,
+                found=f"{len(value)} of them",
+                remedy="give one table of them all, or numbers in order",
+            )
+        return None
+    labels = _labels(value)
+    if twice := [shown(label) for label, count in Counter(labels).items() if count > 1]:
+        raise InputError("a label stands twice", where=where, found=listed(twice))
+    table: Any = value
+    return {label: table[label] for label in labels} or None
+
+
+def _labels(value: object) -> list[Any]:
+    """A table's labels (pandas' `keys()`, `columns`, `column_names`); none where they only count."""
+    table: Any = value
+    if not hasattr(type(value), "__getitem__"):
+        return []
+    if hasattr(type(value), "keys"):
+        labels = list(table.keys())
+    else:
+        labels = list(getattr(table, "column_names", getattr(table, "columns", ())))
+    return [] if labels == list(range(len(labels))) else labels
 
 
 def wrong_count(

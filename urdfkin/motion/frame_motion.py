@@ -8,13 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urdfkin.compiled.breakdown import AccelerationBreakdown, acceleration_breakdown
 from urdfkin.errors.demands import word
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.verify.bounds import result_k
+from urdfkin.verify.bounds import movable, result_k
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, PLACEMENT, VELOCITY, Quantity, validated
 from urdfkin.verify.verifier import held_against
@@ -47,6 +48,7 @@ class FrameMotion:
         velocity: (n, 6) m/s, rad/s.
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
+        movable: (6, nv) which of the Jacobian's numbers can be anything but 0, whatever q is.
         parts: The acceleration by joint and kind.
         checks: What Pinocchio says of each quantity, by its name; empty where it cannot check the robot.
         not_verified: Why it cannot; None if it can.
@@ -58,6 +60,7 @@ class FrameMotion:
     velocity: FloatArray
     acceleration: FloatArray
     jacobian: FloatArray
+    movable: NDArray[np.bool_]
     parts: AccelerationBreakdown
     checks: dict[str, Check]
     not_verified: str | None
@@ -79,10 +82,11 @@ class FrameMotion:
     def manipulability(self, rows: slice = slice(0, 6)) -> FloatArray:
         """(n,) the product of the singular values of the Jacobian's `rows`: Yoshikawa's sqrt(det J J^T).
 
-        With fewer rates than rows J J^T has no volume; the product over the rates is what J^T J has.
+        With fewer rates than rows J J^T has no volume; the product over the rates is what J^T J has. Columns
+        that are 0 for every q are left out, as `Robot.singular_values` does.
         """
         part = self.jacobian[:, rows]
-        moving = np.abs(part).max(axis=(0, 1), initial=0.0) > 0.0
+        moving = self.movable[rows].any(axis=0)
         if not moving.any():
             return np.zeros(len(part))
         values = np.linalg.svd(part[:, :, moving], compute_uv=False)
@@ -125,6 +129,7 @@ def frame_motion(
         velocity,
         acceleration,
         jacobian,
+        movable(call.plan, reference)[0],
         call.compute(acceleration_breakdown, robot.tree, call.links[0], *inputs, reference),
         {} if reason else {row.name: _check(row, robot, call, results) for row, results in ours.items()},
         reason,

@@ -2,12 +2,16 @@
 
 `urdfkin.verify.call` brings the same arguments into shape for the recursion. The two share no code, so that a
 batch that is broadcast, reordered or read wrongly on the one way does not come out the same on the other.
+
+So are names: each is looked up again among the joints in their order, which the oracle compares with its own.
+The numbers of a pose, and how a number with a unit reads (`urdfkin.errors.measured`), are found once.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -16,9 +20,70 @@ from numpy.typing import ArrayLike
 
 from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import OracleError
+from urdfkin.errors.measured import measured
+from urdfkin.errors.numerals import decimal
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.pinocchio_base import BaseNumbers
+
+#: For so many rates of a joint: what its coordinates, or its rates, are called behind its name.
+_OF_Q = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
+_OF_RATES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
+
+
+class _Names:
+    """Where the number of each name is, in q or in v.
+
+    Args:
+        joints: The names of the joints, in order, and how many rates each has.
+        of: `_OF_Q` or `_OF_RATES`.
+
+    >>> names = _Names([("base", 3), ("elbow", 1)], _OF_Q)
+    >>> names.place("base.y"), names.place("base"), names.place("elbow")
+    (1, slice(0, 3, None), 3)
+    >>> names.pairs("ready, base.x = 5mm, elbow=pi / 2")
+    [('base.x', '5mm'), ('elbow', 'pi / 2')]
+    """
+
+    def __init__(self, joints: Sequence[tuple[str, int]], of: Mapping[int, tuple[str, ...]]) -> None:
+        self._joints, at = dict[str, tuple[int, tuple[str, ...]]](), 0
+        for joint, rates in joints:
+            own = of.get(rates, ())
+            self._joints[joint] = at, own
+            at += len(own) or 1
+
+    def place(self, name: str) -> int | slice:
+        """The index of a number, or of a joint's; raises OracleError where nothing is called so."""
+        if name in self._joints:
+            at, own = self._joints[name]
+            return slice(at, at + len(own)) if own else at
+        for joint, (at, own) in self._joints.items():
+            suffix = name.removeprefix(joint).lstrip(".:")
+            if name.startswith(joint) and suffix in own:
+                return at + own.index(suffix)
+        raise OracleError("no number is called so", found=repr(name[:60]))
+
+    def pairs(self, text: str) -> list[tuple[str, str]]:
+        """Each name that an equals sign follows in a text, and the number behind it."""
+        plain = " ".join(text.split())
+        plain = plain[1:-1].strip() if plain[:1] + plain[-1:] in ("[]", "()", "{}") else plain
+        names = [
+            f"{re.escape(joint)}(?:[.:]+(?:{'|'.join(own)}))?" if own else re.escape(joint)
+            for joint, (_, own) in self._joints.items()
+        ]
+        known = "|".join(sorted(names, key=len, reverse=True))
+        starts = list(re.finditer(rf"(?:^|(?<=[ ,]))({known}) ?= ?", plain))
+        ends = [*(match.start() for match in starts[1:]), len(plain)]
+        return [(m[1], plain[m.end() : end].strip(" ,")) for m, end in zip(starts, ends, strict=False)]
+
+
+def _number(text: str) -> float:
+    """In SI units."""
+    found = measured(text)
+    value = decimal(text) if found is None else found.value
+    if value is None:
+        raise OracleError("a number reads differently", found=repr(text[:60]))
+    return value
 
 
 class BaseRows(NamedTuple):
@@ -53,6 +118,8 @@ class Question:
         reference: A member or its name.
         base: None if it stands still.
         inputs: q, v, a as far as they were given: numbers that broadcast.
+        named: What of them was given by name, as it was given; None for the others.
+        joints: The names of the joints that have coordinates, in order, and how many rates each has.
     """
 
     def __init__(
@@ -61,14 +128,33 @@ class Question:
         reference: Reference | str,
         base: BaseNumbers | None,
         inputs: Sequence[ArrayLike],
+        named: Sequence[str | Mapping[str, ArrayLike] | None] = (),
+        joints: Sequence[tuple[str, int]] = (),
     ) -> None:
+        self._is_one = isinstance(frame, str)
         self.frames = (frame,) if isinstance(frame, str) else tuple(frame)
         self.reference, self.base = reference, base
-        self._given = inputs
+        self._given, self._named, self._joints = inputs, named or [None] * len(inputs), joints
+
+    def read(self) -> None:
+        """Read the numbers now, before what they may be views of is written to."""
+        _ = self._inputs
 
     @cached_property
     def _inputs(self) -> tuple[FloatArray, ...]:
-        return tuple(np.asarray(x, dtype=np.float64) for x in self._given)
+        return tuple(
+            np.asarray(x, dtype=np.float64) if given is None else self._by_name(np.array(x, float), given, of)
+            for x, given, of in zip(self._given, self._named, (_OF_Q, _OF_RATES, _OF_RATES), strict=False)
+        )
+
+    def _by_name(
+        self, x: FloatArray, given: str | Mapping[str, ArrayLike], of: Mapping[int, tuple[str, ...]]
+    ) -> FloatArray:
+        """`x` with each number that was given by a name where that name's coordinate or rate is."""
+        names = _Names(self._joints, of)
+        for name, value in given.items() if isinstance(given, Mapping) else names.pairs(given):
+            x[..., names.place(name)] = _number(value) if isinstance(value, str) else np.asarray(value, float)
+        return x
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -104,7 +190,7 @@ class Question:
         Raises:
             OracleError: it has another shape than the question.
         """
-        own = result.shape[result.ndim - axes :]
-        if result.shape not in ((*self.shape, *own), (*self.shape, len(self.frames), *own)):
+        own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
+        if result.shape != (*self.shape, *several, *own):
             raise OracleError("a result has another batch shape than what was asked", found=str(result.shape))
         return result.reshape(self.n, len(self.frames), *own)

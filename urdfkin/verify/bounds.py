@@ -26,8 +26,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from urdfkin.compiled.plan import Column, Plan
+from urdfkin.compiled.plan import Column, Geometry, Motion, Plan, Step
 from urdfkin.kinematics.lengths import chapter as eq
 from urdfkin.kinematics.lengths import norm, product
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, MUJOCO, ROUNDINGS, of_joints
@@ -279,6 +280,33 @@ def _column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
             weights[kind, place, plan.columns[c, Column.V]] += abs(plan.multipliers[c])
     weights.setflags(write=False)
     return weights[0], weights[1]
+
+
+def movable(plan: Plan, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
+    """(frames, 6, nv) which numbers of a Jacobian are not 0 for every q, the base being where it may.
+
+    The linear rows of a turning column are z x d. There d is 0 for every q where the path has no length and
+    nothing slides on it, from the joint to the frame, or in WORLD from the root to the joint.
+    """
+    found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
+    turns, multipliers = plan.steps[:, Step.KIND] == Motion.TURN, plan.geometry[:, Geometry.MULTIPLIER :]
+    extends = (plan.lengths[: len(turns)] > 0.0) | (~turns & (multipliers != 0.0).any(axis=1))
+    for f, (end, place) in enumerate(plan.frames):
+        path, step = list[int](), int(end)  # from the frame's step to the root's
+        while step >= 0:
+            path.append(step)
+            step = int(plan.parents[step])
+        if reference is Reference.WORLD:
+            levers = np.logical_or.accumulate(extends[path[::-1]])[::-1]
+        else:
+            levers = np.logical_or.accumulate([plan.lengths[len(turns) + f] > 0.0, *extends[path[:-1]]])
+        has_lever = dict(zip(path, levers, strict=False))
+        for c in np.flatnonzero((plan.leaders[f] >= 0) & (plan.multipliers != 0.0)):
+            column = plan.columns[c]
+            own = found[place, :, column[Column.V]]
+            own[:3] |= not column[Column.TURNS] or has_lever[column[Column.STEP]]
+            own[3:] |= column[Column.TURNS] == 1
+    return found
 
 
 def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:

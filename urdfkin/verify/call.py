@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,12 +15,15 @@ from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.errors.demands import shown
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.configuration import checked, numbers, shaped
-from urdfkin.model.given import Given
+from urdfkin.model.given import Given, by_name
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.asked import Question, Rows
 
 T = TypeVar("T")
+
+#: Arrays whose methods are NumPy's own.
+_PLAIN = np.ndarray, np.memmap
 
 
 class Part(NamedTuple):
@@ -76,14 +79,15 @@ class Call:
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
             raise InputError("base is a BaseMotion or None", found=type(base).__name__)
-        # By name they are told from the tree, whose names and order the oracle compares with its own.
+        named = [by_name(x, name) for x, name in zip(given, "qva", strict=False)]
         inputs: list[ArrayLike] = [
-            numbers(tree, x, name) if isinstance(x, Mapping | str) else x
-            for x, name in zip(given, "qva", strict=False)
+            cast("ArrayLike", x) if by is None else numbers(tree, by, name)
+            for x, by, name in zip(given, named, "qva", strict=False)
         ]
         self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
         self.several, self.frames = _frames(frame)
-        self.question = Question(frame, reference, base, inputs)
+        joints = [(joint.name, joint.nv) for joint in tree.joints if joint.nv] if any(named) else ()
+        self.question = Question(frame, reference, base, inputs, named, joints)
         self.reference = Reference.of(reference)
         self.links = tuple(tree.frame_link(name) for name in self.frames)
         self.plan = plan((*self.links, *(tree.frame_link(name) for name in also)))
@@ -121,16 +125,24 @@ class Call:
         return self.n * len(self.links)
 
     def flat(self, out: FloatArray | None, own: tuple[int, ...]) -> FloatArray | None:
-        """`out` as the kernels write it, (n, frames, ...); raises InputError if it cannot take the result."""
+        """`out` as the kernels write it, (n, frames, ...); raises InputError if it cannot take the result.
+
+        A subclass of NumPy's array may reshape to another shape than it is asked for, as a matrix does, and a
+        kernel would then write past its end.
+        """
         if out is None:
             return None
         wanted = (*self.shape, *((len(self.links),) if self.several else ()), *own)
-        good = isinstance(out, np.ndarray) and out.dtype == np.float64 and out.flags.c_contiguous
-        if not good or out.shape != wanted or not out.flags.writeable:
+        good = type(out) in _PLAIN and out.dtype == np.float64 and out.flags.carray
+        if not good or out.shape != wanted:
             raise InputError(
                 f"out must be a writable C-contiguous float64 array of shape {wanted}",
-                found=f"{getattr(out, 'dtype', type(out).__name__)} {getattr(out, 'shape', '')}",
+                found=_described(out),
+                remedy="np.asarray(out) is a plain array"
+                if isinstance(out, np.ndarray) and type(out) not in _PLAIN
+                else None,
             )
+        self.question.read()  # lists may hold views of out
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a: they are read again for the check")
         return out.reshape(self.n, len(self.links), *own)
@@ -158,6 +170,19 @@ class Call:
     def index(self, k: int) -> tuple[int, ...]:
         """Flat sample `k` as an index into the caller's batch."""
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
+
+
+def _described(out: object) -> str:
+    """What was given as `out`: its type, and of an array all that matters to a kernel."""
+    if not isinstance(out, np.ndarray):
+        return type(out).__name__
+    flags = {
+        "read-only": out.flags.writeable,
+        "not C-contiguous": out.flags.c_contiguous,
+        "not aligned": out.flags.aligned,
+    }
+    faults = (fault for fault, good in flags.items() if not good)
+    return ", ".join((f"{type(out).__name__} of {out.dtype} {out.shape}", *faults))
 
 
 def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def held_against(
         ours: What was handed out; the witness does not need it.
         by: Whose the oracle is.
     """
-    (q,), other = x.asked.inputs, str(x.options["relative_to"])
+    (q,), other = x.asked.inputs, cast("str", x.options["relative_to"])
     T = oracle.placements(q, [*x.asked.frames, other])
     back = T[:, -1:, :3, :3].swapaxes(-1, -2)
     theirs = np.zeros((*T.shape[:1], T.shape[1] - 1, 4, 4))

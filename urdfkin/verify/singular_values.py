@@ -7,7 +7,8 @@ and V are orthogonal either: with |U^T U - I| <= a and |V^T V - I| <= b the sing
 within (1 - a)^(1/2) (1 - b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2) of those in S (Ostrowski).
 
 The rounding of these residuals themselves is bounded as that of any sum of products: m terms are off by m eps
-of the sum of their sizes.
+of the sum of their sizes. A norm is taken of the matrix divided by its largest number, and a product of
+mantissas and exponents apart: no square and no partial product leaves the range of doubles.
 """
 
 from __future__ import annotations
@@ -62,8 +63,8 @@ class SingularValues:
         if not self.values.value.shape[-1]:
             nothing = np.zeros(self.values.value.shape[:-1])
             return Between(nothing, nothing, nothing)
-        value, lower, upper = (x.prod(axis=-1) for x in self.values)
-        return Between(value, _down(lower), _up(upper))
+        value, lower, upper = map(_product, self.values)
+        return Between(value, np.maximum(_down(lower), 0.0), _up(upper))
 
     @cached_property
     def condition(self) -> Between:
@@ -72,7 +73,7 @@ class SingularValues:
         if not value.shape[-1]:
             nothing = np.full(value.shape[:-1], np.nan)
             return Between(nothing, nothing, nothing)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", over="ignore", under="ignore", invalid="ignore"):
             least, middle, most = (
                 np.where(small > 0.0, large / small, np.inf)
                 for large, small in (
@@ -94,7 +95,7 @@ class SingularValues:
         count = value.shape[-1]
         others = np.ones_like(value)
         for k in range(count):
-            others[..., k] = np.delete(value, k, axis=-1).prod(axis=-1)
+            others[..., k] = _product(np.delete(value, k, axis=-1))
         slopes: FloatArray = np.einsum(
             "...k,...rk,...rij,...ik->...j", others, self.U, H[..., self.rows, :, :], self.V, optimize=True
         )
@@ -143,14 +144,30 @@ def _skew(U: FloatArray) -> FloatArray:
 
 
 def _norm(E: FloatArray) -> FloatArray:
-    """(...) no less than the Frobenius norm of (..., m, n)."""
-    norm: FloatArray = np.linalg.norm(E, axis=(-2, -1))
+    """(...) no less than the Frobenius norm of (..., m, n), none of whose numbers is negative."""
+    largest = E.max(axis=(-2, -1), initial=0.0)
+    unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)  # the norm of inf is inf
+    with np.errstate(over="ignore", under="ignore"):
+        norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))
     return _up(norm)
 
 
+def _product(x: FloatArray) -> FloatArray:
+    """(...) the product of (..., k), which alone can leave the range of doubles: no part of it does."""
+    mantissas, exponents = np.frexp(x)
+    with np.errstate(over="ignore", under="ignore"):
+        product: FloatArray = np.ldexp(mantissas.prod(axis=-1), exponents.sum(axis=-1))
+    return product
+
+
 def _up(x: FloatArray) -> FloatArray:
-    return x + np.abs(x) * _OUTWARD
+    """No less than `x` was before it was rounded; the next number where it is too small for a share of it."""
+    with np.errstate(over="ignore", under="ignore"):
+        return np.nextafter(x + np.abs(x) * _OUTWARD, np.inf)
 
 
 def _down(x: FloatArray) -> FloatArray:
-    return np.where(np.isfinite(x), x - np.abs(x) * _OUTWARD, x)
+    """No more, likewise; the largest double where it was beyond all."""
+    with np.errstate(under="ignore", invalid="ignore"):
+        inside = np.nextafter(x - np.abs(x) * _OUTWARD, -np.inf)
+    return np.where(np.isposinf(x), np.finfo(np.float64).max, inside)

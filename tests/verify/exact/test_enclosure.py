@@ -4,6 +4,7 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import redirect_stdout
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -203,6 +204,17 @@ def test_an_error_is_what_a_number_can_be_off_by_at_most() -> None:
     assert not velocity.contains(off).any()
 
 
+def test_an_error_is_rounded_outward() -> None:
+    generator = np.random.default_rng(3)
+    x, lower = generator.normal(size=(2, 200)) * 10.0 ** generator.integers(-9, 9, (2, 200))
+    upper = np.nextafter(lower, np.inf)
+    errors = Enclosure("velocity", lower, upper, x, None).error(x)
+    for error, *numbers in zip(errors, x, lower, upper, strict=True):
+        number, low, high = map(Fraction, numbers)
+        assert Fraction(error) >= max(abs(number - low), abs(number - high))
+    assert Enclosure("velocity", x, x, x, None).error(x).tolist() == [0.0] * 200
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["tree_1", "one_joint"])
 def test_a_hessian_is_enclosed_where_it_is_asked_for(name: str) -> None:
@@ -216,6 +228,36 @@ def test_a_hessian_is_enclosed_where_it_is_asked_for(name: str) -> None:
         assert holds(one, QUANTITIES["hessian"].truth(motion, link, reference))
         assert ((one.width <= 2.0 * np.spacing(np.abs(one.upper))) | (one.width < 1e-25)).mean() > 0.8
         assert one.error(robot.hessian(x[0], robot.tip_frame, reference)).max() < 1e-14
+
+
+#: A joint that turns, one that follows it by -2.5 and one that follows that by 0.3.
+FOLLOWERS = (
+    '<robot name="followers"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>'
+    '<joint name="x" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    '<joint name="y" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.5 0.1 0"/>'
+    '<axis xyz="0 1 0"/><mimic joint="x" multiplier="-2.5" offset="0.2"/>'
+    '<limit lower="-3" upper="3" effort="1" velocity="3"/></joint>'
+    '<joint name="z" type="prismatic"><parent link="c"/><child link="d"/><origin xyz="0.3 0 0.2"/>'
+    '<axis xyz="1 0 0"/><mimic joint="y" multiplier="0.3"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+)
+
+
+@pytest.mark.parametrize("reference", list(Reference))
+def test_a_hessian_behind_mimic_joints_is_enclosed_and_counts_both_their_multipliers(
+    reference: Reference,
+) -> None:
+    robot = urdfkin.load(FOLLOWERS)
+    q, v, a = np.array([0.3]), np.array([1.0]), np.array([0.5])
+    one = robot.enclose(q, v, a, "d", reference, hessian=True).hessian
+    assert one is not None
+    assert one.error(robot.hessian(q, "d", reference)).max() < 1e-14
+    # The rate of the Jacobian by the robot's own recursion: with one rate, J-dot = H v.
+    motion = at_fifty_digits(robot, (q, v, a), None)
+    link = robot.tree.frame_link("d")
+    rate = QUANTITIES["jacobian rate"].truth(motion, link, reference)
+    assert np.abs((one.lower[..., 0] - rate).astype(float)).max() < 1e-15
 
 
 def test_a_robot_that_pinocchio_refuses_is_enclosed_all_the_same() -> None:

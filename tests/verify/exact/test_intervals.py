@@ -75,6 +75,19 @@ def test_cosine_and_sine_of_every_double_lie_in_their_intervals(bits: int, angle
         assert high - low <= Fraction(2) ** (3 - bits)
 
 
+@pytest.mark.parametrize("bits", BITS)
+@pytest.mark.parametrize("exponent", [-20, -60, -100, -200, -1000])
+def test_what_taylors_series_leaves_out_is_in_the_intervals(exponent: int, bits: int) -> None:
+    # Of so small an angle, a double, the sums are exact: without the remainder they have no width.
+    x = Fraction(2) ** exponent
+    cosine, sine = map(true_ends, intervals(bits).cos_sin(intervals(bits).mpf(2.0**exponent)))
+    # Both lie between two sums of their alternating series.
+    assert sine[0] < x - x**3 / 6 + x**5 / 120
+    assert sine[1] > x - x**3 / 6
+    assert cosine[0] < 1 - x**2 / 2 + x**4 / 24
+    assert cosine[1] > 1 - x**2 / 2
+
+
 @pytest.mark.parametrize("word", ["0.1", "-1.5708", "3.14159265358979", "100.7", "0"])
 def test_cosine_and_sine_of_a_wide_interval_hold_those_of_all_that_is_in_it(word: str) -> None:
     coarse, context = intervals(53), independent.clone()

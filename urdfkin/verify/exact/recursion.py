@@ -158,7 +158,7 @@ def hessian_values(motion: Motion, link: int, reference: Reference) -> NDArray[n
     """(6, nv, nv)."""
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _WALK.hessian(motion.states[link], motion.columns[link], reference):
-        out[of, by] += factor * _array(six)
+        out[of, by] += _array([factor * x for x in six])  # an interval multiplies numbers, not arrays
     return out.transpose(2, 0, 1)
 
 
