@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import warnings
 from collections.abc import Mapping
+from pathlib import Path
 from types import ModuleType
 from typing import Any, TypedDict, Unpack, cast
 
@@ -23,18 +25,18 @@ from urdfkin.lint.rules.mimic import MIMIC_CONTINUOUS
 from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
-from urdfkin.system.files import at_home
+from urdfkin.system.files import at_home, read_bytes
 from urdfkin.urdf.descriptions import described
-from urdfkin.urdf.mjcf import is_mjcf, name_of, read_mjcf
+from urdfkin.urdf.mjcf import is_mjcf, is_text, name_of
 from urdfkin.urdf.origin import Origin
 from urdfkin.urdf.pinocchio_model import is_model, tree_of_model
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.remembering import remembered_tree
-from urdfkin.urdf.sources import Source, Text, as_word, read_source
+from urdfkin.urdf.sources import MOST, Source, Text, as_word, read_source
 from urdfkin.urdf.trees import XmlElement, XmlTree, text_of
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.choosing import Verify, checked_choice
-from urdfkin.verify.made_of_mjcf import demand_the_mjcfs
+from urdfkin.verify.made_of_mjcf import demand_the_mjcfs, read_mjcf
 from urdfkin.verify.made_of_model import demand_the_models
 from urdfkin.verify.made_of_table import demand_the_tables
 from urdfkin.verify.screws import check_screws
@@ -155,17 +157,25 @@ def _load_mjcf(
     **how: Unpack[How],
 ) -> Robot:
     _refuse_arguments(xacro_args, "MJCF")
-    read = read_mjcf(source)
-    path = None if isinstance(source, bytes) or read.is_text else at_home(source)
-    name = as_word(path) if path is not None else streamed.source if streamed else name_of(source)
-    text = Text(write_urdf(read.tree).encode(), f"{name} (as a URDF)", name)
+    wanted = bool(checked_choice(how["verify"]))
+    digest = hashlib.sha256(_bytes_of_mjcf(source)).hexdigest()
+    read = read_mjcf(source, check=wanted)
+    name = as_word(Path(read.path)) if read.path else streamed.source if streamed else name_of(source)
+    text = Text(read.urdf.encode(), f"{name} (as a URDF)", name, sha256=digest)
     listed = tuple(left_out(one, name) for one in read.listed)
     robot = robot_of(text, **how, listed=listed, made=True)
-    if checked_choice(how["verify"]):
+    if wanted:
         plain = how["mimic"] is not False and how["root_joint"] is None
         verifier = (robot if plain else robot_of(text, listed=listed, made=True)).verifier
-        robot.verifier.reading = demand_the_mjcfs(verifier, read, None if path is None else str(path))
+        robot.verifier.reading = demand_the_mjcfs(verifier, read)
     return robot
+
+
+def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
+    """What its digest is of."""
+    if isinstance(source, bytes):
+        return source
+    return str(source).encode("utf-8", "surrogatepass") if is_text(source) else read_bytes(at_home(source), MOST)
 
 
 def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[How]) -> Robot:
@@ -210,7 +220,7 @@ def robot_of(
     """
     witness_of(oracle)
     other = None if oracle == "pinocchio" else oracle
-    origin = Origin(text.source, mimic, root_joint, text.xacro_args, other, table)
+    origin = Origin(text.source, mimic, root_joint, text.xacro_args, other, table, text.sha256)
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Iterator, Mapping
 from copy import copy
@@ -296,8 +295,8 @@ def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
 
 
 def digest(robot: Robot) -> str:
-    """SHA-256 of a robot's text."""
-    return hashlib.sha256(robot.urdf.encode()).hexdigest()
+    """SHA-256 of the file that a robot comes from: a URDF's text, or MJCF."""
+    return robot.sha256
 
 
 def parse_map(words: tuple[str, ...]) -> dict[str, str]:
