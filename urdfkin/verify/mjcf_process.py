@@ -51,12 +51,17 @@ def serve() -> None:
     except MemoryError:
         _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": TOO_MUCH}})
     except UrdfkinError as error:
-        words = {key: getattr(error, key) for key in ("what", "where", "found", "remedy")}
-        _say({"error": words})
+        words = {key: getattr(error, key) for key in ("what", "where", "remedy")}
+        _say({"error": words | {"found": _plain(error.found)}})
     except Exception as error:
         said = f"{type(error).__name__}: {error}"
         _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": said[:2000]}})
     os._exit(0)  # libraries may not do what they would at their end
+
+
+def _plain(found: str | None) -> str | None:
+    """What MuJoCo says; where memory ends it says no more than that something is unknown."""
+    return f"{found} Perhaps {TOO_MUCH}" if found and found.endswith("unknown exception!") else found
 
 
 def _say(answer: Mapping[str, Any]) -> None:
@@ -86,7 +91,7 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             if isinstance(error, InputError) and error.remedy is not None:
                 raise  # MuJoCo does compile it, and no tree can hold what it makes of it
             found = error.found if isinstance(error, InputError) else str(error)
-            yield {"not_whole": found or TOO_MUCH}
+            yield {"not_whole": _plain(found) or TOO_MUCH}
     if samples and path is not None:
         yield {"pinocchio": _pinocchios(path, read, q)}
 
