@@ -215,12 +215,16 @@ def test_a_model_with_followers_is_refused_with_the_cure() -> None:
         urdfkin.load(pin.buildModelFromUrdf(file("panda"), mimic=True))
 
 
-def test_a_reading_that_is_not_the_models_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("number", [(0, 1), (0, 3)], ids=["turned", "moved"])
+def test_a_reading_that_is_off_by_little_more_than_rounding_is_refused(
+    number: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
     right = made_of_model._placements
 
     def moved(*arguments: Any) -> Any:
         T = right(*arguments)
-        T[..., 0, 3] += 1e-12
+        assert np.linalg.norm(T[0, -1, :3, 3]) > 0.1  # at the root nothing may differ, whatever the bound
+        T[:, -1, *number] += 3e-13
         return T
 
     monkeypatch.setattr(made_of_model, "_placements", moved)
