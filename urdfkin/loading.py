@@ -20,6 +20,7 @@ from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError,
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rules.axes import tilts
 from urdfkin.lint.rules.dialect import NEWER_VERSION
+from urdfkin.lint.rules.joints import lost_quaternions
 from urdfkin.lint.rules.left_out import left_out
 from urdfkin.lint.rules.mimic import MIMIC_CONTINUOUS
 from urdfkin.lint.runner import read_urdf
@@ -33,7 +34,7 @@ from urdfkin.urdf.pinocchio_model import is_model, tree_of_model
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.remembering import remembered_tree
 from urdfkin.urdf.sources import MOST, Source, Text, as_word, read_source
-from urdfkin.urdf.trees import XmlElement, XmlTree, text_of
+from urdfkin.urdf.trees import XmlElement, XmlTree, text_of, without_rotation
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.choosing import Verify, checked_choice
 from urdfkin.verify.made_of_mjcf import demand_the_mjcfs, read_mjcf
@@ -113,7 +114,11 @@ def load(
         return _load_model(source, xacro_args, **how)
     if (written := text_of(source)) is not None:
         _refuse_arguments(xacro_args, written[1])
-        return robot_of(Text(written[0].encode(), written[1], written[1]), **how)
+        lost = lost_quaternions(without_rotation(source), written[1])
+        robot = robot_of(Text(written[0].encode(), written[1], written[1]), **how, listed=lost)
+        if lost:
+            robot.verifier.reading = "from yourdfpy's object, which drops quat_xyzw: its file was not seen"
+        return robot
     text = read_source(cast("Source", source), xacro_args=xacro_args)
     if (source == "-" or hasattr(source, "read")) and is_mjcf(text.data):
         return _load_mjcf(text.data, None, text, **how)
