@@ -180,7 +180,9 @@ def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
     """What its digest is of."""
     if isinstance(source, bytes):
         return source
-    return str(source).encode("utf-8", "surrogatepass") if is_text(source) else read_bytes(at_home(source), MOST)
+    return (
+        str(source).encode("utf-8", "surrogatepass") if is_text(source) else read_bytes(at_home(source), MOST)
+    )
 
 
 def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[How]) -> Robot:

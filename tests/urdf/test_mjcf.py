@@ -22,6 +22,7 @@ from urdfkin.errors import InputError, OracleError
 from urdfkin.lint.pages import find_rule, page
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
+from urdfkin.system.interpreter import ask_python
 from urdfkin.urdf import mjcf
 from urdfkin.urdf.mjcf import Mjcf, is_mjcf
 from urdfkin.urdf.sources import Source
@@ -324,6 +325,7 @@ def test_the_compiled_model_answers_for_the_tree_it_was_made_of() -> None:
 
 # -- free bodies that MuJoCo aligns ----------------------------------------------------------------------
 
+_ARM = '<body name="arm" pos="0 0 2">{}<geom size="0.3"/></body>'
 _BOX = '<geom type="box" size=".1 .2 .3" pos="0.5 0 0" euler="0 0 40"/>'
 
 
@@ -332,7 +334,8 @@ def free_body(
 ) -> str:
     return (
         f'<mujoco><compiler {compiler}/>{more}<worldbody>{outside}<body name="drone">'
-        f'<freejoint name="free" {joint}/>{inside}<site name="camera" pos="0.6 0 0"/></body></worldbody></mujoco>'
+        f'<freejoint name="free" {joint}/>{inside}<site name="camera" pos="0.6 0 0"/></body>'
+        "</worldbody></mujoco>"
     )
 
 
@@ -344,9 +347,9 @@ def free_body(
         free_body('alignfree="true"', 'align="false"'),
         free_body(joint='align="true"', inside='<inertial pos="1 2 3" mass="1" diaginertia="1 2 3"/>'),
         free_body('alignfree="true" fusestatic="true"'),
-        free_body('alignfree="true"', inside=_BOX + '<body name="arm" pos="0 0 2"><joint name="j"/>' + _BOX + "</body>"),
-        free_body('alignfree="true"', inside=_BOX + '<body name="arm" pos="0 0 2">' + _BOX + "</body>"),
-        free_body('fusestatic="true"', inside=_BOX + '<body name="arm" pos="0 0 2">' + _BOX + "</body>"),
+        free_body('alignfree="true"', inside=_BOX + _ARM.format('<joint name="j"/>')),
+        free_body('alignfree="true"', inside=_BOX + _ARM.format("")),
+        free_body('fusestatic="true"', inside=_BOX + _ARM.format("")),
     ],
 )  # fmt: skip
 def test_a_free_body_that_mujoco_aligns_moves_as_in_mujoco(text: str) -> None:
@@ -372,21 +375,24 @@ def test_a_free_body_that_mujoco_aligns_moves_as_in_mujoco(text: str) -> None:
 
 def test_a_body_that_cannot_be_aligned_is_listed_and_the_certificate_says_what_was_not_checked() -> None:
     mesh = '<asset><mesh name="m" file="nowhere.stl"/></asset>'
-    with pytest.warns(urdfkin.UrdfWarning, match=r"MJCF101.*drone: MuJoCo aligns the frame of this free body"):
+    with pytest.warns(
+        urdfkin.UrdfWarning, match=r"MJCF101.*drone: MuJoCo aligns the frame of this free body"
+    ):
         robot = urdfkin.load(free_body('alignfree="true"', inside='<geom type="mesh" mesh="m"/>', more=mesh))
     robot.placement(robot.neutral(), "camera")
     said = robot.certificate().reading
-    assert "without the file's shapes and inertias, with which it does not compile: Error: Error opening" in said
+    assert (
+        "without the file's shapes and inertias, with which it does not compile: Error: Error opening" in said
+    )
 
 
 def test_a_free_body_that_others_are_fused_into_is_refused_where_it_is_aligned() -> None:
-    arm = _BOX + '<body name="arm" pos="0 0 2">' + _BOX + "</body>"
     with pytest.raises(InputError, match=r'body drone: .*write fusestatic="false" or align="false"'):
-        loaded(free_body('alignfree="true" fusestatic="true"', inside=arm))
+        loaded(free_body('alignfree="true" fusestatic="true"', inside=_BOX + _ARM.format("")))
 
 
 def test_a_static_body_that_the_file_has_fused_stays_a_link() -> None:
-    text = free_body('fusestatic="true"', inside=_BOX + '<body name="arm" pos="0 0 2">' + _BOX + "</body>")
+    text = free_body('fusestatic="true"', inside=_BOX + _ARM.format(""))
     robot = loaded(text)
     assert robot.placement(robot.neutral(), "arm")[:3, 3] == pytest.approx([0.0, 0.0, 2.0])
     assert robot.certificate().verified
@@ -547,8 +553,12 @@ def test_a_file_that_replicates_without_end_is_given_up() -> None:
 
 
 @pytest.mark.parametrize(
-    "more", ['<size nuser_body="2000000000"/>', '<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>']
-)  # fmt: skip
+    "more",
+    [
+        '<size nuser_body="2000000000"/>',
+        '<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
+    ],
+)
 def test_a_file_that_asks_for_too_much_memory_is_refused(more: str) -> None:
     with pytest.raises(InputError, match="Perhaps it takes more than 2 GiB of memory"):
         loaded(free_body(more=more))
@@ -563,7 +573,7 @@ def test_a_process_that_dies_is_one_clear_error(monkeypatch: pytest.MonkeyPatch)
 def test_what_the_file_with_its_shapes_takes_too_long_for_is_read_without_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    right = made_of_mjcf.ask_python
+    right = ask_python
 
     def first_only(*arguments: Any) -> tuple[bytes, None]:
         return right(*arguments)[0].splitlines(keepends=True)[0], None

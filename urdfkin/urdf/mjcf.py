@@ -181,7 +181,7 @@ class Mjcf:
         return out
 
     def rule_sizes(self, q: FloatArray) -> FloatArray:
-        """(n, equalities) the size of the terms of each mimic rule, times the rules up to the joint that moves.
+        """(n, equalities) the size of the terms of each mimic rule, times its rules up to the leader.
 
         That of y = y0 + c0 + c1 (x - x0) is |y0| + |c0| + |c1| (x's size + |x0|).
         """

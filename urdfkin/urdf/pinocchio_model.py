@@ -152,7 +152,7 @@ class _Reading:
             )
         axis = np.eye(3)["XYZ".index(aligned[2])] if aligned else np.array([1.0, 0.0, 0.0])
         if shown.endswith("Unaligned"):
-            # Not every kind has `axis` in Python (4.1): linear and angular rows of the joint's motion subspace.
+            # Not every kind has `axis` in Python (4.1); the joint's motion subspace has it for each.
             linear, angular = np.split(np.ravel(joint.createData().S), 2)
             axis = linear + angular
         if not kind.has_axis:

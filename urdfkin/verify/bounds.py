@@ -104,13 +104,13 @@ def placement_scale(plan: Plan, size: Magnitudes) -> FloatArray:
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
     """For (n, frames, 4, 4), between the tree that was made of an MJCF file and MuJoCo's model of the file.
 
-    The tree has added up already what MuJoCo adds up anew: a body's place, its joints' anchors there and back,
-    a slide's reference value. So positions have the length of all that, where it is longer than the path.
+    The tree has added up already what MuJoCo adds up anew: a body's place, its joints' anchors there and
+    back, a slide's reference value. So positions have the length of all that, where it exceeds the path's.
 
     MuJoCo turns a hinge by fl(q - ref), the tree by ref and by q. The difference is rounded once, by (eps/2)
-    (|q| + |ref|) rad at most. That turns what is behind the hinge: a number of a rotation changes by the angle
-    at most, one of a position by the angle times the length. Twice that is allowed for, which holds what is of
-    second order; as a share of k eps it is angle / k.
+    (|q| + |ref|) rad at most. That turns what is behind the hinge: a number of a rotation changes by the
+    angle at most, one of a position by the angle times the length. Twice that is allowed, to have room for
+    the second order; as a share of k eps it is angle / k.
 
     Args:
         bound: Of the placements, for the tree.

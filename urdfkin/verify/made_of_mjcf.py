@@ -120,7 +120,9 @@ def _text(source: str | bytes | os.PathLike[str], name: str) -> str:
 
 def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
     """The process's answers, and in words why there are no more."""
-    command = own_python("from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8"))
+    command = own_python(
+        "from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8")
+    )
     output, status = ask_python(command, json.dumps(request).encode(), patience, MOST)
     answers = [json.loads(line) for line in output.splitlines(keepends=True) if _is_answer(line)]
     if status is None:
@@ -181,7 +183,9 @@ def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
     if odd := held.symmetric_difference(rules.keys() | set(answer["apart"])):
         first = min(odd)
         what = f"mimic joint {rules[first]}" if first in rules else f"equality {first}"
-        raise _error(f"{name}, {what}", f"MuJoCo {version()} {'holds' if first in held else 'does not hold'} it")
+        raise _error(
+            f"{name}, {what}", f"MuJoCo {version()} {'holds' if first in held else 'does not hold'} it"
+        )
     if not rules:
         return None
     own = sorted(rules)

@@ -41,7 +41,7 @@ def serve() -> None:
     """A request on standard input, answers on standard output."""
     request = json.load(sys.stdin)
     try:
-        library()
+        library().set_mju_user_warning(lambda said: None)  # of dynamics; else it opens a log file
         if request["path"] is not None and request["samples"]:
             with suppress(InstallationError):
                 pinocchio()

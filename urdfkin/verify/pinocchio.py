@@ -14,7 +14,7 @@ q_full = G q + g_0, v_full = G v, J = J_full G.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 from xml.parsers.expat import ExpatError
 
