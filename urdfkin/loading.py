@@ -177,12 +177,20 @@ def _load_mjcf(
 
 
 def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
-    """What its digest is of."""
+    """What its digest is of.
+
+    Raises:
+        InputError: a file that is larger than what is read of any.
+        SourceError: it cannot be read.
+    """
     if isinstance(source, bytes):
         return source
-    return (
-        str(source).encode("utf-8", "surrogatepass") if is_text(source) else read_bytes(at_home(source), MOST)
-    )
+    if is_text(source):
+        return str(source).encode("utf-8", "surrogatepass")
+    data = read_bytes(at_home(source), MOST)
+    if len(data) > MOST:
+        raise InputError("this MJCF is too large", where=name_of(source), found=f"more than {MOST} bytes")
+    return data
 
 
 def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[How]) -> Robot:

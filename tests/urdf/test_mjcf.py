@@ -564,6 +564,11 @@ def test_a_file_that_asks_for_too_much_memory_is_refused(more: str) -> None:
         loaded(free_body(more=more))
 
 
+def test_memory_that_a_file_sets_apart_for_its_dynamics_is_not_taken() -> None:
+    robot = loaded(free_body(more='<size njmax="80000" nconmax="40000" nstack="1000000000"/>'))
+    assert "does not compile" not in robot.verifier.reading
+
+
 def test_a_process_that_dies_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(made_of_mjcf, "ask_python", lambda *arguments: (b'{"urdf": "half', -11))
     with pytest.raises(InputError, match="<text>: MuJoCo cannot compile this MJCF: found its process ended"):

@@ -261,11 +261,10 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
             _refuse_fused(aligned, name)
             fused = compiled(_spec(mujoco, source))
         spec.compiler.fusestatic = False
-        if whole:
-            model = compiled(spec)
-        left = list(_stripped(mujoco, spec))
+        left = list(_left_out(mujoco, spec))
         if not whole:
-            model = compiled(spec)
+            _strip(mujoco, spec)
+        model = compiled(spec)
         title = spec.modelname or "robot"
         reader = _Reader(mujoco, model, title, name)
         tree = reader.tree()
@@ -300,7 +299,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
 def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     made = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
     made.compiler.usethread = False  # a confined process may start none
-    made.memory = -1  # what the file has measured for its own dynamics
+    made.memory = made.njmax = made.nconmax = made.nstack = -1  # of the file's own dynamics, maybe gigabytes
     return made
 
 
@@ -354,29 +353,41 @@ def is_text(source: object) -> bool:
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
-def _stripped(mujoco: Any, spec: Any) -> Iterator[Listed]:
-    """Take out what kinematics does not need, so that no mesh has to be there; say what it was."""
-    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
-    for i, one in enumerate(list(spec.equalities)):
-        if one.type != mujoco.mjtEq.mjEQ_JOINT:
-            kind, names = str(one.type).rpartition("_")[2].lower(), _joined(one.name1, one.name2)
-            what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot hold"
-            yield Listed(what, f"equality {one.name or i}", moves=bool(one.active))
-            spec.delete(one)
-    gone = []
+def _useless(spec: Any) -> Iterator[tuple[str, list[Any]]]:
+    """What kinematics does not need, kind by kind."""
     for words in (
         "keys", "sensors", "actuators", "tendons", "excludes", "pairs", "skins", "flexes", "geoms", "cameras",
         "lights", "meshes", "hfields", "materials", "textures",
     ):  # fmt: skip
-        found = list(getattr(spec, words, ()))
+        if found := list(getattr(spec, words, ())):
+            yield words, found
+
+
+def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
+    """In words, what of a file the tree does not hold, its joints' own constraints aside."""
+    for i, one in enumerate(spec.equalities):
+        if one.type != mujoco.mjtEq.mjEQ_JOINT:
+            kind, names = str(one.type).rpartition("_")[2].lower(), _joined(one.name1, one.name2)
+            what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot hold"
+            yield Listed(what, f"equality {one.name or i}", moves=bool(one.active))
+    gone = dict(_useless(spec))
+    for words in ("tendons", "flexes"):
+        if words in gone:
+            yield Listed(f"{words} move nothing here", words, moves=True)
+    if gone:
+        said = ", ".join(f"{len(found)} {words}" for words, found in gone.items())
+        yield Listed(f"left out, since kinematics does not use them: {said}")
+
+
+def _strip(mujoco: Any, spec: Any) -> None:
+    """Take out what kinematics does not need, so that no mesh has to be there."""
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    for one in list(spec.equalities):
+        if one.type != mujoco.mjtEq.mjEQ_JOINT:
+            spec.delete(one)
+    for _, found in _useless(spec):
         for one in found:
             spec.delete(one)
-        if found:
-            gone.append(f"{len(found)} {words}")
-            if words in ("tendons", "flexes"):
-                yield Listed(f"{words} move nothing here", words, moves=True)
-    if gone:
-        yield Listed(f"left out, since kinematics does not use them: {', '.join(gone)}")
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
