@@ -371,6 +371,8 @@ def test_a_free_body_that_mujoco_aligns_moves_as_in_mujoco(text: str) -> None:
     mujoco.mj_objectVelocity(model, data, site, 0, theirs, 0)
     assert robot.velocity(q, v, "camera") == pytest.approx(np.roll(theirs, 3), abs=1e-13)
     assert "does not compile" not in robot.certificate().reading
+    unchecked = loaded(text, verify=False)
+    np.testing.assert_array_equal(unchecked.placement(q, "camera"), robot.placement(q, "camera"))
 
 
 def test_a_body_that_cannot_be_aligned_is_listed_and_the_certificate_says_what_was_not_checked() -> None:

@@ -19,6 +19,7 @@ import numpy as np
 
 from urdfkin.compiled.plan import make_plan
 from urdfkin.errors import InputError, OracleError
+from urdfkin.errors.printable import printable
 from urdfkin.kinematics.roundings import EPS, MJCF_RULE
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.frame_names import LinkFrame
@@ -38,8 +39,10 @@ from urdfkin.verify.worst import worst_of_each
 _SAMPLES = 8
 #: Seconds after which reading is given up.
 PATIENCE = 60.0
+#: Letters of an error of MuJoCo's that a certificate quotes.
+_SAID = 300
 #: Bytes of answers after which they are not read on.
-MOST = 1_000_000_000
+MOST = 400_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +109,7 @@ def read_mjcf(
         tuple(Listed(*one) for one in read[-1]["listed"]),
         path,
         read[-1],
-        None if read[-1]["whole"] else (said or [ending])[0],
+        None if read[-1]["whole"] else printable((said or [ending])[0])[:_SAID],
         next((answer["pinocchio"] for answer in answers if "pinocchio" in answer), None),
     )
 
