@@ -4,7 +4,8 @@
     python scripts/fuzz.py --family names --family followers --robots 5000
 
 Mutants of the shipped robots are one family; the others are random whole robots, each odd in its own way:
-names that look like ours, prefixes, versions, followers, lengths, angles, axes, limits, roots, or everything.
+names that look like ours, prefixes, versions, followers, lengths, angles, axes, limits, roots, or everything;
+and MJCF files with free bodies, equalities and default classes, which MuJoCo is asked about on its own.
 
 Each goes through `check` and `load`, and every quantity of it is computed in every reference, on bases near
 and far, and held against Pinocchio, in a worker process that is restarted when it dies or takes too long.
@@ -30,7 +31,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
-from scripts.fuzzing import GOOD, Case, robots
+from scripts.fuzzing import GOOD, Case, mjcf, robots
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
@@ -38,7 +39,7 @@ from urdfkin.urdf.catalogue import catalogue
 READY, FIRST_WAIT = "ready", 300.0
 
 MUTANTS = "mutants"
-FAMILIES = (MUTANTS, *robots.FAMILIES)
+FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES)
 
 
 @cache
@@ -50,6 +51,8 @@ def files() -> list[Path]:
 
 def case(seed: int, family: str, number: int) -> Case:
     """One document of a family."""
+    if family in mjcf.FAMILIES:
+        return mjcf.robot(seed, family, number)
     return mutant(seed, number, files()) if family == MUTANTS else robots.robot(seed, family, number)
 
 
@@ -153,7 +156,8 @@ def fuzz(
                 made = case(seed, family, number)
                 keep.mkdir(parents=True, exist_ok=True)
                 name = f"{family}-{seed}-{number}"
-                (keep / f"{name}.urdf").write_bytes(made.data)
+                ending = "xml" if family in mjcf.FAMILIES else "urdf"
+                (keep / f"{name}.{ending}").write_bytes(made.data)
                 (keep / f"{name}.txt").write_text(f"{made.words}\n{word}\n{details}\n", "utf-8")
                 print(f"{family} {number} ({made.what}): {word}", flush=True)
 

@@ -4,6 +4,7 @@ import re
 import sys
 from collections import Counter
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -12,14 +13,16 @@ import pytest
 
 import urdfkin
 from scripts import fuzz
-from scripts.fuzzing import GOOD, Case, robots
+from scripts.fuzzing import GOOD, Case, mjcf, robots
 from scripts.fuzzing.judge import Outcome
 from scripts.fuzzing.judge import judge as judge_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
 from tests.lint.cases.arm import arm, fixed
 from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.system.interpreter import ask_python
 from urdfkin.urdf.records import FURTHER_LIMITS
+from urdfkin.verify import made_of_mjcf
 
 pytestmark = pytest.mark.slow
 
@@ -170,5 +173,52 @@ def test_a_short_run_of_mutants_finds_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize("family", robots.FAMILIES)
 def test_a_short_run_of_whole_robots_finds_nothing(family: str) -> None:
     words = Counter(judge_case(robots.robot(20, family, number)).word for number in range(5))
+    assert set(words) <= set(GOOD), words
+    assert words["verified"] > 2
+
+
+# -- MJCF --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("family", mjcf.FAMILIES)
+def test_an_mjcf_file_depends_on_seed_family_and_number_alone(family: str) -> None:
+    made = [mjcf.robot(0, family, number) for number in range(20)]
+    assert made == [fuzz.case(0, family, number) for number in range(20)]
+    assert len({each.data for each in made}) > 17
+    assert made != [mjcf.robot(1, family, number) for number in range(20)]
+
+
+def test_mjcf_files_are_of_every_oddity_and_mujoco_takes_them() -> None:
+    made = {family: [mjcf.robot(3, family, number).data for number in range(100)] for family in mjcf.FAMILIES}
+    texts = {family: b"".join(files) for family, files in made.items()}
+    for word in (b'align="true"', b'align="auto"', b'alignfree="true"', b'fusestatic="true"', b"<inertial"):
+        assert word in texts["mjcf-free"], word
+    for word in (b'active="false"', b"<weld", b'joint2="', b"polycoef="):
+        assert word in texts["mjcf-equalities"], word
+    for word in (b'class="inner"', b"childclass=", b'angle="degree"', b"eulerseq="):
+        assert word in texts["mjcf-classes"], word
+    models = [mjcf.compiled(data) for files in made.values() for data in files]
+    assert sum(model is not None for model in models) > 290
+    assert sum(model is not None and (model.eq_type == 2).sum() > 2 for model in models) > 20
+
+
+def test_a_reading_of_mjcf_that_is_not_mujocos_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (
+        '<mujoco><worldbody><body name="b"><freejoint name="f" align="true"/><geom size=".1" pos="1 0 0"/>'
+        '<site name="s"/></body></worldbody></mujoco>'
+    )
+    assert judge(text).word == "verified"
+
+    def without_shapes(*arguments: Any) -> tuple[bytes, int | None]:
+        output, status = ask_python(*arguments)
+        return output.splitlines(keepends=True)[0], status
+
+    monkeypatch.setattr(made_of_mjcf, "ask_python", without_shapes)
+    assert judge(text).word == "MuJoCo has another robot"
+
+
+@pytest.mark.parametrize("family", mjcf.FAMILIES)
+def test_a_short_run_of_mjcf_files_finds_nothing(family: str) -> None:
+    words = Counter(judge_case(mjcf.robot(20, family, number)).word for number in range(5))
     assert set(words) <= set(GOOD), words
     assert words["verified"] > 2

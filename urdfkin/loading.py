@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import warnings
 from collections.abc import Mapping
+from pathlib import Path
 from types import ModuleType
 from typing import Any, TypedDict, Unpack, cast
 
@@ -18,22 +20,23 @@ from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError,
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rules.axes import tilts
 from urdfkin.lint.rules.dialect import NEWER_VERSION
+from urdfkin.lint.rules.joints import lost_quaternions
 from urdfkin.lint.rules.left_out import left_out
 from urdfkin.lint.rules.mimic import MIMIC_CONTINUOUS
 from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
-from urdfkin.system.files import at_home
+from urdfkin.system.files import at_home, read_bytes
 from urdfkin.urdf.descriptions import described
-from urdfkin.urdf.mjcf import is_mjcf, name_of, read_mjcf
+from urdfkin.urdf.mjcf import is_mjcf, is_text, name_of
 from urdfkin.urdf.origin import Origin
 from urdfkin.urdf.pinocchio_model import is_model, tree_of_model
 from urdfkin.urdf.reader import read_tree
-from urdfkin.urdf.sources import Source, Text, as_word, read_source
-from urdfkin.urdf.trees import XmlElement, XmlTree, text_of
+from urdfkin.urdf.sources import MOST, Source, Text, as_word, read_source
+from urdfkin.urdf.trees import XmlElement, XmlTree, text_of, without_rotation
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.choosing import Verify, checked_choice
-from urdfkin.verify.made_of_mjcf import demand_the_mjcfs
+from urdfkin.verify.made_of_mjcf import demand_the_mjcfs, read_mjcf
 from urdfkin.verify.made_of_model import demand_the_models
 from urdfkin.verify.made_of_table import demand_the_tables
 from urdfkin.verify.screws import check_screws
@@ -110,7 +113,11 @@ def load(
         return _load_model(source, xacro_args, **how)
     if (written := text_of(source)) is not None:
         _refuse_arguments(xacro_args, written[1])
-        return robot_of(Text(written[0].encode(), written[1], written[1]), **how)
+        lost = lost_quaternions(without_rotation(source), written[1])
+        robot = robot_of(Text(written[0].encode(), written[1], written[1]), **how, listed=lost)
+        if lost:
+            robot.verifier.reading = "from yourdfpy's object, which drops quat_xyzw: its file was not seen"
+        return robot
     text = read_source(cast("Source", source), xacro_args=xacro_args)
     if (source == "-" or hasattr(source, "read")) and is_mjcf(text.data):
         return _load_mjcf(text.data, None, text, **how)
@@ -154,17 +161,35 @@ def _load_mjcf(
     **how: Unpack[How],
 ) -> Robot:
     _refuse_arguments(xacro_args, "MJCF")
-    read = read_mjcf(source)
-    path = None if isinstance(source, bytes) or read.is_text else at_home(source)
-    name = as_word(path) if path is not None else streamed.source if streamed else name_of(source)
-    text = Text(write_urdf(read.tree).encode(), f"{name} (as a URDF)", name)
+    wanted = bool(checked_choice(how["verify"]))
+    digest = hashlib.sha256(_bytes_of_mjcf(source)).hexdigest()
+    read = read_mjcf(source, check=wanted)
+    name = as_word(Path(read.path)) if read.path else streamed.source if streamed else name_of(source)
+    text = Text(read.urdf.encode(), f"{name} (as a URDF)", name, sha256=digest)
     listed = tuple(left_out(one, name) for one in read.listed)
     robot = robot_of(text, **how, listed=listed, made=True)
-    if checked_choice(how["verify"]):
+    if wanted:
         plain = how["mimic"] is not False and how["root_joint"] is None
         verifier = (robot if plain else robot_of(text, listed=listed, made=True)).verifier
-        robot.verifier.reading = demand_the_mjcfs(verifier, read, None if path is None else str(path))
+        robot.verifier.reading = demand_the_mjcfs(verifier, read)
     return robot
+
+
+def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
+    """What its digest is of.
+
+    Raises:
+        InputError: a file that is larger than what is read of any.
+        SourceError: it cannot be read.
+    """
+    if isinstance(source, bytes):
+        return source
+    if is_text(source):
+        return str(source).encode("utf-8", "surrogatepass")
+    data = read_bytes(at_home(source), MOST)
+    if len(data) > MOST:
+        raise InputError("this MJCF is too large", where=name_of(source), found=f"more than {MOST} bytes")
+    return data
 
 
 def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[How]) -> Robot:
@@ -209,7 +234,7 @@ def robot_of(
     """
     witness_of(oracle)
     other = None if oracle == "pinocchio" else oracle
-    origin = Origin(text.source, mimic, root_joint, text.xacro_args, other, table)
+    origin = Origin(text.source, mimic, root_joint, text.xacro_args, other, table, text.sha256)
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data)

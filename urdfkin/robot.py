@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Collection, Sequence
 from copy import copy
 from pathlib import Path
@@ -178,8 +177,8 @@ class Robot(Shown):
 
     @property
     def sha256(self) -> str:
-        """The digest of the URDF's text as UTF-8: which file it was, whatever became of it since."""
-        return hashlib.sha256(self.verifier.text.encode()).hexdigest()
+        """The digest of the URDF's text as UTF-8, or of the MJCF file without what it includes."""
+        return self.verifier.sha256
 
     @property
     def path(self) -> str | None:

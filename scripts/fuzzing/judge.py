@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 import urdfkin
-from scripts.fuzzing import Case
+from scripts.fuzzing import Case, mjcf
 from scripts.fuzzing.asking import MismatchError, ask, ask_prepared
-from urdfkin.errors import RangeError, UrdfkinError
+from urdfkin.errors import InputError, RangeError, UrdfkinError
 from urdfkin.lint import Finding, Severity, UrdfError
 from urdfkin.robot import Robot
+from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
 #: Findings about sizes that arithmetic cannot carry: a result that is no number is no surprise after them.
@@ -31,7 +32,7 @@ class Outcome:
 def judge(case: Case) -> Outcome:
     """What happens to a document on its way to numbers."""
     try:
-        return _judge(case)
+        return _judge_mjcf(case) if is_mjcf(case.data) else _judge(case)
     except UrdfkinError as error:
         return Outcome(f"raises {type(error).__name__}", traceback.format_exc())
     except Exception as error:
@@ -52,6 +53,20 @@ def _judge(case: Case) -> Outcome:
         if errors:
             return Outcome("load takes what check refuses", str(errors[0]))
         return _asked(robot, findings, warned) or _unverified(robot, findings, warned)
+
+
+def _judge_mjcf(case: Case) -> Outcome:
+    model = mjcf.compiled(case.data)
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        try:
+            robot = urdfkin.load(case.data, mimic=case.mimic)
+        except InputError as error:
+            known = model is None or error.remedy is not None
+            return Outcome("refused" if known else "load refuses what MuJoCo takes", str(error))
+        if model is not None and (found := mjcf.difference(robot, model, 0)) is not None:
+            return Outcome("MuJoCo has another robot", found)
+        return _asked(robot, robot.findings, warned) or _unverified(robot, robot.findings, warned)
 
 
 def _asked(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome | None:

@@ -127,6 +127,30 @@ def test_an_axis_of_another_length_is_told_when_it_comes_from_yourdfpy() -> None
         urdfkin.load(robot)
 
 
+def test_a_quaternion_that_yourdfpy_dropped_is_no_secret(tmp_path: Path) -> None:
+    """The object has neither the attribute nor the text: a finding says so, and so does the certificate."""
+    text = (
+        '<robot name="r" version="1.1"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
+        '<parent link="a"/><child link="b"/><origin {}/></joint></robot>'
+    )
+    path = tmp_path / "r.urdf"
+    said = {}
+    for rotation in ('quat_xyzw="0 0 1 0"', 'rpy="0 0 1"', 'xyz="1 2 3"'):
+        path.write_text(text.format(rotation))
+        robot = urdfkin.load(yourdfpys(str(path)))
+        robot.placement([0.0], "b")
+        said[rotation] = [str(f) for f in robot.findings], robot.certificate().reading
+    assert said['rpy="0 0 1"'] == ([], "")
+    assert said['xyz="1 2 3"'] == said['quat_xyzw="0 0 1 0"']
+    findings, reading = said['quat_xyzw="0 0 1 0"']
+    assert len(findings) == 1
+    assert (
+        "<yourdfpy>:1:1: URDF512 note: yourdfpy drops quat_xyzw and keeps no text: had the file"
+        in findings[0]
+    )
+    assert "drops quat_xyzw: its file was not seen" in reading
+
+
 def test_a_yourdfpy_robot_in_two_pieces_is_refused() -> None:
     robot = yourdfpys(file("polar"))
     robot.robot.joints.pop()
@@ -189,6 +213,24 @@ def _unit(generator: np.random.Generator) -> list[float]:
     return found
 
 
+@pytest.mark.parametrize("kind", ["continuous", "revolute", "prismatic"])
+def test_a_joint_of_a_model_may_have_any_axis(kind: str) -> None:
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/>'
+        '<joint name="i" type="continuous"><parent link="a"/><child link="b"/></joint>'
+        f'<joint name="j" type="{kind}"><parent link="b"/><child link="c"/><origin xyz="1 2 3"/>'
+        '<axis xyz="0 0.6 -0.8"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    robot, made = loaded(text), loaded(pin.buildModelFromXML(text))
+    assert (made.tree.joints[1].kind, made.tree.joints[1].axis.tolist()) == (
+        robot.tree.joints[1].kind,
+        [0.0, 0.6, -0.8],
+    )
+    q = [0.5, 0.3]
+    np.testing.assert_allclose(made.placement(q, "c"), robot.placement(q, "c"), atol=1e-15)
+    assert made.certificate().verified
+
+
 def test_a_floating_base_of_the_model_stays_one() -> None:
     model = pin.buildModelFromUrdf(file("a1"), pin.JointModelFreeFlyer())
     made = loaded(pin.RobotWrapper(model))
@@ -215,12 +257,16 @@ def test_a_model_with_followers_is_refused_with_the_cure() -> None:
         urdfkin.load(pin.buildModelFromUrdf(file("panda"), mimic=True))
 
 
-def test_a_reading_that_is_not_the_models_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("number", [(0, 1), (0, 3)], ids=["turned", "moved"])
+def test_a_reading_that_is_off_by_little_more_than_rounding_is_refused(
+    number: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
     right = made_of_model._placements
 
     def moved(*arguments: Any) -> Any:
         T = right(*arguments)
-        T[..., 0, 3] += 1e-12
+        assert np.linalg.norm(T[0, -1, :3, 3]) > 0.1  # at the root nothing may differ, whatever the bound
+        T[:, -1, *number] += 3e-13
         return T
 
     monkeypatch.setattr(made_of_model, "_placements", moved)

@@ -5,7 +5,11 @@ import json
 import math
 import time
 import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -18,9 +22,11 @@ from urdfkin.errors import InputError, OracleError
 from urdfkin.lint.pages import find_rule, page
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
+from urdfkin.system.interpreter import ask_python
 from urdfkin.urdf import mjcf
-from urdfkin.urdf.mjcf import is_mjcf, read_mjcf
+from urdfkin.urdf.mjcf import Mjcf, is_mjcf
 from urdfkin.urdf.sources import Source
+from urdfkin.verify import made_of_mjcf, mjcf_process
 
 TWO = """
 <mujoco model="two">
@@ -58,6 +64,15 @@ def loaded(source: Source, **options: object) -> urdfkin.Robot:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
         return urdfkin.load(source, **options)  # type: ignore[arg-type]
+
+
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read MJCF here, where a slip can be planted, and not in a process of its own."""
+
+    def ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
+        return json.loads(json.dumps(list(mjcf_process.answers(request)))), "ended"
+
+    monkeypatch.setattr(made_of_mjcf, "_ask", ask)
 
 
 def one_joint(joint: str, body: str = "") -> str:
@@ -209,6 +224,7 @@ def test_an_equality_between_two_joints_is_obeyed() -> None:
 def test_a_slip_in_the_reading_is_found_when_it_is_loaded(
     broken: tuple[str, object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    in_this_process(monkeypatch)
     monkeypatch.setattr(mjcf, *broken)
     with pytest.raises(OracleError, match="is not the file's"):
         loaded(TWO)
@@ -298,10 +314,298 @@ def test_a_mjcf_is_a_robot_to_every_command(tmp_path: Path) -> None:
 
 
 def test_the_compiled_model_answers_for_the_tree_it_was_made_of() -> None:
-    read = read_mjcf(TWO)
+    read = mjcf.read_mjcf(TWO, "two")
     assert read.tree.links[0] == "world"
     q = np.zeros((1, read.tree.nq))
     q[0, 6] = 1.0
     # Everything at zero: followers stand at their offsets, the free body at the origin.
     assert read.qpos(q)[0, read.coordinates["f"]] == pytest.approx(0.1 - math.pi / 3)
     assert read.placements(q)[0, list(read.frames).index("base"), :3, 3] == pytest.approx([0.0, 0.0, 0.0])
+
+
+# -- free bodies that MuJoCo aligns ----------------------------------------------------------------------
+
+_ARM = '<body name="arm" pos="0 0 2">{}<geom size="0.3"/></body>'
+_BOX = '<geom type="box" size=".1 .2 .3" pos="0.5 0 0" euler="0 0 40"/>'
+
+
+def free_body(
+    compiler: str = "", joint: str = "", inside: str = _BOX, more: str = "", outside: str = ""
+) -> str:
+    return (
+        f'<mujoco><compiler {compiler}/>{more}<worldbody>{outside}<body name="drone">'
+        f'<freejoint name="free" {joint}/>{inside}<site name="camera" pos="0.6 0 0"/></body>'
+        "</worldbody></mujoco>"
+    )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        free_body(joint='align="true"'),
+        free_body('alignfree="true"'),
+        free_body('alignfree="true"', 'align="false"'),
+        free_body(joint='align="true"', inside='<inertial pos="1 2 3" mass="1" diaginertia="1 2 3"/>'),
+        free_body('alignfree="true" fusestatic="true"'),
+        free_body('alignfree="true"', inside=_BOX + _ARM.format('<joint name="j"/>')),
+        free_body('alignfree="true"', inside=_BOX + _ARM.format("")),
+        free_body('fusestatic="true"', inside=_BOX + _ARM.format("")),
+    ],
+)  # fmt: skip
+def test_a_free_body_that_mujoco_aligns_moves_as_in_mujoco(text: str) -> None:
+    """Places and velocities, of MuJoCo's own model of the file as it is."""
+    robot = loaded(text)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.qpos[:7] = [1.0, 2.0, 3.0, 0.5, 0.5, -0.5, 0.5]
+    data.qvel[3:6] = [0.1, -0.2, 1.0]
+    mujoco.mj_forward(model, data)
+    q = np.zeros(robot.nq)
+    q[:7] = [1.0, 2.0, 3.0, 0.5, -0.5, 0.5, 0.5]
+    v = np.zeros(robot.nv)
+    v[3:6] = [0.1, -0.2, 1.0]
+    assert robot.placement(q, "camera")[:3, 3] == pytest.approx(data.site("camera").xpos, abs=1e-14)
+    assert robot.placement(q, "camera")[:3, :3].ravel() == pytest.approx(data.site("camera").xmat, abs=1e-14)
+    theirs = np.zeros(6)
+    site = mujoco.mjtObj.mjOBJ_SITE
+    mujoco.mj_objectVelocity(model, data, site, 0, theirs, 0)
+    assert robot.velocity(q, v, "camera") == pytest.approx(np.roll(theirs, 3), abs=1e-13)
+    assert "does not compile" not in robot.certificate().reading
+    unchecked = loaded(text, verify=False)
+    np.testing.assert_array_equal(unchecked.placement(q, "camera"), robot.placement(q, "camera"))
+
+
+def test_a_body_that_cannot_be_aligned_is_listed_and_the_certificate_says_what_was_not_checked() -> None:
+    mesh = '<asset><mesh name="m" file="nowhere.stl"/></asset>'
+    with pytest.warns(
+        urdfkin.UrdfWarning, match=r"MJCF101.*drone: MuJoCo aligns the frame of this free body"
+    ):
+        robot = urdfkin.load(free_body('alignfree="true"', inside='<geom type="mesh" mesh="m"/>', more=mesh))
+    robot.placement(robot.neutral(), "camera")
+    said = robot.certificate().reading
+    assert (
+        "without the file's shapes and inertias, with which it does not compile: Error: Error opening" in said
+    )
+
+
+def test_a_free_body_that_others_are_fused_into_is_refused_where_it_is_aligned() -> None:
+    with pytest.raises(InputError, match=r'body drone: .*write fusestatic="false" or align="false"'):
+        loaded(free_body('alignfree="true" fusestatic="true"', inside=_BOX + _ARM.format("")))
+
+
+def test_a_static_body_that_the_file_has_fused_stays_a_link() -> None:
+    text = free_body('fusestatic="true"', inside=_BOX + _ARM.format(""))
+    robot = loaded(text)
+    assert robot.placement(robot.neutral(), "arm")[:3, 3] == pytest.approx([0.0, 0.0, 2.0])
+    assert robot.certificate().verified
+
+
+# -- mimic rules -----------------------------------------------------------------------------------------
+
+
+def coupled(*equalities: str, refs: tuple[float, ...] = (0.3, -0.4, 0.5)) -> str:
+    """Three hinges, one after the other, with reference values."""
+    open_ = "".join(
+        f'<body name="{name}" pos="0.1 0.2 0.3"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+        f'<joint name="{name}" axis="0 {i} 1" ref="{ref}"/>'
+        for i, (name, ref) in enumerate(zip("abc", refs, strict=True))
+    )
+    return (
+        f'<mujoco><compiler angle="radian"/><worldbody>{open_}{"</body>" * 3}</worldbody>'
+        f"<equality>{''.join(equalities)}</equality></mujoco>"
+    )
+
+
+_CHAIN = (
+    '<joint name="second" joint1="c" joint2="b" polycoef="0.2 -3 0 0 0"/>',
+    '<joint name="first" joint1="b" joint2="a" polycoef="0.1 2 0 0 0"/>',
+)
+
+
+def test_an_equality_after_an_equality_is_obeyed_as_mujoco_has_it() -> None:
+    robot = loaded(coupled(*_CHAIN))
+    assert robot.coordinate_names == ("a",)
+    rules = {joint.name: joint.mimic for joint in robot.tree.joints if joint.mimic is not None}
+    # b + 0.4 = 0.1 + 2 (a - 0.3), c - 0.5 = 0.2 - 3 (b + 0.4)
+    assert (rules["b"].leader, rules["b"].multiplier, rules["c"].leader, rules["c"].multiplier) == (
+        "a", 2.0, "a", -6.0,
+    )  # fmt: skip
+    assert rules["b"].offset == pytest.approx(-0.9)
+    assert rules["c"].offset == pytest.approx(0.7 - 3.0 * -0.5)
+    robot.placement(robot.sample(3), "c")
+    certificate = robot.certificate()
+    assert certificate.verified
+    assert "and holds its 2 mimic rules there" in certificate.reading
+
+
+def test_an_equality_that_is_not_active_couples_nothing() -> None:
+    idle = '<joint name="idle" joint1="b" joint2="a" polycoef="0 1 0 0 0" active="false"/>'
+    robot = loaded(coupled(idle))
+    assert robot.coordinate_names == ("a", "b", "c")
+    assert "mimic rules" not in robot.certificate().reading
+
+
+def wrong_offset(right: Callable[..., Any]) -> Callable[..., Any]:
+    def rule(self: Any, i: int) -> Any:
+        name, found = right(self, i)
+        return name, replace(found, offset=found.offset + 1e-12)
+
+    return rule
+
+
+def wrong_multiplier(right: Callable[..., Any]) -> Callable[..., Any]:
+    def resolved(rules: Any, follower: str) -> Any:
+        found = right(rules, follower)
+        chained = found.leader != rules[follower].leader
+        return replace(found, multiplier=rules[follower].multiplier) if chained else found
+
+    return resolved
+
+
+@pytest.mark.parametrize(
+    ("where", "name", "slip"),
+    [(mjcf._Reader, "_rule", wrong_offset), (mjcf, "_resolved", wrong_multiplier)],
+    ids=["an offset", "the multiplier of a mimic of a mimic"],
+)
+def test_a_slip_in_a_mimic_rule_is_found_by_mujocos_own_equality(
+    where: Any, name: str, slip: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    in_this_process(monkeypatch)
+    monkeypatch.setattr(where, name, slip(getattr(where, name)))
+    with pytest.raises(OracleError, match=r"mimic joint [bc]: .* is not the file's: found MuJoCo \S+ has it"):
+        loaded(coupled(*_CHAIN))
+
+
+@pytest.mark.parametrize(
+    ("active", "said"), [("false", "mimic joint b: .* does not hold it"), ("true", "equality 0: .* holds it")]
+)
+def test_a_rule_that_mujoco_does_not_hold_and_one_that_was_dropped_are_found(
+    active: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two files that differ in one equality, the model of one and the rules of the other."""
+    rule = '<joint name="x" joint1="b" joint2="a" polycoef="0 1 0 0 0" active="{}"/>'
+    other = mjcf.read_mjcf(coupled(rule.format("true" if active == "false" else "false")), "other")
+
+    def mixed(source: str, name: str, *, whole: bool = False) -> Mjcf:
+        return replace(other, model=mjcf.read_mjcf(source, name, whole=whole).model)
+
+    in_this_process(monkeypatch)
+    monkeypatch.setattr(mjcf_process, "read_mjcf", mixed)
+    with pytest.raises(OracleError, match=said):
+        loaded(coupled(rule.format(active)))
+
+
+# -- how closely it must agree ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ref", [0.0, 1e3, -1e6])
+@pytest.mark.parametrize("kind", ["hinge", "slide"])
+def test_a_large_reference_value_is_no_disagreement(kind: str, ref: float) -> None:
+    robot = loaded(one_joint(f'<joint name="j" type="{kind}" axis="1 2 3" pos="0 2 0" ref="{ref!r}"/>'))
+    q = robot.sample(1)[0]
+    model = one_joint(f'<joint name="j" type="{kind}" axis="1 2 3" pos="0 2 0" ref="{ref!r}"/>')
+    atol = 1e-13 * max(1.0, abs(ref) / 100)
+    np.testing.assert_allclose(robot.placement(q, "link:b"), of_mujoco(model, q, "b"), atol=atol)
+
+
+@pytest.mark.parametrize(
+    "joint", ['type="slide" axis="1 0 0" ref="1000000.1"', 'axis="0 0 1" pos="-1000000.1 0 0"']
+)
+def test_lengths_that_cancel_in_the_tree_are_no_disagreement(joint: str) -> None:
+    """MuJoCo adds up a million metres there and back, where the tree has their difference."""
+    text = one_joint(f'<joint name="j" {joint}/>').replace('pos="1 0 0"', 'pos="1000000.3 0 0"')
+    robot = loaded(text)
+    robot.placement(robot.sample(1), "s")
+    assert robot.certificate().verified
+
+
+@pytest.mark.parametrize("ref", [0.0, 1e3])
+@pytest.mark.parametrize("number", [(0, 1), (1, 3)], ids=["turned", "moved"])
+def test_a_reading_that_is_off_by_little_more_than_rounding_is_refused(
+    number: tuple[int, int], ref: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A hinge with a reference value may be off by eps |ref| more, here 2.2e-13."""
+    right = Mjcf.placements
+
+    def moved(self: Mjcf, q: FloatArray) -> FloatArray:
+        T = right(self, q)
+        T[:, list(self.frames).index("s"), *number] += 3e-12 if ref else 1e-12
+        return T
+
+    in_this_process(monkeypatch)
+    text = one_joint(f'<joint name="j" axis="0 0 1" ref="{ref!r}"/>')
+    loaded(text)
+    monkeypatch.setattr(Mjcf, "placements", moved)
+    with pytest.raises(OracleError, match="times what rounding allows"):
+        loaded(text)
+
+
+# -- what a file may take --------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_file_that_replicates_without_end_is_given_up() -> None:
+    inside = '<geom size=".1"/>'
+    for _ in range(9):
+        inside = f'<replicate count="1000" offset="1 0 0">{inside}</replicate>'
+    began = time.monotonic()
+    with pytest.raises(InputError, match="MuJoCo cannot compile this MJCF: found no end within 3 s"):
+        made_of_mjcf.read_mjcf(f"<mujoco><worldbody>{inside}</worldbody></mujoco>", patience=3.0)
+    assert time.monotonic() - began < 20.0
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        '<size nuser_body="2000000000"/>',
+        '<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
+    ],
+)
+def test_a_file_that_asks_for_too_much_memory_is_refused(more: str) -> None:
+    with pytest.raises(InputError, match="Perhaps it takes more than 2 GiB of memory"):
+        loaded(free_body(more=more))
+
+
+def test_memory_that_a_file_sets_apart_for_its_dynamics_is_not_taken() -> None:
+    robot = loaded(free_body(more='<size njmax="80000" nconmax="40000" nstack="1000000000"/>'))
+    assert "does not compile" not in robot.verifier.reading
+
+
+def test_a_process_that_dies_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(made_of_mjcf, "ask_python", lambda *arguments: (b'{"urdf": "half', -11))
+    with pytest.raises(InputError, match="<text>: MuJoCo cannot compile this MJCF: found its process ended"):
+        loaded(free_body())
+
+
+def test_what_the_file_with_its_shapes_takes_too_long_for_is_read_without_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    right = ask_python
+
+    def first_only(*arguments: Any) -> tuple[bytes, None]:
+        return right(*arguments)[0].splitlines(keepends=True)[0], None
+
+    monkeypatch.setattr(made_of_mjcf, "ask_python", first_only)
+    robot = loaded(free_body(joint='align="true"'))
+    assert "does not compile: no end within 60 s" in robot.verifier.reading
+    assert "MJCF101" in {finding.code for finding in robot.findings}
+
+
+def test_a_name_that_is_not_utf_8_is_one_clear_error(tmp_path: Path) -> None:
+    path = tmp_path / "odd.xml"
+    for odd in (b'<mujoco model="\xff">', b'<mujoco><worldbody><body name="\xff"/></worldbody>'):
+        path.write_bytes(odd + b"</mujoco>")
+        with pytest.raises(InputError, match=r"odd.xml: this MJCF holds a name that is not UTF-8"):
+            loaded(path)
+
+
+def test_the_digest_is_that_of_the_file_beside_which_it_stands(tmp_path: Path) -> None:
+    path = tmp_path / "two.xml"
+    path.write_text(TWO, "utf-8")
+    robot = loaded(path)
+    digest = sha256(path.read_bytes()).hexdigest()
+    assert (robot.sha256, robot.source) == (digest, str(path))
+    assert robot.certificate().sha256 == digest
+    shown = json.loads(command("info", str(path), "--format", "json").text)
+    assert (shown["sha256"], shown["source"]) == (digest, str(path))
+    assert loaded(TWO).sha256 == digest

@@ -87,6 +87,19 @@ is from a rotation does not enter:
 with u = eps/2. 20.2 is within ROUNDINGS. Found were 0.6 and 5.1 for the rotation (1,500 matrices, against 50
 digits).
 
+**An MJCF equality** y - y0 = c0 + c1 (x - x0), of reference values y0 and x0, holds where the tree's mimic
+rules put the joints, but for
+
+| | |
+|---|---|
+| the rule's offset y0 + c0 - c1 x0 | 1.5 |
+| a rule that follows a rule: the product of multipliers, that with the offset, the sum | 1.5 |
+| x and y by their rules, m q + c | 2.0 |
+| MuJoCo's residual: x - x0, c1 times that, y - y0, two differences | 2.5 |
+| | 7.5 |
+
+for each rule up to the joint that moves, and one more, times the size of all these terms.
+
 **Numbers near zero.** Products below the smallest normal number lose bits one by one. Such a product is off
 by 2^-1075, half the smallest subnormal number, which is (eps/2) times the smallest normal number: counting
 every size that is not zero as that large at least (`urdfkin.kinematics.lengths`) puts it among the roundings
@@ -126,6 +139,8 @@ NOT_ZERO = 1e-300
 ROUNDINGS = 24.0
 #: The same of urdfkin and MuJoCo together; derived above.
 MUJOCO = 30.0
+#: For each mimic rule of an MJCF file, between the tree and MuJoCo; derived above.
+MJCF_RULE = 8.0
 #: For each row of a table; derived above.
 ROW = 8.0
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
@@ -376,8 +375,8 @@ def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
 
 
 def digest(robot: Robot) -> str:
-    """SHA-256 of a robot's text."""
-    return hashlib.sha256(robot.urdf.encode()).hexdigest()
+    """SHA-256 of the file that a robot comes from: a URDF's text, or MJCF."""
+    return robot.sha256
 
 
 def parse_map(words: tuple[str, ...]) -> dict[str, str]:

@@ -6,6 +6,9 @@ of them the body's own. A joint's reference value is put into its place, so that
 free joint's quaternion, whose scalar is first there). Sites become links that are fixed.
 
 What a tree cannot hold is listed, never dropped in silence.
+
+A free body that MuJoCo aligns (`align`, `alignfree`) has its inertial frame as its frame, which only the file
+with its shapes tells: such a file is compiled as it is.
 """
 
 from __future__ import annotations
@@ -57,22 +60,30 @@ class Mjcf:
 
     Attributes:
         tree: Its links and joints.
-        model: MuJoCo's compiled model, without shapes.
+        model: MuJoCo's compiled model of the file, in which each body is still there.
+        fused: The same with static bodies fused, where the file says `fusestatic`; otherwise None.
         frames: Names of links, each with its body's or site's number in MuJoCo's model.
-        coordinates: Names of the joints that move, each with its place in MuJoCo's qpos; followers too.
+        coordinates: Names of the joints that move, each with its place in MuJoCo's qpos; mimic joints too.
+        rules: Equalities of the model that are mimic rules: their numbers, and which joint each couples.
+        apart: Other equalities between joints that are active, which the tree does not hold: their numbers.
         listed: What the tree does not hold.
-        is_text: Whether it was text, not a file.
+        whole: Whether the model has the file's shapes and inertias.
+        aligns: Whether the file has MuJoCo move a free body's frame to its inertial frame.
     """
 
     tree: KinematicTree
     model: Any
+    fused: Any
     frames: dict[str, tuple[str, int]]
     coordinates: dict[str, int]
+    rules: dict[int, str]
+    apart: frozenset[int]
     listed: tuple[Listed, ...]
-    is_text: bool
+    whole: bool
+    aligns: bool
 
     def qpos(self, q: FloatArray) -> FloatArray:
-        """(n, MuJoCo's nq) for (n, nq): followers stand where their leaders put them."""
+        """(n, MuJoCo's nq) for (n, nq): mimic joints stand where the tree's rules put them."""
         tree, full = self.tree, np.tile(self.model.qpos0, (len(q), 1))
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
             if joint.name not in self.coordinates:
@@ -89,20 +100,124 @@ class Mjcf:
         return full
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """(n, frames, 4, 4) of `frames`, by `mj_kinematics` on the file's own model."""
-        mujoco = library()
-        data = mujoco.MjData(self.model)
-        out = np.zeros((len(q), len(self.frames), 4, 4))
-        out[..., 3, 3] = 1.0
+        """(n, frames, 4, 4) of `frames`, by `mj_kinematics`; where the file fuses bodies, on the fused model.
+
+        A frame that the fused model does not have is placed by the other one.
+        """
+        qpos = self.qpos(q)
+        out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
+        if self.fused is not None:
+            kept = {f: at for f, at in enumerate(map(self._in_fused, self.frames.values())) if at is not None}
+            out[:, list(kept)] = _placements(self.fused, qpos, kept)
+        return out
+
+    def _in_fused(self, frame: tuple[str, int]) -> tuple[str, int] | None:
+        """The same body or site in the fused model, by its name."""
+        mujoco, (kind, i) = library(), frame
+        what = mujoco.mjtObj.mjOBJ_BODY if kind == "body" else mujoco.mjtObj.mjOBJ_SITE
+        name = mujoco.mj_id2name(self.model, what, i)
+        there = mujoco.mj_name2id(self.fused, what, name) if name else -1
+        return (kind, there) if there >= 0 else None
+
+    def lengths(self, q: FloatArray) -> FloatArray:
+        """(n, frames) the sum of the lengths that MuJoCo adds up on its way from the world to each frame."""
+        m, qpos = self.model, np.abs(self.qpos(q))
+        at_body = np.zeros((len(q), m.nbody))
+        for i in range(1, m.nbody):
+            own = np.full(len(q), float(np.linalg.norm(m.body_pos[i])))
+            for j, kind, to in self._joints_of(i):
+                if kind == "free":
+                    own = np.linalg.norm(qpos[:, to : to + 3], axis=1)
+                elif kind == "slide":
+                    own = own + qpos[:, to] + abs(m.qpos0[to])
+                own = own + 2.0 * np.linalg.norm(m.jnt_pos[j])
+            at_body[:, i] = at_body[:, m.body_parentid[i]] + own
+        return self._of_frames(at_body, np.linalg.norm(m.site_pos, axis=1))
+
+    def reference_angles(self, q: FloatArray) -> FloatArray:
+        """(n, frames) the sum of |q| + |ref| of the hinges on the way that have a reference value: rad."""
+        m, qpos = self.model, np.abs(self.qpos(q))
+        at_body = np.zeros((len(q), m.nbody))
+        for i in range(1, m.nbody):
+            at_body[:, i] = at_body[:, m.body_parentid[i]]
+            for _, kind, to in self._joints_of(i):
+                if kind == "hinge" and m.qpos0[to]:
+                    at_body[:, i] += qpos[:, to] + abs(m.qpos0[to])
+        return self._of_frames(at_body, np.zeros(m.nsite))
+
+    def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
+        """The joints of a body: number, kind, place in qpos."""
+        m, kinds = self.model, library().mjtJoint
+        words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
+        first = int(m.body_jntadr[body])
+        for j in range(first, first + int(m.body_jntnum[body])):
+            yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
+
+    def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
+        """(n, frames) from (n, bodies), and what each site adds to its body's."""
+        columns = [
+            at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
+            for kind, i in self.frames.values()
+        ]
+        return np.stack(columns, axis=1)
+
+    def residuals(self, q: FloatArray) -> FloatArray:
+        """(n, equalities) how far off each equality between joints is, by MuJoCo: its own `efc_pos`.
+
+        It is NaN where MuJoCo holds nothing: an equality that is not active, or of another kind.
+        """
+        mujoco, m = library(), self.model
+        off = mujoco.mjtDisableBit
+        m.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_LIMIT) | int(off.mjDSBL_FRICTIONLOSS)
+        m.opt.disableflags &= ~(int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_EQUALITY))
+        data, out = mujoco.MjData(m), np.full((len(q), m.neq), np.nan)
         for k, qpos in enumerate(self.qpos(q)):
             data.qpos[:] = qpos
-            mujoco.mj_kinematics(self.model, data)
-            for f, (kind, i) in enumerate(self.frames.values()):
-                R, p = (
-                    (data.xmat[i], data.xpos[i]) if kind == "body" else (data.site_xmat[i], data.site_xpos[i])
-                )
-                out[k, f, :3, :3], out[k, f, :3, 3] = R.reshape(3, 3), p
+            mujoco.mj_fwdPosition(m, data)
+            rows = np.asarray(data.efc_type) == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+            ids = np.asarray(data.efc_id)[rows]
+            between_joints = np.asarray(m.eq_type)[ids] == int(mujoco.mjtEq.mjEQ_JOINT)
+            out[k, ids[between_joints]] = np.asarray(data.efc_pos)[rows][between_joints]
         return out
+
+    def rule_sizes(self, q: FloatArray) -> FloatArray:
+        """(n, equalities) the size of the terms of each mimic rule, times its rules up to the leader.
+
+        That of y = y0 + c0 + c1 (x - x0) is |y0| + |c0| + |c1| (x's size + |x0|).
+        """
+        m, qpos = self.model, np.abs(self.qpos(q))
+        by_joint = {int(m.eq_obj1id[i]): i for i in self.rules}
+        known: dict[int, tuple[FloatArray, int]] = {}
+        for i in self.rules:
+            chain = [i]
+            while (above := by_joint.get(int(m.eq_obj2id[chain[-1]]))) is not None and above not in known:
+                chain.append(above)
+            for one in reversed(chain):
+                y, x = (int(m.jnt_qposadr[j]) for j in (m.eq_obj1id[one], m.eq_obj2id[one]))
+                free = qpos[:, x], 0
+                size, depth = known.get(by_joint.get(int(m.eq_obj2id[one]), -1), free)
+                y0, x0 = abs(m.qpos0[y]), abs(m.qpos0[x])
+                c0, c1 = np.abs(m.eq_data[one, :2])
+                known[one] = y0 + c0 + c1 * (size + x0), depth + 1
+        out = np.zeros((len(q), m.neq))
+        for i, (size, depth) in known.items():
+            out[:, i] = (depth + 1) * size
+        return out
+
+
+def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]) -> FloatArray:
+    """(n, frames, 4, 4) by `mj_kinematics`."""
+    mujoco = library()
+    data = mujoco.MjData(model)
+    out = np.zeros((len(qpos), len(frames), 4, 4))
+    out[..., 3, 3] = 1.0
+    for k, numbers in enumerate(qpos):
+        data.qpos[:] = numbers
+        mujoco.mj_kinematics(model, data)
+        for f, (kind, i) in enumerate(frames.values()):
+            R, p = (data.xmat[i], data.xpos[i]) if kind == "body" else (data.site_xmat[i], data.site_xpos[i])
+            out[k, f, :3, :3], out[k, f, :3, 3] = R.reshape(3, 3), p
+    return out
 
 
 def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
@@ -113,7 +228,7 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
     """
     if isinstance(source, bytes):
         return _ROOT.match(source.decode("utf-8-sig", "replace")) is not None
-    if _is_text(source):
+    if is_text(source):
         return _ROOT.match(str(source).lstrip("\ufeff")) is not None
     if not isinstance(source, str | os.PathLike) or Path(source).suffix.lower() not in _ENDINGS:
         return False
@@ -125,70 +240,158 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
     return _ROOT.match(head.decode("utf-8-sig", "replace")) is not None
 
 
-def read_mjcf(source: str | bytes | os.PathLike[str]) -> Mjcf:
-    """The robot of an MJCF file or text.
+def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False) -> Mjcf:
+    """The robot of an MJCF file or text, read in this process: `urdfkin.verify.made_of_mjcf` confines it.
 
     Args:
-        source: A path, or text, or its bytes; files that the file includes are read, meshes are not.
+        source: A path, or text; files that the file includes are read.
+        name: What to call it in messages.
+        whole: Whether MuJoCo compiles the file as it is, with its meshes; otherwise shapes and inertias are
+            taken out first, so that no mesh has to be there.
 
     Raises:
         InputError: MuJoCo is not installed, does not accept the file, or the robot has a ball joint.
     """
     mujoco = library()
+    fused = None
     try:
-        if isinstance(source, bytes):
-            spec = mujoco.MjSpec.from_string(source.decode("utf-8-sig"))
-        elif _is_text(source):
-            spec = mujoco.MjSpec.from_string(str(source).lstrip("\ufeff"))
-        else:
-            spec = mujoco.MjSpec.from_file(str(at_home(source)))
-        left = list(_stripped(mujoco, spec))
+        spec = _spec(mujoco, source)
+        aligned, fuses = list(_aligned(mujoco, spec)), bool(spec.compiler.fusestatic)
+        if whole and fuses:
+            _refuse_fused(aligned, name)
+            fused = compiled(_spec(mujoco, source))
+        spec.compiler.fusestatic = False
+        left = list(_left_out(mujoco, spec))
+        if not whole:
+            _strip(mujoco, spec)
         model = compiled(spec)
+        title = spec.modelname or "robot"
+        reader = _Reader(mujoco, model, title, name)
+        tree = reader.tree()
+    except UnicodeDecodeError as error:
+        raise InputError(
+            "this MJCF holds a name that is not UTF-8",
+            where=name,
+            found=repr(error.object)[:80],
+            remedy="save the file as UTF-8",
+        ) from None
+    except InputError:
+        raise
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         found = str(error).strip().replace("\n", "; ")
-        raise InputError("MuJoCo does not accept this MJCF", where=name_of(source), found=found) from None
-    reader = _Reader(mujoco, model, spec.modelname or "robot", name_of(source))
-    tree = reader.tree()
-    text = isinstance(source, bytes) or _is_text(source)
-    return Mjcf(tree, model, reader.frames, reader.coordinates, (*reader.listed, *left), text)
+        raise InputError("MuJoCo does not accept this MJCF", where=name, found=found) from None
+    left += [_aligned_words(body.name, whole=whole) for body in aligned]
+    listed = (*reader.listed, *left)
+    return Mjcf(
+        tree,
+        model,
+        fused,
+        reader.frames,
+        reader.coordinates,
+        reader.taken,
+        frozenset(reader.apart),
+        listed,
+        whole,
+        bool(aligned),
+    )
+
+
+def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
+    made = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
+    made.compiler.usethread = False  # a confined process may start none
+    made.memory = made.njmax = made.nconmax = made.nstack = -1  # of the file's own dynamics, maybe gigabytes
+    return made
+
+
+def _aligned(mujoco: Any, spec: Any) -> Iterator[Any]:
+    """Free bodies whose frame MuJoCo moves to their inertial frame: those that nothing movable hangs from."""
+    kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
+    for joint in spec.joints:
+        if joint.type != kinds.mjJNT_FREE:
+            continue
+        wanted = spec.compiler.alignfree if joint.align == choices.mjALIGNFREE_AUTO else joint.align
+        bodies = joint.parent.bodies
+        if wanted and not (bodies and not spec.compiler.fusestatic) and not _moving_below(joint.parent):
+            yield joint.parent
+
+
+def _moving_below(body: Any) -> bool:
+    open_ = list(body.bodies)
+    while open_:
+        one = open_.pop()
+        if list(one.joints):
+            return True
+        open_ += one.bodies
+    return False
+
+
+def _refuse_fused(aligned: list[Any], name: str) -> None:
+    for body in aligned:
+        if body.bodies:
+            raise InputError(
+                "MuJoCo fuses static bodies into a free body and aligns its frame with the inertia of all",
+                where=f"{name}: body {body.name}",
+                remedy='write fusestatic="false" or align="false"',
+            )
+
+
+def _aligned_words(body: str, *, whole: bool) -> Listed:
+    where = f"body {body}" if body else "a body without a name"
+    if whole:
+        return Listed("its frame is its inertial frame: MuJoCo aligns this free body", where)
+    said = "MuJoCo aligns the frame of this free body with its inertia, which needs its shapes; here it is"
+    return Listed(f"{said} where the file writes it", where, moves=True)
 
 
 def name_of(source: str | bytes | os.PathLike[str]) -> str:
     """What to call a source in messages."""
-    return "<bytes>" if isinstance(source, bytes) else "<text>" if _is_text(source) else str(source)
+    return "<bytes>" if isinstance(source, bytes) else "<text>" if is_text(source) else str(source)
 
 
-def _is_text(source: object) -> bool:
+def is_text(source: object) -> bool:
+    """Whether a source is MJCF itself, not the path of a file."""
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
-def _stripped(mujoco: Any, spec: Any) -> Iterator[Listed]:
-    """Take out what kinematics does not need, so that no mesh has to be there; say what it was."""
-    spec.compiler.fusestatic = False
-    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
-    for i, one in enumerate(list(spec.equalities)):
-        if one.type != mujoco.mjtEq.mjEQ_JOINT:
-            kind, names = str(one.type).rpartition("_")[2].lower(), _joined(one.name1, one.name2)
-            what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot hold"
-            yield Listed(what, f"equality {one.name or i}", moves=bool(one.active))
-            spec.delete(one)
-    gone = []
+def _useless(spec: Any) -> Iterator[tuple[str, list[Any]]]:
+    """What kinematics does not need, kind by kind."""
     for words in (
         "keys", "sensors", "actuators", "tendons", "excludes", "pairs", "skins", "flexes", "geoms", "cameras",
         "lights", "meshes", "hfields", "materials", "textures",
     ):  # fmt: skip
-        found = list(getattr(spec, words, ()))
+        if found := list(getattr(spec, words, ())):
+            yield words, found
+
+
+def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
+    """In words, what of a file the tree does not hold, its joints' own constraints aside."""
+    for i, one in enumerate(spec.equalities):
+        if one.type != mujoco.mjtEq.mjEQ_JOINT:
+            kind, names = str(one.type).rpartition("_")[2].lower(), _joined(one.name1, one.name2)
+            what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot hold"
+            yield Listed(what, f"equality {one.name or i}", moves=bool(one.active))
+    gone = dict(_useless(spec))
+    for words in ("tendons", "flexes"):
+        if words in gone:
+            yield Listed(f"{words} move nothing here", words, moves=True)
+    if gone:
+        said = ", ".join(f"{len(found)} {words}" for words, found in gone.items())
+        yield Listed(f"left out, since kinematics does not use them: {said}")
+
+
+def _strip(mujoco: Any, spec: Any) -> None:
+    """Take out what kinematics does not need, so that no mesh has to be there."""
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    for one in list(spec.equalities):
+        if one.type != mujoco.mjtEq.mjEQ_JOINT:
+            spec.delete(one)
+    for _, found in _useless(spec):
         for one in found:
             spec.delete(one)
-        if found:
-            gone.append(f"{len(found)} {words}")
-            if words in ("tendons", "flexes"):
-                yield Listed(f"{words} move nothing here", words, moves=True)
-    if gone:
-        yield Listed(f"left out, since kinematics does not use them: {', '.join(gone)}")
     for site in spec.sites:
         site.material = ""
-    spec.memory = -1  # what the file has measured for its own dynamics
+    for joint in spec.joints:
+        joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE  # with inertias that are none of the file's
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
         body.inertia, body.iquat, body.fullinertia = (1.0,) * 3, (1.0, 0.0, 0.0, 0.0), (np.nan,) * 6
@@ -209,6 +412,8 @@ class _Reader:
     frames: dict[str, tuple[str, int]] = field(default_factory=dict)
     coordinates: dict[str, int] = field(default_factory=dict)
     listed: list[Listed] = field(default_factory=list)
+    taken: dict[int, str] = field(default_factory=dict)
+    apart: set[int] = field(default_factory=set)
     _joints: list[tuple[Joint, str, str]] = field(default_factory=list)
     _names: dict[str, set[str]] = field(default_factory=lambda: {"link": set(), "joint": set()})
     _links: list[str] = field(default_factory=list)
@@ -308,20 +513,24 @@ class _Reader:
         """Equalities between two joints that are y = m x + c: mimic rules. What they lead to is free."""
         m, rules = self.model, dict[str, Mimic]()
         for i in range(m.neq):
+            if m.eq_type[i] != self.mujoco.mjtEq.mjEQ_JOINT:
+                continue
             where = f"equality {m.equality(i).name or i}"
             rule = self._rule(i)
             if not m.eq_active0[i]:
                 self.listed.append(Listed("a constraint that is not active", where))
-            elif rule is None:
+                continue
+            if rule is None:
                 names = _joined(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
                 said = f"a constraint ({names}) that is no line between two joints"
-                self.listed.append(Listed(said, where, moves=True))
             elif rule[0] in rules or _leads(rules, rule[1].leader, rule[0]):
-                self.listed.append(
-                    Listed(f"joint {rule[0]} is held twice, or in a circle", where, moves=True)
-                )
+                said = f"joint {rule[0]} is held twice, or in a circle"
             else:
                 rules[rule[0]] = rule[1]
+                self.taken[i] = rule[0]
+                continue
+            self.apart.add(i)
+            self.listed.append(Listed(said, where, moves=True))
         for follower in rules:
             yield follower, _resolved(rules, follower)
 

@@ -21,6 +21,7 @@ class Origin:
         oracle: Who checks besides Pinocchio or in its place, if anybody.
         table: Whether it is a table, whose frames between base and tip are its convention's, not links that
             somebody placed.
+        sha256: The digest of the MJCF that the URDF was made of; empty where the URDF itself was given.
 
     Raises:
         InputError: `mimic` is neither True, False nor None, or `root_joint` is no name.
@@ -32,6 +33,7 @@ class Origin:
     xacro_args: tuple[tuple[str, str], ...] = ()
     oracle: Literal["pinocchio", "mujoco"] | None = None
     table: bool = False
+    sha256: str = ""
 
     def __post_init__(self) -> None:
         if self.mimic is not None:

@@ -152,7 +152,9 @@ class _Reading:
             )
         axis = np.eye(3)["XYZ".index(aligned[2])] if aligned else np.array([1.0, 0.0, 0.0])
         if shown.endswith("Unaligned"):
-            axis = np.array(joint.extract().axis)
+            # Not every kind has `axis` in Python (4.1); the joint's motion subspace has it for each.
+            linear, angular = np.split(np.ravel(joint.createData().S), 2)
+            axis = linear + angular
         if not kind.has_axis:
             return Joint(name, kind, 0, T, axis)
         q, v = int(joint.idx_q), int(joint.idx_v)

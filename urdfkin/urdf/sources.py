@@ -33,6 +33,7 @@ class Text:
         source: What to give again to get it again; `<text>`, `<bytes>` or `<file>` where that has no name.
         entry: The catalogue's entry, if that is where it came from.
         xacro_args: Names and values that it was expanded with.
+        sha256: The digest of the MJCF that it was made of; empty for a URDF.
     """
 
     data: bytes
@@ -40,6 +41,7 @@ class Text:
     source: str
     entry: Entry | None = None
     xacro_args: tuple[tuple[str, str], ...] = ()
+    sha256: str = ""
 
 
 def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, object] | None = None) -> Text:

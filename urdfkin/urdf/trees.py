@@ -8,6 +8,8 @@ from __future__ import annotations
 from typing import Any, Protocol
 from xml.etree import ElementTree
 
+import numpy as np
+
 from urdfkin.errors import InputError
 from urdfkin.errors.demands import shown
 
@@ -45,6 +47,22 @@ def text_of(source: Any) -> tuple[str, str] | None:
     if hasattr(root, "tag") and hasattr(root, "attrib") and hasattr(root, "iter"):
         return _text(root), "<ElementTree>"
     return None
+
+
+def without_rotation(source: Any) -> list[str]:
+    """Joints of a yourdfpy robot whose origin has no rotation; none for any other source.
+
+    yourdfpy (0.0.60) drops the attribute quat_xyzw and keeps no text: whether the file wrote a rotation so
+    cannot be seen any more.
+    """
+    robot = getattr(source, "robot", source)
+    if not type(robot).__module__.startswith("yourdfpy"):
+        return []
+    return [
+        str(joint.name)
+        for joint in robot.joints
+        if joint.origin is not None and (joint.origin[:3, :3] == np.eye(3)).all()
+    ]
 
 
 def _text(root: Any) -> str:

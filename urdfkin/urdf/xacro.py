@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import threading
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import asdict
 from importlib.util import find_spec
 from math import ceil
@@ -21,7 +18,7 @@ from typing import Any
 
 from urdfkin.errors import SourceError, UrdfkinError
 from urdfkin.errors.questions import Question
-from urdfkin.system.interpreter import own_python
+from urdfkin.system.interpreter import ask_python, own_python
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.packages import VARIABLES
 
@@ -30,9 +27,6 @@ PATIENCE = 60.0
 
 #: Bytes of an answer after which it is not read on.
 MOST = 100_000_000
-
-#: What a Python may need from the environment to start at all.
-_NEEDED = ("LD_LIBRARY_PATH",)
 
 
 class XacroError(UrdfkinError):
@@ -62,7 +56,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
             question=Question.XACRO,
         )
     command = own_python("from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8"))
-    output, status = _ask(command, _request(path.absolute(), arguments, patience), patience)
+    output, status = ask_python(command, _request(path.absolute(), arguments, patience), patience, MOST)
     if status is None:
         raise XacroError("xacro does not come to an end", where=str(path), found=f"{patience:g} s")
     if len(output) > MOST:
@@ -98,36 +92,6 @@ def _request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes
 def _absolute(entries: str) -> str:
     """A search path whose entries do not depend on the working directory."""
     return os.pathsep.join(str(Path(entry).absolute()) for entry in entries.split(os.pathsep) if entry)
-
-
-def _ask(command: list[str], request: bytes, patience: float) -> tuple[bytes, int | None]:
-    """What a process writes, up to a limit, and its exit status; None for the status if it took too long."""
-    environ = {name: os.environ[name] for name in _NEEDED if name in os.environ}
-    pipe = subprocess.PIPE
-    late = threading.Event()
-    with subprocess.Popen(
-        command, env=environ, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL
-    ) as process:
-
-        def give_up() -> None:
-            late.set()
-            process.kill()
-
-        timer = threading.Timer(patience, give_up)
-        timer.start()
-        try:
-            assert process.stdin is not None
-            assert process.stdout is not None
-            with suppress(BrokenPipeError), process.stdin:
-                process.stdin.write(request)
-            output = process.stdout.read(MOST + 1)
-            if len(output) > MOST:
-                process.kill()
-            status = process.wait()
-        finally:
-            timer.cancel()
-            process.kill()
-    return output, None if late.is_set() else status
 
 
 def _answer(output: bytes) -> dict[str, Any]:

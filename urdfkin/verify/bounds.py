@@ -102,6 +102,29 @@ def placement_scale(plan: Plan, size: Magnitudes) -> FloatArray:
 
 
 @_BEYOND
+def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
+    """For (n, frames, 4, 4), between the tree that was made of an MJCF file and MuJoCo's model of the file.
+
+    The tree has added up already what MuJoCo adds up anew: a body's place, its joints' anchors there and
+    back, a slide's reference value. So positions have the length of all that, where it exceeds the path's.
+
+    MuJoCo turns a hinge by fl(q - ref), the tree by ref and by q. The difference is rounded once, by (eps/2)
+    (|q| + |ref|) rad at most. That turns what is behind the hinge: a number of a rotation changes by the
+    angle at most, one of a position by the angle times the length. Twice that is allowed, to have room for
+    the second order; as a share of k eps it is angle / k.
+
+    Args:
+        bound: Of the placements, for the tree.
+        lengths: (n, frames) what MuJoCo adds up: m.
+        angles: (n, frames) the sum of |q| + |ref| over the hinges that have a reference value: rad.
+    """
+    scale = bound.scale.copy()
+    scale[..., :3, 3] = np.maximum(scale[..., :3, 3], lengths[..., None])
+    scale[..., :3, :] *= 1.0 + (angles / result_k(bound, angles.shape))[..., None, None]
+    return Bound(scale, bound.k)
+
+
+@_BEYOND
 def velocity_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
     """For (n, frames, 6)."""
     linear = size.vel

@@ -157,7 +157,7 @@ class Certificate(Shown):
         not_verified: Why results were not checked, in words; empty where all were.
         reading: Who vouches for the way from another format to the URDF that is checked; empty for a URDF.
         source: Where the robot came from.
-        sha256: The digest of its URDF's text as UTF-8.
+        sha256: The digest of its URDF's text as UTF-8; of the MJCF file that it was made of.
         urdfkin: The version that computed.
     """
 

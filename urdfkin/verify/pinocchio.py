@@ -14,7 +14,7 @@ q_full = G q + g_0, v_full = G v, J = J_full G.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 from xml.parsers.expat import ExpatError
 
@@ -30,7 +30,7 @@ from urdfkin.verify.pinocchio_frames import Frames
 from urdfkin.verify.pinocchio_layout import Layout
 from urdfkin.verify.pinocchio_module import pinocchio, version
 
-__all__ = ["MOST_RATES", "Oracle", "OracleError", "depth_of", "mjcf_placements", "version"]
+__all__ = ["MOST_RATES", "Oracle", "OracleError", "depth_of", "version"]
 
 #: Pinocchio recurses over links: less than 4 kB of stack for each was measured (4.1.0), room for more.
 _STACK_FOR_A_LINK = 16_384
@@ -38,9 +38,6 @@ _STACK_FOR_A_LINK = 16_384
 _SHALLOW = 100
 #: Pinocchio's workspace takes about 64 bytes times the cube of the rates (4.1.0 measured): at most 2 GB.
 MOST_RATES = 315
-
-#: Coordinates of a joint that moves freely.
-_CARTESIAN = 7
 
 #: Names that an error lists at most.
 _NAMED = 5
@@ -372,64 +369,6 @@ class Oracle:
         if self._moving_base and base is not None:
             full[:, :6] = free_flyer_second_rates(base)
         return full
-
-
-def mjcf_placements(
-    path: str, qpos: FloatArray, coordinates: Mapping[str, int], bodies: Sequence[str]
-) -> FloatArray:
-    """(n, bodies, 4, 4) by Pinocchio's own reader of MJCF, which takes joints and bodies by name.
-
-    Args:
-        path: The file.
-        qpos: (n, MuJoCo's nq).
-        coordinates: Where each joint's first number stands in them.
-        bodies: Names of bodies.
-
-    Raises:
-        OracleError: it does not accept the file, or finds other joints or bodies in it.
-    """
-    pin = pinocchio()
-
-    try:
-        model = pin.buildModelFromMJCF(path)
-    except Exception as error:  # it raises what its parsers do
-        raise OracleError("it does not accept the file", found=str(error).strip()) from error
-    joints = dict(_numbered(model, list(coordinates)))
-    if joints.keys() != coordinates.keys():
-        found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:_NAMED])
-        raise OracleError("it finds other joints", found=found)
-    if missing := [name for name in bodies if not model.existFrame(name)]:
-        raise OracleError("it finds no such body", found=missing[0])
-    data, out = model.createData(), np.empty((len(qpos), len(bodies), 4, 4))
-    ids = [int(model.getFrameId(name, pin.FrameType.BODY)) for name in bodies]
-    for k, numbers in enumerate(qpos):
-        q = pin.neutral(model)
-        for name, at in coordinates.items():
-            (first, count), x = joints[name], numbers[at]
-            if count == _CARTESIAN:
-                q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
-            elif count == 1:
-                q[first] = x
-            else:  # a turn without limits
-                q[first : first + 2] = np.cos(x), np.sin(x)
-        pin.framesForwardKinematics(model, data, q)
-        out[k] = [data.oMf[i].homogeneous for i in ids]
-    return out
-
-
-def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
-    """Where each joint's numbers begin in q, and how many there are.
-
-    A body's joints are one to Pinocchio, `Composite_` and the first one's name, with a number for each.
-    """
-    for j, name in list(enumerate(map(str, model.names)))[1:]:
-        joint, first = model.joints[j], name.removeprefix("Composite_")
-        if first != name and first in names:
-            at = names.index(first)
-            for i, part in enumerate(names[at : at + joint.nq]):
-                yield part, (joint.idx_q + i, 1)
-        else:
-            yield name, (joint.idx_q, joint.nq)
 
 
 def demand_the_same(

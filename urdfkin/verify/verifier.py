@@ -141,9 +141,14 @@ class Verifier:
             self.ledger.certificate(self.tree.name, self.witness.words),
             reading=self.reading,
             source=self.origin.source,
-            sha256=hashlib.sha256(self.text.encode()).hexdigest(),
+            sha256=self.sha256,
             urdfkin=own_version(),
         )
+
+    @property
+    def sha256(self) -> str:
+        """The digest of what was given: of the MJCF file, or of the URDF's text as UTF-8."""
+        return self.origin.sha256 or hashlib.sha256(self.text.encode()).hexdigest()
 
     # -- quantities ----------------------------------------------------------------------------------
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from urdfkin.lint.escape import quoted
-from urdfkin.lint.finding import Severity
+from urdfkin.lint.finding import Finding, Severity
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, WARNING, Rule
 from urdfkin.lint.rules.axes import LONGEST, SHORTEST
@@ -22,6 +24,8 @@ IGNORED = Rule("URDF510", "ignored-value", WARNING)
 QUATERNION_IGNORED = Rule("URDF511", "quat-xyzw-ignored", WARNING)
 QUATERNION = Rule("URDF512", "quat-xyzw", WARNING)
 BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
+#: Names that one finding lists at most.
+_NAMED = 5
 
 
 def read_robot(report: Reporter, root: Element, version: tuple[int, int]) -> RobotRecord:
@@ -42,6 +46,24 @@ def read_robot(report: Reporter, root: Element, version: tuple[int, int]) -> Rob
         seen.setdefault(joint.name, element)
         robot.joints.append(joint)
     return robot
+
+
+def lost_quaternions(joints: Sequence[str], file: str) -> tuple[Finding, ...]:
+    """What is said of a yourdfpy robot whose joints may have had a rotation that yourdfpy does not read.
+
+    Args:
+        joints: Those whose origin has no rotation.
+        file: What to call the robot.
+    """
+    if not joints:
+        return ()
+    more = f" and {len(joints) - _NAMED} more" if len(joints) > _NAMED else ""
+    message = (
+        f"yourdfpy drops quat_xyzw and keeps no text: had the file one at {', '.join(joints[:_NAMED])}{more},"
+        " its rotation would be missing here"
+    )
+    remedy = "load the file itself if it is written so"
+    return (Finding(QUATERNION.id, Severity.NOTE, message, remedy=remedy, file=file),)
 
 
 class JointReader:

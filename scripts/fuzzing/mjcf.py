@@ -1,0 +1,221 @@
+"""Random MJCF files: free bodies that MuJoCo aligns or fuses, chains of equalities, default classes.
+
+A file depends on the seed, its family and its number alone. MuJoCo itself is asked where each body and site
+of the file is, and which equalities hold: nothing of urdfkin's reading of MJCF is used for it.
+"""
+
+from __future__ import annotations
+
+import random
+
+import mujoco
+import numpy as np
+
+from scripts.fuzzing import Case
+from scripts.fuzzing import odd_numbers as odd
+from urdfkin.model.frame_names import LinkFrame
+from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.robot import Robot
+
+FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
+_CLASSES = ("outer", "inner", "other")
+#: How far two placements, or the two sides of an equality, may be apart in proportion to what is added up.
+_APART = 1e-12
+
+mujoco.set_mju_user_warning(lambda said: None)  # of dynamics; else it writes a log into the current folder
+
+
+def robot(seed: int, family: str, number: int) -> Case:
+    """The file of that number."""
+    rng = random.Random(f"{seed}:{family}:{number}")
+    return Case(f"{family} {number}", _File(rng, family).text().encode())
+
+
+class _File:
+    """A file while it is written."""
+
+    def __init__(self, rng: random.Random, family: str) -> None:
+        self.rng, self.family = rng, family
+        self.bodies, self.sites = 0, 0
+        self.joints: list[str] = []
+        self.degrees = rng.random() < 0.4
+
+    def text(self) -> str:
+        """The document."""
+        rng = self.rng
+        trees = "".join(self.body(0) for _ in range(rng.randint(1, 3)))
+        words = {
+            "angle": "degree" if self.degrees else "radian",
+            "eulerseq": rng.choice(("xyz", "ZYX", "zxz", "XyZ")),
+            "alignfree": rng.choice(("true", "false")),
+            "fusestatic": rng.choice(("true", "false", "false")),
+            "autolimits": rng.choice(("true", "true", "false")),
+        }
+        written = [word for word in words if word == "angle" or rng.random() < 0.7]
+        compiler = " ".join(f'{word}="{words[word]}"' for word in written)
+        return (
+            f'<mujoco model="m"><compiler {compiler}/>{self.defaults()}<worldbody>{trees}</worldbody>'
+            f"{self.equalities()}</mujoco>\n"
+        )
+
+    def defaults(self) -> str:
+        """Classes in one another, which give joints, shapes and sites what these do not say."""
+        if self.family != "mjcf-classes":
+            return ""
+
+        def inside() -> str:
+            joint = " ".join(self.joint_words(0.3))
+            site = f'<site pos="{self.vector()}"/>' if self.rng.random() < 0.5 else ""
+            return f"<joint {joint}/>{site}"
+
+        inner = f'<default class="inner">{inside()}</default>'
+        outer = (
+            f'<default class="outer">{inside()}{inner}</default><default class="other">{inside()}</default>'
+        )
+        return f"<default>{outer}</default>"
+
+    def body(self, depth: int) -> str:
+        """A body with its joints, shapes and sites, and those that hang from it."""
+        rng = self.rng
+        name, self.bodies = f"body{self.bodies}", self.bodies + 1
+        words = [f'name="{name}"', f'pos="{self.vector()}"', self.orientation()]
+        if self.family == "mjcf-classes" and rng.random() < 0.4:
+            words.append(f'childclass="{rng.choice(_CLASSES)}"')
+        free = depth == 0 and rng.random() < (0.8 if self.family == "mjcf-free" else 0.1)
+        parts = [
+            self.free_joint() if free else "".join(self.joint() for _ in range(rng.choice((0, 1, 1, 2))))
+        ]
+        parts += [self.shape() for _ in range(rng.randint(1, 2))]
+        if rng.random() < 0.2:
+            moments = " ".join(repr(1.0 + rng.random()) for _ in range(3))
+            parts.append(f'<inertial pos="{self.vector()}" mass="1" diaginertia="{moments}"/>')
+        for _ in range(rng.randint(0, 2)):
+            parts.append(f'<site name="site{self.sites}"{self.of_class()} {self.site_words()}/>')
+            self.sites += 1
+        while depth < 4 and rng.random() < 0.45:
+            parts.append(self.body(depth + 1))
+        return f"<body {' '.join(words)}>{''.join(parts)}</body>"
+
+    def site_words(self) -> str:
+        """Where a site is, if it says so itself."""
+        return f'pos="{self.vector()}" {self.orientation()}' if self.rng.random() < 0.7 else ""
+
+    def of_class(self) -> str:
+        """A class of its own."""
+        named = self.family == "mjcf-classes" and self.rng.random() < 0.4
+        return f' class="{self.rng.choice(_CLASSES)}"' if named else ""
+
+    def free_joint(self) -> str:
+        """A joint that moves freely, in its two writings."""
+        name, align = f"free{self.bodies}", self.rng.choice(("true", "false", "auto"))
+        if self.rng.random() < 0.5:
+            return f'<joint name="{name}" type="free"/>'
+        return f'<freejoint name="{name}" align="{align}"/>'
+
+    def joint(self) -> str:
+        """A hinge or a slide."""
+        name = f"joint{len(self.joints)}"
+        self.joints.append(name)
+        return f'<joint name="{name}"{self.of_class()} {" ".join(self.joint_words(0.7))}/>'
+
+    def joint_words(self, share: float) -> list[str]:
+        """What a joint, or its class, says: each thing or not."""
+        rng = self.rng
+        lower, upper = sorted((rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 2.0)))
+        large = rng.random() < 0.2
+        words = (
+            f'type="{rng.choice(("hinge", "hinge", "slide"))}"',
+            f'axis="{" ".join(map(repr, odd.direction(rng)))}"',
+            f'pos="{self.vector()}"',
+            f'ref="{rng.uniform(-2.0, 2.0) * (1e4 if large else 1.0)!r}"',
+            f'range="{lower!r} {upper + 0.1!r}" limited="true"',
+        )
+        return [word for word in words if rng.random() < share]
+
+    def shape(self) -> str:
+        """A box, which gives its body an inertia that lies askew."""
+        sizes = " ".join(repr(self.rng.uniform(0.05, 0.5)) for _ in range(3))
+        return f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>'
+
+    def orientation(self) -> str:
+        """None, or in one of the ways of MJCF."""
+        rng = self.rng
+        angle = 90.0 if self.degrees else 1.5
+        return rng.choice(
+            (
+                "",
+                f'quat="{" ".join(repr(rng.gauss(0.0, 1.0)) for _ in range(4))}"',
+                f'euler="{" ".join(repr(rng.uniform(-angle, angle)) for _ in range(3))}"',
+                f'axisangle="{" ".join(map(repr, odd.direction(rng)))} {rng.uniform(-angle, angle)!r}"',
+                f'xyaxes="1 {rng.random()!r} 0 0 1 {rng.random()!r}"',
+            )
+        )
+
+    def vector(self) -> str:
+        """Three lengths."""
+        return " ".join(repr(odd.tame_length(self.rng)) for _ in range(3))
+
+    def equalities(self) -> str:
+        """Constraints between joints: chains, circles, twice, idle, bent, and others."""
+        rng, made = self.rng, []
+        count = rng.randint(1, 5) if self.family == "mjcf-equalities" else rng.randint(0, 1)
+        for i in range(count if len(self.joints) > 1 else 0):
+            first, second = rng.sample(self.joints, 2)
+            c = [rng.uniform(-1.0, 1.0), rng.choice((1.0, -1.0, 0.0, rng.uniform(-3.0, 3.0))), 0.0, 0.0, 0.0]
+            if rng.random() < 0.1:
+                c[rng.randint(2, 4)] = rng.uniform(-1.0, 1.0)
+            words = [f'name="equality{i}"', f'joint1="{first}"']
+            words += [f'joint2="{second}"'] if rng.random() < 0.9 else []
+            words += [f'polycoef="{" ".join(map(repr, c))}"'] if rng.random() < 0.9 else []
+            words += [f'active="{rng.choice(("true", "false"))}"'] if rng.random() < 0.4 else []
+            made.append(f"<joint {' '.join(words)}/>")
+        if self.bodies > 1 and rng.random() < 0.2:
+            made.append('<weld name="glue" body1="body0" body2="body1"/>')
+        return f"<equality>{''.join(made)}</equality>"
+
+
+def compiled(data: bytes) -> mujoco.MjModel | None:
+    """MuJoCo's model of the file as it is; None where it does not accept it."""
+    try:
+        return mujoco.MjModel.from_xml_string(data.decode())
+    except ValueError:
+        return None
+
+
+def difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
+    """Where MuJoCo has a body or a site elsewhere, or couples joints otherwise; None if it does not."""
+    data = mujoco.MjData(model)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    warned = " ".join(finding.message for finding in robot.findings if finding.code == "MJCF101")
+    for q in robot.sample(3, seed=seed):
+        data.qpos[:] = _qpos(robot, model, q)
+        mujoco.mj_fwdPosition(model, data)
+        large = 10.0 + float(np.abs(data.qpos).max(initial=0.0)) + float(np.abs(model.qpos0).max(initial=0.0))
+        for kind, count in (("body", model.nbody), ("site", model.nsite)):
+            for i in range(1 if kind == "body" else 0, count):
+                one = getattr(data, kind)(i)
+                T = robot.placement(q, LinkFrame.of(one.name))
+                off = max(np.abs(T[:3, 3] - one.xpos).max(), np.abs(T[:3, :3].ravel() - one.xmat).max())
+                if off > _APART * large:
+                    return f"{one.name} is {off:.3g} elsewhere"
+        for row in np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)):
+            i = int(data.efc_id[row])
+            name = model.equality(i).name
+            told = f"equality {name}:" in warned
+            if not told and abs(data.efc_pos[row]) > 1e3 * _APART * large:
+                return f"{name} is off by {data.efc_pos[row]:.3g}"
+    return None
+
+
+def _qpos(robot: Robot, model: mujoco.MjModel, q: FloatArray) -> FloatArray:
+    qpos: FloatArray = np.array(model.qpos0)
+    for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
+        if joint.kind is JointKind.FIXED:
+            continue
+        to = int(model.joint(joint.name).qposadr[0])
+        if joint.kind is JointKind.FLOATING:
+            qpos[to : to + 7] = [*q[at : at + 3], q[at + 6], *q[at + 3 : at + 6]]
+        else:
+            rule = joint.mimic
+            qpos[to] = q[at] if rule is None else rule.multiplier * q[at] + rule.offset
+    return qpos

@@ -1,0 +1,203 @@
+"""The process that compiles an MJCF file: MuJoCo and Pinocchio's MJCF reader run here, within limits.
+
+A few lines of MJCF may ask for any time and memory (nested `<replicate>`, `nuser_body`), and a defect of a
+parser may do anything; so the caller's process sees plain data only. A request comes on standard input, each
+answer is a line of JSON on standard output: the robot without its shapes; the robot of the file as it is;
+where Pinocchio's reader places the bodies. Should the process end early, the answers before stand.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import astuple
+from typing import Any
+
+import numpy as np
+
+from urdfkin.errors import InputError, InstallationError, OracleError, UrdfkinError
+from urdfkin.model.configuration import neutral
+from urdfkin.model.tree import FloatArray
+from urdfkin.urdf.confinement import MEMORY, limit
+from urdfkin.urdf.mjcf import Mjcf, read_mjcf
+from urdfkin.urdf.mujoco import library
+from urdfkin.urdf.writer import to_urdf
+from urdfkin.verify.pinocchio_module import pinocchio
+from urdfkin.verify.sampling import sample
+
+#: Coordinates of a joint that moves freely.
+_CARTESIAN = 7
+#: Names that an error lists at most.
+_NAMED = 5
+
+TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
+
+
+def serve() -> None:
+    """A request on standard input, answers on standard output."""
+    request = json.load(sys.stdin)
+    try:
+        library().set_mju_user_warning(lambda said: None)  # of dynamics; else it opens a log file
+        if request["path"] is not None and request["samples"]:
+            with suppress(InstallationError):
+                pinocchio()
+        limit(request["seconds"])
+        for answer in answers(request):
+            _say(answer)
+    except MemoryError:
+        _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": TOO_MUCH}})
+    except UrdfkinError as error:
+        words = {key: getattr(error, key) for key in ("what", "where", "remedy")}
+        _say({"error": words | {"found": _plain(error.found)}})
+    except Exception as error:
+        said = f"{type(error).__name__}: {error}"
+        _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": said[:2000]}})
+    os._exit(0)  # libraries may not do what they would at their end
+
+
+def _plain(found: str | None) -> str | None:
+    """What MuJoCo says; where memory ends it says no more than that something is unknown."""
+    return f"{found} Perhaps {TOO_MUCH}" if found and found.endswith("unknown exception!") else found
+
+
+def _say(answer: Mapping[str, Any]) -> None:
+    sys.stdout.write(json.dumps(answer) + "\n")
+    sys.stdout.flush()
+
+
+def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """What is answered to a request, one after the other.
+
+    Args:
+        request: `path` or `text`; `name`, what to call it in messages; `samples`, how many configurations
+            MuJoCo places besides the neutral one, 0 for none at all.
+    """
+    path, samples = request["path"], int(request["samples"])
+    source = path if path is not None else request["text"]
+    read = read_mjcf(source, request["name"])
+    q = _configurations(read, samples)
+    yield _answer(read, q)
+    if samples or read.aligns:
+        try:
+            whole = read_mjcf(source, request["name"], whole=True)
+            q = _configurations(whole, samples)
+            yield _answer(whole, q)
+            read = whole
+        except (MemoryError, InputError, library().FatalError) as error:
+            if isinstance(error, InputError) and error.remedy is not None:
+                raise  # MuJoCo does compile it, and no tree can hold what it makes of it
+            found = error.found if isinstance(error, InputError) else str(error)
+            yield {"not_whole": _plain(found) or TOO_MUCH}
+    if samples and path is not None:
+        yield {"pinocchio": _pinocchios(path, read, q)}
+
+
+def _configurations(read: Mjcf, samples: int) -> FloatArray:
+    """(n, nq): the neutral one and random ones; none where none are asked for."""
+    if not samples:
+        return np.empty((0, read.tree.nq))
+    drawn = sample(read.tree, samples, np.random.default_rng(0))
+    return np.vstack((neutral(read.tree), drawn))
+
+
+def _answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
+    answer: dict[str, Any] = {
+        "urdf": to_urdf(read.tree),
+        "listed": [astuple(one) for one in read.listed],
+        "whole": read.whole,
+        "frames": [(name, kind) for name, (kind, _) in read.frames.items()],
+        "rules": [(i, name) for i, name in read.rules.items()],
+        "apart": sorted(read.apart),
+    }
+    if len(q):
+        answer |= {
+            "q": packed(q),
+            "placements": packed(read.placements(q)[..., :3, :]),
+            "lengths": packed(read.lengths(q)),
+            "angles": packed(read.reference_angles(q)),
+            "residuals": packed(read.residuals(q)),
+            "rule_sizes": packed(read.rule_sizes(q)),
+        }
+    return answer
+
+
+def packed(numbers: FloatArray) -> dict[str, Any]:
+    """An array as plain data for JSON."""
+    data = np.ascontiguousarray(numbers, dtype="<f8")
+    return {"shape": data.shape, "base64": base64.b64encode(data.tobytes()).decode("ascii")}
+
+
+def unpacked(found: Mapping[str, Any]) -> FloatArray:
+    """The array again."""
+    numbers = np.frombuffer(base64.b64decode(found["base64"]), dtype="<f8")
+    return numbers.reshape([int(n) for n in found["shape"]]).astype(np.float64)
+
+
+def _pinocchios(path: str, read: Mjcf, q: FloatArray) -> dict[str, Any]:
+    bodies = [name for name, (kind, i) in read.frames.items() if kind == "body" and i]
+    try:
+        placed = _pinocchio_placements(path, read.qpos(q), read.coordinates, bodies)
+    except (OracleError, InstallationError) as error:
+        return {"error": str(error)}
+    return {"bodies": bodies, "placements": packed(placed[..., :3, :])}
+
+
+def _pinocchio_placements(
+    path: str, qpos: FloatArray, coordinates: Mapping[str, int], bodies: Sequence[str]
+) -> FloatArray:
+    """(n, bodies, 4, 4) by Pinocchio's own reader of MJCF, which takes joints and bodies by name.
+
+    Args:
+        path: The file.
+        qpos: (n, MuJoCo's nq).
+        coordinates: Where each joint's first number stands in them.
+        bodies: Names of bodies.
+
+    Raises:
+        OracleError: it does not accept the file, or finds other joints or bodies in it.
+    """
+    pin = pinocchio()
+    try:
+        model = pin.buildModelFromMJCF(path)
+    except Exception as error:  # it raises what its parsers do
+        raise OracleError("it does not accept the file", found=str(error).strip()) from error
+    joints = dict(_numbered(model, list(coordinates)))
+    if joints.keys() != coordinates.keys():
+        found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:_NAMED])
+        raise OracleError("it finds other joints", found=found)
+    if missing := [name for name in bodies if not model.existFrame(name)]:
+        raise OracleError("it finds no such body", found=missing[0])
+    data, out = model.createData(), np.empty((len(qpos), len(bodies), 4, 4))
+    ids = [int(model.getFrameId(name, pin.FrameType.BODY)) for name in bodies]
+    for k, numbers in enumerate(qpos):
+        q = pin.neutral(model)
+        for name, at in coordinates.items():
+            (first, count), x = joints[name], numbers[at]
+            if count == _CARTESIAN:
+                q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
+            elif count == 1:
+                q[first] = x
+            else:  # a turn without limits
+                q[first : first + 2] = np.cos(x), np.sin(x)
+        pin.framesForwardKinematics(model, data, q)
+        out[k] = [data.oMf[i].homogeneous for i in ids]
+    return out
+
+
+def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
+    """Where each joint's numbers begin in q, and how many there are.
+
+    A body's joints are one to Pinocchio, `Composite_` and the first one's name, with a number for each.
+    """
+    for j, name in list(enumerate(map(str, model.names)))[1:]:
+        joint, first = model.joints[j], name.removeprefix("Composite_")
+        if first != name and first in names:
+            at = names.index(first)
+            for i, part in enumerate(names[at : at + joint.nq]):
+                yield part, (joint.idx_q + i, 1)
+        else:
+            yield name, (joint.idx_q, joint.nq)
