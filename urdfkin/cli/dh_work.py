@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.output import write_file
 from urdfkin.dh import DHTable, Units, export, read_table, to_convention
-from urdfkin.dh.compare import CellDifference, Comparison, Slip, compare, comparison_text, diagnose
+from urdfkin.dh.compare import CellDifference, Comparison, Mistake, Slip, compare, comparison_text, diagnose
 from urdfkin.dh.digits import last_digits
 from urdfkin.dh.export.mapping import to_mapping
 from urdfkin.dh.export.tree import as_mapping, write_tree
@@ -223,13 +223,13 @@ def _compare(work: Work, name: str) -> int:
             error.remedy = f"{error.remedy}; {slip}" if error.remedy else str(slip)
         raise
     found = compare(chain, reference, tolerance, fit=work.fit, digits=last_digits(data))
-    slip = None if found.agrees else diagnose(chain, data, tolerance, found.metres)
+    slip = None if found.agrees or found.mistakes else diagnose(chain, data, tolerance, found.metres)
     if work.format_ == "json":
         text = json.dumps(_comparison(found, slip), indent=2, allow_nan=False) + "\n"
     else:
         text = comparison_text(found, work.units) + (f"\nhint: {slip}\n" if slip else "")
     _put(work, text)
-    return 0 if found.agrees else 1
+    return 0 if found.passes else 1
 
 
 def _known(work: Work, name: object) -> str | None:
@@ -239,6 +239,7 @@ def _known(work: Work, name: object) -> str | None:
 
 def _comparison(found: Comparison, slip: Slip | None) -> dict[str, Any]:
     return {
+        "passes": found.passes,
         "agrees": found.agrees,
         "exact": found.exact,
         "tip_off_at_most_m": found.metres,
@@ -255,6 +256,7 @@ def _comparison(found: Comparison, slip: Slip | None) -> dict[str, Any]:
         "offsets": list(found.offsets),
         "not_compared": [{"row": row + 1, "cell": cell} for row, cell in found.hidden],
         "differences": [_difference(one) for one in found.differences],
+        "likely_mistakes": [_mistake(one) for one in found.mistakes],
         "would_fit_read_as": slip and slip.as_mapping(),
         "without_fitting": [_difference(one) for one in found.instead],
         "fitted": to_mapping(found.reference),
@@ -270,6 +272,17 @@ def _difference(one: CellDifference) -> dict[str, Any]:
         "urdf": one.urdf,
         "tip_m": one.tip,
         "within_last_digit": one.is_rounding,
+    }
+
+
+def _mistake(one: Mistake) -> dict[str, Any]:
+    return {
+        "kind": str(one.kind),
+        "rows": [row + 1 for row in one.rows],
+        "cell": one.cell and _difference(one.cell),
+        "still_fitted": asdict(one.fitted),
+        "tip_off_at_most_m": one.metres,
+        "tip_turned_at_most_rad": one.radians,
     }
 
 
