@@ -13,7 +13,16 @@ import numpy as np
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.output import write_file
 from urdfkin.dh import DHTable, Units, export, read_table, to_convention
-from urdfkin.dh.compare import CellDifference, Comparison, Mistake, Slip, compare, comparison_text, diagnose
+from urdfkin.dh.compare import (
+    CellDifference,
+    Comparison,
+    Mistake,
+    Slip,
+    compare,
+    comparison_text,
+    convention_that_fits,
+    diagnose,
+)
 from urdfkin.dh.digits import last_digits
 from urdfkin.dh.export.mapping import to_mapping
 from urdfkin.dh.export.tree import as_mapping, write_tree
@@ -216,6 +225,11 @@ def _compare(work: Work, name: str) -> int:
     tip = work.tip or _known(work, data.get("tip_frame"))
     base = work.base or _known(work, data.get("base_frame"))
     chain, tolerance = work.robot.chain(tip, base), work.tolerance / 1e3
+    note = ""
+    if "convention" not in data:
+        convention = convention_that_fits(chain, data, tolerance, str(path))
+        data = {**data, "convention": convention}
+        note = f"The table names no convention; {convention} fits best. Write the convention into it.\n"
     try:
         reference = table_of(data, str(path))
     except InputError as error:
@@ -225,9 +239,9 @@ def _compare(work: Work, name: str) -> int:
     found = compare(chain, reference, tolerance, fit=work.fit, digits=last_digits(data))
     slip = None if found.agrees or found.mistakes else diagnose(chain, data, tolerance, found.metres)
     if work.format_ == "json":
-        text = json.dumps(_comparison(found, slip), indent=2, allow_nan=False) + "\n"
+        text = json.dumps(_comparison(found, reference, slip), indent=2, allow_nan=False) + "\n"
     else:
-        text = comparison_text(found, work.units) + (f"\nhint: {slip}\n" if slip else "")
+        text = note + comparison_text(found, work.units) + (f"\nhint: {slip}\n" if slip else "")
     _put(work, text)
     return 0 if found.passes else 1
 
@@ -237,11 +251,12 @@ def _known(work: Work, name: object) -> str | None:
     return name if isinstance(name, str) and name in work.robot.frame_names else None
 
 
-def _comparison(found: Comparison, slip: Slip | None) -> dict[str, Any]:
+def _comparison(found: Comparison, reference: DHTable, slip: Slip | None) -> dict[str, Any]:
     return {
         "passes": found.passes,
         "agrees": found.agrees,
         "exact": found.exact,
+        "read_as": str(reference.convention),
         "tip_off_at_most_m": found.metres,
         "tip_turned_at_most_rad": found.radians,
         "proven_tip_off_at_most_m": found.most_metres,

@@ -2,7 +2,7 @@
 
 from urdfkin.dh.compare.agreement import TOLERANCE, compare
 from urdfkin.dh.compare.result import CellDifference, Comparison, Mistake
-from urdfkin.dh.compare.slips import Slip, diagnose
+from urdfkin.dh.compare.slips import Slip, convention_that_fits, diagnose
 from urdfkin.dh.compare.text import comparison_text
 
 __all__ = [
@@ -13,5 +13,6 @@ __all__ = [
     "Slip",
     "compare",
     "comparison_text",
+    "convention_that_fits",
     "diagnose",
 ]
