@@ -14,6 +14,7 @@ from urdfkin.dh.compare.mistakes import Search
 from urdfkin.dh.compare.proof import most_apart
 from urdfkin.dh.compare.result import EXPLAINED, CellDifference, Comparison, TakenUp
 from urdfkin.dh.convert import to_convention
+from urdfkin.dh.lengths import demand_squares_of
 from urdfkin.dh.row import Convention
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHTable
@@ -139,7 +140,10 @@ def _reach(chain: FrameChain, wanted: FloatArray) -> float:
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
-    """Raise InputError unless a table has as many joints as a path, of the same kinds, and at least one."""
+    """Raise InputError unless a table has as many joints as a path, of the same kinds, and at least one.
+
+    RangeError where a length of either cannot be squared.
+    """
     theirs = [row.kind.turns for row in reference.rows]
     ours = [joint.kind.turns for joint in chain.joints]
     if theirs != ours or not ours:
@@ -150,6 +154,7 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
             found=f"{words[0]} in the table, {words[1]} in the URDF",
             remedy="choose base and tip so that exactly the table's joints lie between them",
         )
+    demand_squares_of(chain, reference)
 
 
 def _wanted(chain: FrameChain) -> tuple[Wanted, Wanted]:

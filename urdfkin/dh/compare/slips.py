@@ -23,7 +23,7 @@ from urdfkin.dh.reading import Reading, as_said, other_readings
 from urdfkin.dh.row import Convention
 from urdfkin.dh.rows import table_from_mapping
 from urdfkin.dh.table import DHTable
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, RangeError
 from urdfkin.errors.questions import Question
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
@@ -97,7 +97,10 @@ def diagnose(
     close.sort(key=lambda one: one[0] + worth * one[1])
     found = list[tuple[float, Slip]]()
     for _, slips, reading, table in close[:_TRIED]:
-        metres, radians = best_fit(chain, table, tolerance)
+        try:
+            metres, radians = best_fit(chain, table, tolerance)
+        except RangeError:  # lengths that only this reading makes so large
+            continue
         off_here = metres + radians * chain.reach
         if off_here <= max(tolerance, min(_EXPLAINS * off, _EXPLAINS * chain.reach)):
             found.append((off_here + tolerance * slips, Slip(reading, said, metres, radians)))
