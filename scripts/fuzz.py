@@ -5,6 +5,7 @@
 
 Mutants of the shipped robots are one family; the others are random whole robots, each odd in its own way:
 names that look like ours, prefixes, versions, followers, lengths, angles, axes, limits, roots, or everything.
+The family "tables" has Denavit-Hartenberg tables with damaged headers: each is refused or compared.
 
 Each goes through `check` and `load`, and every quantity of it is computed in every reference, on bases near
 and far, and held against Pinocchio, in a worker process that is restarted when it dies or takes too long.
@@ -30,7 +31,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
-from scripts.fuzzing import GOOD, Case, robots
+from scripts.fuzzing import GOOD, Case, robots, tables
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
@@ -38,7 +39,7 @@ from urdfkin.urdf.catalogue import catalogue
 READY, FIRST_WAIT = "ready", 300.0
 
 MUTANTS = "mutants"
-FAMILIES = (MUTANTS, *robots.FAMILIES)
+FAMILIES = (MUTANTS, *robots.FAMILIES, tables.FAMILY)
 
 
 @cache
@@ -50,6 +51,8 @@ def files() -> list[Path]:
 
 def case(seed: int, family: str, number: int) -> Case:
     """One document of a family."""
+    if family == tables.FAMILY:
+        return tables.sheet(seed, number)
     return mutant(seed, number, files()) if family == MUTANTS else robots.robot(seed, family, number)
 
 
@@ -126,7 +129,8 @@ def work(seed: int) -> None:
     print(READY, file=answers, flush=True)
     for line in sys.stdin:
         family, number = line.split()
-        outcome = judge(case(seed, family, int(number)))
+        made = case(seed, family, int(number))
+        outcome = tables.judge(made) if family == tables.FAMILY else judge(made)
         print(json.dumps([outcome.word, outcome.details]), file=answers, flush=True)
 
 
@@ -153,7 +157,7 @@ def fuzz(
                 made = case(seed, family, number)
                 keep.mkdir(parents=True, exist_ok=True)
                 name = f"{family}-{seed}-{number}"
-                (keep / f"{name}.urdf").write_bytes(made.data)
+                (keep / f"{name}{made.suffix}").write_bytes(made.data)
                 (keep / f"{name}.txt").write_text(f"{made.words}\n{word}\n{details}\n", "utf-8")
                 print(f"{family} {number} ({made.what}): {word}", flush=True)
 
