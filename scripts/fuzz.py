@@ -5,7 +5,8 @@
 
 Mutants of the shipped robots are one family; the others are random whole robots, each odd in its own way:
 names that look like ours, prefixes, versions, followers, lengths, angles, axes, limits, roots, or everything;
-and MJCF files with free bodies, equalities and default classes, which MuJoCo is asked about on its own.
+MJCF files with free bodies, equalities and default classes, which MuJoCo checks on its own; and the family
+"tables", Denavit-Hartenberg tables with damaged headers: each is refused or compared.
 
 Each goes through `check` and `load`, and every quantity of it is computed in every reference, on bases near
 and far, and held against Pinocchio, in a worker process that is restarted when it dies or takes too long.
@@ -31,7 +32,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
-from scripts.fuzzing import GOOD, Case, mjcf, robots
+from scripts.fuzzing import GOOD, Case, mjcf, robots, tables
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
@@ -39,7 +40,7 @@ from urdfkin.urdf.catalogue import catalogue
 READY, FIRST_WAIT = "ready", 300.0
 
 MUTANTS = "mutants"
-FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES)
+FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES, tables.FAMILY)
 
 
 @cache
@@ -53,6 +54,8 @@ def case(seed: int, family: str, number: int) -> Case:
     """One document of a family."""
     if family in mjcf.FAMILIES:
         return mjcf.robot(seed, family, number)
+    if family == tables.FAMILY:
+        return tables.sheet(seed, number)
     return mutant(seed, number, files()) if family == MUTANTS else robots.robot(seed, family, number)
 
 
@@ -129,7 +132,8 @@ def work(seed: int) -> None:
     print(READY, file=answers, flush=True)
     for line in sys.stdin:
         family, number = line.split()
-        outcome = judge(case(seed, family, int(number)))
+        made = case(seed, family, int(number))
+        outcome = tables.judge(made) if family == tables.FAMILY else judge(made)
         print(json.dumps([outcome.word, outcome.details]), file=answers, flush=True)
 
 
@@ -156,8 +160,8 @@ def fuzz(
                 made = case(seed, family, number)
                 keep.mkdir(parents=True, exist_ok=True)
                 name = f"{family}-{seed}-{number}"
-                ending = "xml" if family in mjcf.FAMILIES else "urdf"
-                (keep / f"{name}.{ending}").write_bytes(made.data)
+                suffix = ".xml" if family in mjcf.FAMILIES else made.suffix
+                (keep / f"{name}{suffix}").write_bytes(made.data)
                 (keep / f"{name}.txt").write_text(f"{made.words}\n{word}\n{details}\n", "utf-8")
                 print(f"{family} {number} ({made.what}): {word}", flush=True)
 

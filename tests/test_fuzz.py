@@ -13,7 +13,7 @@ import pytest
 
 import urdfkin
 from scripts import fuzz
-from scripts.fuzzing import GOOD, Case, mjcf, robots
+from scripts.fuzzing import GOOD, Case, mjcf, robots, tables
 from scripts.fuzzing.judge import Outcome
 from scripts.fuzzing.judge import judge as judge_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
@@ -222,3 +222,24 @@ def test_a_short_run_of_mjcf_files_finds_nothing(family: str) -> None:
     words = Counter(judge_case(mjcf.robot(20, family, number)).word for number in range(5))
     assert set(words) <= set(GOOD), words
     assert words["verified"] > 2
+
+
+def test_a_damaged_table_depends_on_seed_and_number_alone() -> None:
+    made = [tables.sheet(0, number) for number in range(50)]
+    assert made == [fuzz.case(0, tables.FAMILY, number) for number in range(50)]
+    assert {case.suffix for case in made} == {*tables.FORMS.values(), ".tsv"}
+    assert made != [tables.sheet(1, number) for number in range(50)]
+
+
+def test_no_damaged_table_hurts() -> None:
+    words = Counter(tables.judge(tables.sheet(1, number)).word for number in range(60))
+    assert set(words) <= set(GOOD)
+    assert words["refused"] > 10
+
+
+def test_a_crash_on_a_damaged_table_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def crash(*_: object) -> None:
+        raise StopIteration
+
+    monkeypatch.setattr(tables, "table_from_text", crash)
+    assert tables.judge(tables.sheet(0, 0)).word == "traceback: StopIteration"

@@ -1173,7 +1173,7 @@ class Robot(Shown):
             parallel_offset: "last", "first" or "each".
             flip: Joints to count the other way.
             first: "base" or "joint": whether the first row takes the way from the base (Craig's d_1 is zero).
-            sign: "theta", "a" or "alpha": which of them x keeps small, or from being negative.
+            sign: How to choose the direction of x: "theta" (smallest), "a" or "alpha" (not negative).
             slide: "drawn" or "minimal": where the lines of sliding joints are.
             like: A published table, whose frames, senses and zeros are to be taken.
             verify: Whether Pinocchio checks the table; None leaves it to the robot.

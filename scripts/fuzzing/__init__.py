@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 
+#: What happens to a table that can be read.
+COMPARED = "read and compared"
 #: What may happen to a robot.
 GOOD = (
     "refused",
     "verified",
     "not verified, with a finding that says why",
     "too large to compute, with a finding",
+    COMPARED,
 )
 
 
@@ -19,6 +22,7 @@ class Case:
     data: bytes
     root_joint: str | None = None
     mimic: bool | None = None
+    suffix: str = ".urdf"
 
     @property
     def words(self) -> str:

@@ -15,7 +15,7 @@ from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.dh import DHTable, dh_table, table_from_rows, units_of
 from urdfkin.dh.compare import compare, comparison_text
 from urdfkin.dh.convert import to_convention
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, RangeError
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import FloatArray, KinematicTree
 
@@ -67,6 +67,7 @@ def test_what_cannot_matter_is_forgiven(seed: int, convention: str) -> None:
     reference = to_convention(disguised(dh_table(elbow(), "tip"), seed), convention)
     found = compare(path, reference)
     assert found.exact
+    assert found.passes
     assert found.differences == ()
     assert found.residual <= 1e-13
     # What turns with the base or the tool is told of these, not as an offset besides.
@@ -185,3 +186,18 @@ def test_the_text_names_row_cell_and_millimetres() -> None:
         line.split()[:3] == ["3", "j3", "a"] and line.split()[-2:] == ["-0.3", "0.3"]
         for line in text.splitlines()
     )
+
+
+@pytest.mark.parametrize(("cell", "where"), [("a", "row 3, a"), ("d", "row 3, d")])
+@pytest.mark.parametrize("size", [1e155, -1e307])
+def test_a_length_whose_square_overflows_is_refused(size: float, cell: str, where: str) -> None:
+    table = dh_table(elbow(), "tip")
+    wrong = (*table.rows[:2], replace(table.rows[2], **{cell: size}), *table.rows[3:])  # type: ignore[arg-type]
+    with pytest.raises(RangeError, match=where):
+        compare(chain(elbow(), "tip"), replace(table, rows=wrong))
+
+
+def test_a_path_whose_square_overflows_is_refused() -> None:
+    table = dh_table(elbow(), "tip")
+    with pytest.raises(RangeError, match="squares of lengths"):
+        compare(chain(arm(*[shift(0.1, 0, 1e155)] * 6, kinds="RRRRRR"), "tip"), table)

@@ -198,3 +198,25 @@ def test_a_table_given_as_robot_is_written_as_it_stands(tmp_path: Path) -> None:
     assert [row.cells for row in read_table(out).rows] == [row.cells for row in wanted.rows]
     derived = run(path, "--last", "flange")
     assert "q1 + pi" not in derived.stdout
+
+
+@pytest.mark.parametrize(
+    "header", ["a;alpha,d,theta", "a,alpha;d,theta", "a_i;alpha,d,theta", "a|alpha,d,theta"]
+)
+def test_headings_with_mixed_separators_are_refused(header: str) -> None:
+    with pytest.raises(InputError, match="the headings are not separated as one line of cells"):
+        table_from_text(f"# convention: standard\n{header}\n0,pi/2,0.1,0\n", ".csv")
+
+
+def test_a_heading_that_is_missing_is_named_beside_units_and_indices() -> None:
+    with pytest.raises(InputError, match="no column 'd'"):
+        table_from_text("# convention: standard\na [mm],alpha_i,x,theta\n0,pi/2,0.1,0\n", ".csv")
+
+
+@pytest.mark.parametrize("number", ["1e4000", "nan", "-inf"])
+def test_a_base_with_an_infinite_number_is_refused(number: str) -> None:
+    """LAPACK's singular values of such a matrix never returned."""
+    rows = f" 1 0 0 0\n {number} 1 0 0\n 0 0 1 0\n"
+    sheet = f"standard\na  alpha  d  theta\n0  pi/2  0.3  q1\n\nbase (metres):\n{rows}"
+    with pytest.raises(InputError, match="the base is a matrix of finite numbers"):
+        table_from_text(sheet, ".txt")

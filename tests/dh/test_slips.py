@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import warnings
 from pathlib import Path
@@ -139,3 +140,64 @@ def test_load_warns_of_a_table_in_millimetres() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         load(table_from_rows([[0.425, 0, 0, 0], [0.39225, 0, 0, 0]], "standard"), verify=False)
+
+
+ROWS: dict[str, list[list[Any]]] = {
+    "standard": [
+        [0, "pi/2", 0.089159], [-0.425, 0, 0], [-0.39225, 0, 0], [0, "pi/2", 0.10915], [0, "-pi/2", 0.09465],
+        [0, 0, 0.0823],
+    ],
+    "modified": [
+        [0, 0, 0.089159], [0, "pi/2", 0], [-0.425, 0, 0], [-0.39225, 0, 0.10915], [0, "pi/2", 0.09465],
+        [0, "-pi/2", 0.0823],
+    ],
+}  # fmt: skip
+UR5 = ("ur5", "--base", "base", "--tip", "tool0")
+
+
+def nameless(file: Path, convention: str) -> Path:
+    rows = [[*row, 0] for row in ROWS[convention]]
+    file.write_text(f"rows = {json.dumps(rows)}\n")
+    return file
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_a_table_that_names_no_convention_is_compared_in_the_one_that_fits(
+    tmp_path: Path, convention: str
+) -> None:
+    file = nameless(tmp_path / "ur5.toml", convention)
+    result = run(*UR5, "--compare", str(file))
+    assert result.exit_code == 0
+    assert f"The table names no convention; {convention} fits best." in result.stdout
+    data = json.loads(run(*UR5, "--compare", str(file), "--format", "json").stdout)
+    assert data["read_as"] == convention
+
+
+@pytest.mark.slow
+def test_a_table_without_convention_and_units_is_told_both(tmp_path: Path) -> None:
+    file = nameless(tmp_path / "ur5.toml", "modified")
+    file.write_text(file.read_text().replace('"-pi/2"', "-90").replace('"pi/2"', "90"))
+    with pytest.raises(InputError, match=r"more than a turn.*this fits to .* when read as degrees"):
+        run(*UR5, "--compare", str(file))
+
+
+@pytest.mark.slow
+def test_a_table_that_fits_in_no_convention_is_refused_with_how_far_it_is_off(tmp_path: Path) -> None:
+    file = nameless(tmp_path / "ur5.toml", "standard")
+    with pytest.raises(
+        InputError, match=r"and neither fits: found off by .* mm as standard and .* as modified"
+    ):
+        run("ur3", *UR5[1:], "--compare", str(file))
+    with pytest.raises(InputError, match="joints are not the path's"):
+        run("panda", "--compare", str(file))
+
+
+@pytest.mark.slow
+def test_a_mistake_tells_the_convention_too(tmp_path: Path) -> None:
+    file = nameless(tmp_path / "ur5.toml", "standard")
+    file.write_text(file.read_text().replace("0.425, 0", '0.425, "pi/2"'))
+    result = run(*UR5, "--compare", str(file))
+    assert result.exit_code == 1
+    assert "standard fits best" in result.stdout
+    assert "row 2, shoulder_lift_joint: alpha = 0 rad, not pi/2" in result.stdout

@@ -45,32 +45,48 @@ def _columns(_context: click.Context, _option: click.Parameter, value: str) -> t
 
 part_options = together(
     path_options,
-    click.option("--all", "all_", is_flag=True, help="A table for each leaf of the robot."),
-    click.option("--tree", is_flag=True, help="Khalil and Kleinfinger's parameters of the whole robot."),
+    click.option("--all", "all_", is_flag=True, help="Write a table for each leaf of the robot."),
+    click.option(
+        "--tree", is_flag=True, help="Write Khalil and Kleinfinger's parameters of the whole robot."
+    ),
 )
 choice_options = together(
-    _choice("--convention", ("standard", "modified"), "Distal (the text's), or proximal (Craig's)."),
-    _choice("--near-parallel", ("hayati", "strict"), "Nearly parallel axes: a fifth parameter, or four."),
+    _choice(
+        "--convention",
+        ("standard", "modified"),
+        "Standard (distal) or modified (proximal, Craig's) parameters.",
+    ),
+    _choice(
+        "--near-parallel", ("hayati", "strict"), "Rows of nearly parallel axes: five parameters, or four."
+    ),
     click.option(
         "--snap",
         type=Number(),
         default=0.0,
         metavar="RAD",
-        help="Make angles within this of a multiple of 15 degrees round.",
+        help="Round angles within this tolerance to multiples of 15 degrees.",
     ),
-    _choice("--last", ("tip", "flange"), "Whether the last row takes the tip where it can."),
-    _choice("--parallel-offset", ("last", "first", "each"), "The row of parallel axes with the offset."),
-    click.option("--flip", multiple=True, metavar="JOINT", help="Count a joint the other way; repeatable."),
-    _choice("--first", ("base", "joint"), "Whether d1 holds the base's offset, or is zero as Craig's."),
+    _choice("--last", ("tip", "flange"), "Whether the last row reaches the tip, or the tool holds the rest."),
     _choice(
-        "--sign", ("theta", "a", "alpha"), "What the direction of x keeps small, or from being negative."
+        "--parallel-offset", ("last", "first", "each"), "The row that takes the offset along parallel axes."
     ),
-    _choice("--slide", ("drawn", "minimal"), "Lines of sliding joints: the URDF's, or those with a = 0."),
+    click.option("--flip", multiple=True, metavar="JOINT", help="Reverse the sense of a joint; repeatable."),
+    _choice(
+        "--first", ("base", "joint"), "Where frame 0 is: d1 holds the base's offset, or is zero (Craig's)."
+    ),
+    _choice(
+        "--sign",
+        ("theta", "a", "alpha"),
+        "How to choose the direction of x: smallest theta, or a (alpha) not negative.",
+    ),
+    _choice(
+        "--slide", ("drawn", "minimal"), "Axis lines of prismatic joints: the URDF's, or those with a = 0."
+    ),
     click.option(
         "--like",
         metavar="TABLE",
         shell_complete=complete_table,
-        help="The URDF's numbers in the frames, senses and zeros of a published table (as for --compare).",
+        help="Write the URDF's numbers in the frames, senses and zeros of a published table.",
     ),
 )
 compare_options = together(
@@ -78,7 +94,7 @@ compare_options = together(
         "--compare",
         metavar="TABLE",
         shell_complete=complete_table,
-        help="Hold the URDF against a table: a file (as for ROBOT), or the name of a shipped one.",
+        help="Compare the URDF with a table: a file (as for ROBOT), or the name of a shipped one.",
     ),
     click.option(
         "--tolerance",
@@ -86,10 +102,10 @@ compare_options = together(
         default=0.2,
         show_default=True,
         metavar="MM",
-        help="Millimetres at the tip up to which --compare agrees.",
+        help="Tolerance of --compare at the tip, in millimetres.",
     ),
     click.option(
-        "--fit/--no-fit", default=True, help="Whether --compare fits base, tool and joint offsets (default)."
+        "--fit/--no-fit", default=True, help="Fit base, tool and joint offsets in --compare (default)."
     ),
 )
 form_options = together(
@@ -99,19 +115,25 @@ form_options = together(
         type=click.Choice(FORMATS),
         default="terminal",
         show_default=True,
-        help="Form; a file's ending says it, too.",
+        help="Output format; by default chosen by the suffix of the output file.",
     ),
-    click.option("--degrees/--radians", default=False, help="Angles in what people read."),
-    click.option("--millimetres/--metres", default=False, help="Lengths in what people read."),
+    click.option("--degrees/--radians", default=False, help="Angle unit in printed tables."),
+    click.option("--millimetres/--metres", default=False, help="Length unit in printed tables."),
     click.option(
         "--columns",
         metavar="NAMES",
         default="a,alpha,d,theta",
         show_default=True,
         callback=_columns,
-        help="Their order, in what people read.",
+        help="Order of the columns in printed tables.",
     ),
-    click.option("--digits", type=Whole(3, 17), default=10, show_default=True, help="Significant."),
+    click.option(
+        "--digits",
+        type=Whole(3, 17),
+        default=10,
+        show_default=True,
+        help="Significant digits in printed tables.",
+    ),
 )
 
 
@@ -155,16 +177,17 @@ def _refuse_idle(context: click.Context, is_table: bool, options: dict[str, Any]
 @output_option
 @click.pass_context
 def command(context: click.Context, /, robot: str, verify: bool, output: Path | None, **options: Any) -> None:
-    """Denavit-Hartenberg table of the path between two frames, exact to rounding and checked.
+    """Write the Denavit-Hartenberg table of the path between two frames, exact to rounding and checked.
 
-    The path may run down the tree, up, or through the common ancestor. Angles and lengths stay as the file
-    has them unless --snap makes angles round; the table then says by how much the tip moves at most.
+    The path may run down the tree, up, or through the common ancestor. Angles and lengths are the file's.
+    --snap rounds angles; the table then states by how much the tip moves at most.
     ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
-    .tsv, .md, .tex, .txt), which is written as it stands, in the convention asked for; options that choose
-    rows have it derived anew, from the robot that it describes. `urdfkin explain urdf-to-dh` says more.
+    .tsv, .md, .tex, .txt). A table is written as it stands, in the convention asked for. Options that choose
+    rows derive it anew from the robot that it describes. `urdfkin explain urdf-to-dh` says more.
 
-    Exit 0: verified, or the compared table agrees. 1: a disagreement. 2: bad input. 3: not checked, or a
-    strict table that loses more to rounding than the robot itself.
+    Exit 0: verified, or the compared table agrees. 1: the compared table differs, or agrees only while base,
+    tool and zeros absorb a mistake that is printed. 2: bad input. 3: not checked, or a strict table that
+    loses more to rounding than the robot itself.
     """
     from urdfkin.cli.dh_work import Work, run  # noqa: PLC0415  keeps --help fast
     from urdfkin.dh.read import is_table_file  # noqa: PLC0415

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,16 @@ import numpy as np
 from urdfkin.cli.door import say, say_file
 from urdfkin.cli.output import write_file
 from urdfkin.dh import DHTable, Units, export, read_table, to_convention
-from urdfkin.dh.compare import CellDifference, Comparison, Slip, compare, comparison_text, diagnose
+from urdfkin.dh.compare import (
+    CellDifference,
+    Comparison,
+    Mistake,
+    Slip,
+    compare,
+    comparison_text,
+    convention_that_fits,
+    diagnose,
+)
 from urdfkin.dh.digits import last_digits
 from urdfkin.dh.export.mapping import to_mapping
 from urdfkin.dh.export.tree import as_mapping, write_tree
@@ -216,6 +225,11 @@ def _compare(work: Work, name: str) -> int:
     tip = work.tip or _known(work, data.get("tip_frame"))
     base = work.base or _known(work, data.get("base_frame"))
     chain, tolerance = work.robot.chain(tip, base), work.tolerance / 1e3
+    note = ""
+    if "convention" not in data:
+        convention = convention_that_fits(chain, data, tolerance, str(path))
+        data = {**data, "convention": convention}
+        note = f"The table names no convention; {convention} fits best. Write the convention into it.\n"
     try:
         reference = table_of(data, str(path))
     except InputError as error:
@@ -223,13 +237,13 @@ def _compare(work: Work, name: str) -> int:
             error.remedy = f"{error.remedy}; {slip}" if error.remedy else str(slip)
         raise
     found = compare(chain, reference, tolerance, fit=work.fit, digits=last_digits(data))
-    slip = None if found.agrees else diagnose(chain, data, tolerance, found.metres)
+    slip = None if found.agrees or found.mistakes else diagnose(chain, data, tolerance, found.metres)
     if work.format_ == "json":
-        text = json.dumps(_comparison(found, slip), indent=2, allow_nan=False) + "\n"
+        text = json.dumps(_comparison(found, reference, slip), indent=2, allow_nan=False) + "\n"
     else:
-        text = comparison_text(found, work.units) + (f"\nhint: {slip}\n" if slip else "")
+        text = note + comparison_text(found, work.units) + (f"\nhint: {slip}\n" if slip else "")
     _put(work, text)
-    return 0 if found.agrees else 1
+    return 0 if found.passes else 1
 
 
 def _known(work: Work, name: object) -> str | None:
@@ -237,10 +251,12 @@ def _known(work: Work, name: object) -> str | None:
     return name if isinstance(name, str) and name in work.robot.frame_names else None
 
 
-def _comparison(found: Comparison, slip: Slip | None) -> dict[str, Any]:
+def _comparison(found: Comparison, reference: DHTable, slip: Slip | None) -> dict[str, Any]:
     return {
+        "passes": found.passes,
         "agrees": found.agrees,
         "exact": found.exact,
+        "read_as": str(reference.convention),
         "tip_off_at_most_m": found.metres,
         "tip_turned_at_most_rad": found.radians,
         "proven_tip_off_at_most_m": found.most_metres,
@@ -255,6 +271,7 @@ def _comparison(found: Comparison, slip: Slip | None) -> dict[str, Any]:
         "offsets": list(found.offsets),
         "not_compared": [{"row": row + 1, "cell": cell} for row, cell in found.hidden],
         "differences": [_difference(one) for one in found.differences],
+        "likely_mistakes": [_mistake(one) for one in found.mistakes],
         "would_fit_read_as": slip and slip.as_mapping(),
         "without_fitting": [_difference(one) for one in found.instead],
         "fitted": to_mapping(found.reference),
@@ -270,6 +287,17 @@ def _difference(one: CellDifference) -> dict[str, Any]:
         "urdf": one.urdf,
         "tip_m": one.tip,
         "within_last_digit": one.is_rounding,
+    }
+
+
+def _mistake(one: Mistake) -> dict[str, Any]:
+    return {
+        "kind": str(one.kind),
+        "rows": [row + 1 for row in one.rows],
+        "cell": one.cell and _difference(one.cell),
+        "still_fitted": asdict(one.fitted),
+        "tip_off_at_most_m": one.metres,
+        "tip_turned_at_most_rad": one.radians,
     }
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import permutations, product
 from typing import Any
 
-from urdfkin.dh.row import Convention
+from urdfkin.dh.row import Convention, convention_of
 from urdfkin.dh.rows import table_from_mapping
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Angles, Lengths, units_of
@@ -29,13 +29,13 @@ class Reading:
     """One way to read a table.
 
     Attributes:
-        convention: Standard or modified.
+        convention: Standard or modified; None where a table names none.
         lengths: Metres or millimetres.
         angles: Radians or degrees.
         columns: What the columns that are called a, alpha, d, theta (or come in this order) really hold.
     """
 
-    convention: Convention
+    convention: Convention | None
     lengths: Lengths
     angles: Angles
     columns: tuple[str, ...] = ORDER
@@ -70,7 +70,8 @@ class Reading:
 def as_said(data: Mapping[str, Any]) -> Reading:
     """How the data say that they are to be read; InputError for a convention or a unit that is none."""
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
-    return Reading(Convention(data["convention"]), units.lengths, units.angles)
+    convention = convention_of(data["convention"]) if "convention" in data else None
+    return Reading(convention, units.lengths, units.angles)
 
 
 def other_readings(data: Mapping[str, Any]) -> Iterator[tuple[Reading, DHTable]]:

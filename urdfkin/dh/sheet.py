@@ -153,7 +153,15 @@ def _no_header(lines: list[str]) -> InputError:
     said = [re.split(r"[,;|&\t]|\s{2,}", line.strip()) for line in lines if not line.startswith("#")]
     named = [[cell.strip() for cell in cells if cell.strip()] for cells in said]
     best = max(named, key=lambda cells: sum(_column(cell).name in ORDER for cell in cells), default=[])
-    missing = next(name for name in ORDER if name not in map(_NAMES.get, map(str.lower, best)))
+    names = [_column(cell).name for cell in best]
+    missing = next((name for name in ORDER if name not in names), None)
+    if missing is None:
+        return InputError(
+            "the headings are not separated as one line of cells",
+            where="header",
+            found=", ".join(best)[:200],
+            remedy="separate all of them by the same sign: a comma, a semicolon, a tab or a bar",
+        )
     return InputError(
         f"no column {missing!r}",
         where="header",
@@ -271,18 +279,22 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
     """The three rows under `base (metres):`, or the matrix in LaTeX, as urdfkin prints them."""
     matrix = rf"{end.title()} \(m\): \$\\begin{{bmatrix}}(.*?)\\end{{bmatrix}}"
     if found := re.search(matrix, " ".join(lines)):
-        return _rigid([[cell_of(cell).number for cell in row.split("&")] for row in found[1].split(r"\\")])
+        return _rigid(
+            [[cell_of(cell).number for cell in row.split("&")] for row in found[1].split(r"\\")], end
+        )
     for k, line in enumerate(lines):
         if line.strip().lower().startswith(f"{end} (metres):"):
             rows = [row.split() for row in lines[k + 1 : k + 1 + _POSE_LINES] if row.strip(" `")][:3]
             if len(rows) == 3 and all(len(row) == 4 for row in rows):
-                return _rigid([[float(number) for number in row] for row in rows])
+                return _rigid([[float(number) for number in row] for row in rows], end)
     return None
 
 
-def _rigid(rows: list[list[float]]) -> list[list[float]]:
-    """A pose that was printed with some digits: its rotation is the nearest one."""
+def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
+    """A pose that was printed with some digits: with the nearest rotation; refuses infinite numbers."""
     pose = np.array(rows)
+    if not np.isfinite(pose).all():  # LAPACK's singular values of an infinite matrix need not return
+        raise InputError(f"the {end} is a matrix of finite numbers", where=end, found=shown(rows))
     off = polar_factor(pose[:3, :3]) - pose[:3, :3]
     if ROUNDED < np.abs(off).max() < _PRINTED:
         pose[:3, :3] += off

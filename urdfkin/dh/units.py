@@ -44,7 +44,7 @@ class Units:
         angles: Radians, with pi as a fraction where that is exact, or degrees.
         lengths: Metres or millimetres.
         digits: Significant digits.
-        columns: The order of the columns in what people read.
+        columns: The order of the columns in printed tables.
     """
 
     angles: Angles = Angles.RADIANS

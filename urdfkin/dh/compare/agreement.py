@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.compare.align import Alignment, align
 from urdfkin.dh.compare.fit import CELLS, Model, Wanted, columns, fit_cells, hidden_cells
-from urdfkin.dh.compare.freedoms import fit_freedoms
+from urdfkin.dh.compare.freedoms import as_written, fitted_model
+from urdfkin.dh.compare.mistakes import Search
 from urdfkin.dh.compare.proof import most_apart
 from urdfkin.dh.compare.result import EXPLAINED, CellDifference, Comparison, TakenUp
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.elements import along_axis, between_axes
+from urdfkin.dh.lengths import demand_squares_of
 from urdfkin.dh.row import Convention
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
-from urdfkin.kinematics.roundings import EPS, of_a_fit
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
 from urdfkin.model.tree import FloatArray, JointKind, Limit, is_bounded
 
@@ -28,13 +27,11 @@ TOLERANCE = 2e-4
 #: How many configurations a fit is made on, how many it is judged on, and their seeds: never the same ones.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Patterns of signs that are fitted, and kept at each joint, where a size will do.
-_HASTY = (3, 16)
-#: Of what the tip is off: cells, or another pattern of signs, that leave more explain nothing.
+#: Of what the tip is off: cells that leave more explain nothing.
 _EXPLAINS = 0.5
-#: Metres for each metre of reach: a fit that is off by less is at rounding, and nothing better is looked for.
-_AT_ROUNDING = 1e-12
-#: Likewise: a cell that moved by less did not, being a tenth of what `EXPLAINED` leaves.
+#: Of what the tip is off: a single mistake, undone, leaves no more.
+_LEFT = 0.05
+#: Metres for each metre of reach: a cell that moved by less did not, a tenth of what `EXPLAINED` leaves.
 _MOVED = 1e-10
 #: Of the way along a robot's links: a tip that goes no farther stands still, and says nothing of how far.
 _STANDS = 1e-6
@@ -68,10 +65,10 @@ def compare(
     check_joints(chain, reference)
     standard = to_convention(reference, Convention.STANDARD)
     tried, judged = _wanted(chain)
-    written = _written(standard)
-    fitted = _best_fit(chain, standard, written, tried) if fit else written
+    written = as_written(standard)
+    fitted = fitted_model(chain, standard, written, tried) if fit else written
     complete = fit_cells(fitted, tried, _cells_of(reference), free=fit)
-    off, residual = _off(fitted, written, judged), _apart(complete, judged)[0]
+    off, residual = _off(fitted, written, judged), judged.apart(complete)[0]
     cells = _differences(chain, reference, fitted, complete, judged, digits, fit)
     table = _fitted_table(chain, standard, fitted)
     most_metres, most_radians = most_apart(chain, table, _slides(chain))
@@ -86,6 +83,7 @@ def compare(
         differences=cells if residual <= max(_EXPLAINS * off["metres"], EXPLAINED * tried.scale) else (),
         instead=(),
         hidden=_hidden(reference, fitted, judged) if fit else (),
+        mistakes=(),
         residual=residual,
         tolerance=tolerance,
         samples=CHECK_SAMPLES,
@@ -93,7 +91,14 @@ def compare(
         most_radians=most_radians,
         **off,
     )
-    if fit and not found.as_written:
+    if found.as_written:
+        return found
+    enough = tolerance if found.agrees else max(tolerance, _LEFT * found.metres)
+    if mistakes := Search(chain, tried, judged, enough).mistakes(reference, fit=fit, agrees=found.agrees):
+        cells = tuple(one.cell for one in mistakes if one.cell is not None)
+        blamed = cells if len(mistakes) == 1 else ()
+        return replace(found, mistakes=mistakes, differences=blamed)
+    if fit:
         found = replace(found, instead=_instead(chain, reference, written, found, (tried, judged), digits))
     return found
 
@@ -114,13 +119,13 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
     check_joints(chain, reference)
     standard = to_convention(reference, Convention.STANDARD)
     tried, judged = _wanted(chain)
-    return _apart(_best_fit(chain, standard, _written(standard), tried, enough, hasty=True), judged)
+    return judged.apart(fitted_model(chain, standard, as_written(standard), tried, enough, hasty=True))
 
 
 def _off(fitted: Model, written: Model, judged: Wanted) -> dict[str, float]:
     """How far the tip is off, as fitted and as written."""
     names = ("metres", "radians", "written_metres", "written_radians")
-    return dict(zip(names, (*_apart(fitted, judged), *_apart(written, judged)), strict=True))
+    return dict(zip(names, (*judged.apart(fitted), *judged.apart(written)), strict=True))
 
 
 def _reach(chain: FrameChain, wanted: FloatArray) -> float:
@@ -135,7 +140,10 @@ def _reach(chain: FrameChain, wanted: FloatArray) -> float:
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
-    """Raise InputError unless a table has as many joints as a path, of the same kinds, and at least one."""
+    """Raise InputError unless a table has as many joints as a path, of the same kinds, and at least one.
+
+    RangeError where a length of either cannot be squared.
+    """
     theirs = [row.kind.turns for row in reference.rows]
     ours = [joint.kind.turns for joint in chain.joints]
     if theirs != ours or not ours:
@@ -146,87 +154,7 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
             found=f"{words[0]} in the table, {words[1]} in the URDF",
             remedy="choose base and tip so that exactly the table's joints lie between them",
         )
-
-
-def _written(standard: DHTable) -> Model:
-    """The table as it is written, its variables the URDF's coordinates."""
-    return Model(
-        np.array([(row.theta, row.d, row.a, row.alpha, row.beta) for row in standard.rows]),
-        np.array([float(row.kind.turns) for row in standard.rows]),
-        np.array([float(row.sense) for row in standard.rows]),
-        standard.base,
-        standard.tool,
-    )
-
-
-def _best_fit(
-    chain: FrameChain,
-    standard: DHTable,
-    written: Model,
-    wanted: Wanted,
-    enough: float = 0.0,
-    *,
-    hasty: bool = False,
-) -> Model:
-    """Of the table as written and the likely sign patterns, the one whose freedoms fit best.
-
-    What is written has the first word: another pattern must be twice as good.
-    """
-
-    def size(model: Model) -> float:
-        metres, radians = _apart(model, wanted)
-        return metres + wanted.scale * radians
-
-    if size(written) <= EPS * of_a_fit(0) * wanted.scale:
-        return written
-    best, best_size = written, size(written)
-    for start in _starts(chain, standard, written, *(_HASTY if hasty else ())):
-        # Least squares make the sum small. The worst sample is what counts: there the start may be better.
-        model = min(fit_freedoms(start, wanted, turns=not hasty), start, key=size)
-        needed = 1.0 if start is written else _EXPLAINS
-        if (its_size := size(model)) < needed * best_size:
-            best, best_size = model, its_size
-        if best_size <= max(enough, _AT_ROUNDING * wanted.scale):
-            break
-    return _ends_gathered(best, written)
-
-
-def _ends_gathered(model: Model, written: Model) -> Model:
-    """The same with the first joint's offset in the base and the last one's in the tool, where it is seen."""
-    cells, n = model.cells.copy(), len(model.cells)
-    _, _, a, alpha, beta = cells[-1]
-    step = between_axes(a, alpha, beta)
-    base, tool = model.base, model.tool
-    for i in dict.fromkeys((0, n - 1)):
-        k = model.own(i)
-        change = cells[i, k] - written.cells[i, k]
-        cells[i, k] = written.cells[i, k]
-        S = along_axis(change, 0.0) if model.turns[i] else along_axis(0.0, change)
-        if i == 0:
-            base = base @ S
-        else:
-            tool = np.linalg.solve(step, S @ step) @ tool
-    return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(tool))
-
-
-def _starts(chain: FrameChain, standard: DHTable, written: Model, *effort: int) -> Iterator[Model]:
-    """Where fits begin: what is written, then each likely pattern of signs."""
-    yield written
-    for aligned in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
-        yield _start(standard, aligned)
-
-
-def _start(standard: DHTable, aligned: Alignment) -> Model:
-    """The reference with the freedoms that an alignment found."""
-    start = replace(
-        _written(standard),
-        senses=np.array(aligned.senses, dtype=np.float64),
-        base=aligned.base,
-        tool=aligned.tool,
-    )
-    for i, offset in enumerate(aligned.offsets):
-        start.cells[i, start.own(i)] += offset
-    return start
+    demand_squares_of(chain, reference)
 
 
 def _wanted(chain: FrameChain) -> tuple[Wanted, Wanted]:
@@ -253,12 +181,6 @@ def _slides(chain: FrameChain) -> dict[str, tuple[float, float]]:
 
 def _slide(limit: Limit | None) -> tuple[float, float]:
     return (limit.lower, limit.upper) if is_bounded(limit) and limit.lower < limit.upper else _SLIDE
-
-
-def _apart(model: Model, wanted: Wanted) -> tuple[float, float]:
-    poses, there = model.poses(wanted.values), wanted.poses
-    metres = np.linalg.norm(poses[:, :3, 3] - there[:, :3, 3], axis=-1).max()
-    return float(metres), float(rotation_angle(poses[:, :3, :3], there[:, :3, :3]).max())
 
 
 def _offsets(standard: DHTable, fitted: Model) -> tuple[float, ...]:
@@ -339,7 +261,7 @@ def _instead(
     """The cells that would have to change if nothing were fitted, where that is an explanation."""
     tried, judged = wanted
     complete = fit_cells(written, tried, _cells_of(reference), free=False)
-    metres, radians = _apart(complete, judged)
+    metres, radians = judged.apart(complete)
     if metres > EXPLAINED * found.reach or radians > EXPLAINED:
         return ()
     cells = _differences(chain, reference, written, complete, judged, digits, False)

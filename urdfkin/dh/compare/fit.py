@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urdfkin.dh.elements import along_axis, between_axes
+from urdfkin.dh.snapping import rotation_angle
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.pose import pose
@@ -125,6 +126,12 @@ class Wanted:
     values: FloatArray
     poses: FloatArray
     scale: float
+
+    def apart(self, model: Model) -> tuple[float, float]:
+        """Metres and radians that a model's tip is off at the worst sample."""
+        poses = model.poses(self.values)
+        metres = np.linalg.norm(poses[:, :3, 3] - self.poses[:, :3, 3], axis=-1).max()
+        return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def errors(self, poses: FloatArray) -> FloatArray:
         """(6 s,) twists that would bring a model's poses to these, angles times `scale`."""

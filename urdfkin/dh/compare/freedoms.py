@@ -9,11 +9,17 @@ succeed, and where the descent ends, turns of such pairs against each other are 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from urdfkin.dh.compare.align import Alignment, align
 from urdfkin.dh.compare.fit import LONGEST_STEP, Model, Wanted, columns, moved
+from urdfkin.dh.elements import along_axis, between_axes
+from urdfkin.dh.table import DHTable
+from urdfkin.kinematics.roundings import EPS, of_a_fit
+from urdfkin.model.chain import FrameChain
 
 _ROUNDS = 60
 #: Of the largest singular value: where damping starts, and between what it stays.
@@ -24,20 +30,108 @@ _EASING, _HARDER = 0.03, 10.0
 _SLOW, _PATIENCE = 0.99, 4
 #: Fit up to which nothing better is looked for, metres for each metre of reach.
 _ROUNDING = 1e-13
+#: Patterns of signs that are fitted, and kept at each joint, where a size will do.
+HASTY = (3, 16)
+#: Metres for each metre of reach: a fit that is off by less is at rounding, and nothing better is looked for.
+_AT_ROUNDING = 1e-12
+#: Of what the tip is off: another pattern of signs than the written one must leave less.
+_TWICE_AS_GOOD = 0.5
 #: Turns that are tried of one offset against the next.
 _TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 
 
-def fit_freedoms(model: Model, wanted: Wanted, *, turns: bool) -> Model:
+def as_written(standard: DHTable) -> Model:
+    """The table as it is written, its variables the URDF's coordinates."""
+    return Model(
+        np.array([(row.theta, row.d, row.a, row.alpha, row.beta) for row in standard.rows]),
+        np.array([float(row.kind.turns) for row in standard.rows]),
+        np.array([float(row.sense) for row in standard.rows]),
+        standard.base,
+        standard.tool,
+    )
+
+
+def fitted_model(
+    chain: FrameChain,
+    standard: DHTable,
+    written: Model,
+    wanted: Wanted,
+    enough: float = 0.0,
+    *,
+    hasty: bool = False,
+) -> Model:
+    """Of the table as written and the likely sign patterns, the one whose freedoms fit best.
+
+    What is written has the first word: another pattern must be twice as good.
+    """
+
+    def size(model: Model) -> float:
+        metres, radians = wanted.apart(model)
+        return metres + wanted.scale * radians
+
+    if size(written) <= EPS * of_a_fit(0) * wanted.scale:
+        return written
+    best, best_size = written, size(written)
+    for start in starts(chain, standard, written, *(HASTY if hasty else ())):
+        # Least squares make the sum small. The worst sample is what counts: there the start may be better.
+        model = min(fit_freedoms(start, wanted, turns=not hasty), start, key=size)
+        needed = 1.0 if start is written else _TWICE_AS_GOOD
+        if (its_size := size(model)) < needed * best_size:
+            best, best_size = model, its_size
+        if best_size <= max(enough, _AT_ROUNDING * wanted.scale):
+            break
+    return ends_gathered(best, written)
+
+
+def ends_gathered(model: Model, written: Model) -> Model:
+    """The same with the first joint's offset in the base and the last one's in the tool, where it is seen."""
+    cells, n = model.cells.copy(), len(model.cells)
+    _, _, a, alpha, beta = cells[-1]
+    step = between_axes(a, alpha, beta)
+    base, tool = model.base, model.tool
+    for i in dict.fromkeys((0, n - 1)):
+        k = model.own(i)
+        change = cells[i, k] - written.cells[i, k]
+        cells[i, k] = written.cells[i, k]
+        S = along_axis(change, 0.0) if model.turns[i] else along_axis(0.0, change)
+        if i == 0:
+            base = base @ S
+        else:
+            tool = np.linalg.solve(step, S @ step) @ tool
+    return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(tool))
+
+
+def starts(chain: FrameChain, standard: DHTable, written: Model, *effort: int) -> Iterator[Model]:
+    """Where fits begin: what is written, then each likely pattern of signs."""
+    yield written
+    for aligned in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
+        yield _start(standard, aligned)
+
+
+def _start(standard: DHTable, aligned: Alignment) -> Model:
+    """The reference with the freedoms that an alignment found."""
+    start = replace(
+        as_written(standard),
+        senses=np.array(aligned.senses, dtype=np.float64),
+        base=aligned.base,
+        tool=aligned.tool,
+    )
+    for i, offset in enumerate(aligned.offsets):
+        start.cells[i, start.own(i)] += offset
+    return start
+
+
+def fit_freedoms(model: Model, wanted: Wanted, *, turns: bool, ends: bool = False) -> Model:
     """The table's best fit.
 
     Args:
         model: Where to begin.
         wanted: What the URDF's tip does.
         turns: Whether offsets of neighbours are turned against each other where a descent ends.
+        ends: Whether base and tool alone are fitted.
     """
     for _ in range(2 * len(model.cells)):
-        model, size = _descended(model, wanted)
+        model, size = _descended(model, wanted, ends)
         if not turns or size <= _ROUNDING * wanted.scale * math.sqrt(6 * len(wanted.values)):
             break
         turned = min(_turned(model), key=lambda one: _size(one, wanted), default=model)
@@ -51,11 +145,11 @@ def _size(model: Model, wanted: Wanted) -> float:
     return float(np.linalg.norm(wanted.errors(model.poses(wanted.values))))
 
 
-def _descended(model: Model, wanted: Wanted) -> tuple[Model, float]:
+def _descended(model: Model, wanted: Wanted, ends: bool) -> tuple[Model, float]:
     size, damping, slow = _size(model, wanted), _DAMPING, 0
     for _ in range(_ROUNDS):
         poses, freedoms, _ = columns(model, wanted)
-        U, S, Vt = np.linalg.svd(freedoms, full_matrices=False)
+        U, S, Vt = np.linalg.svd(freedoms[:, : 12 if ends else None], full_matrices=False)
         along = U.T @ wanted.errors(poses)
         before = size
         while damping <= _MOST:

@@ -15,13 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.compare.agreement import best_fit
+from urdfkin.dh.compare.agreement import best_fit, compare
+from urdfkin.dh.compare.result import Comparison
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.derive import Choices, Last, derive
 from urdfkin.dh.reading import Reading, as_said, other_readings
 from urdfkin.dh.row import Convention
+from urdfkin.dh.rows import table_from_mapping
 from urdfkin.dh.table import DHTable
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, RangeError
+from urdfkin.errors.questions import Question
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
@@ -80,7 +83,7 @@ def diagnose(
     own = shape(derive(chain, Choices(last=Last.FLANGE)), chain.reach)
     try:
         said = as_said(data)
-    except (InputError, KeyError, ValueError):  # what it says is no convention or no unit: that is the slip
+    except InputError:  # what it says is no convention or no unit: that is the slip
         return None
     close = list[tuple[float, int, Reading, DHTable]]()
     for reading, table in other_readings(data):
@@ -94,13 +97,58 @@ def diagnose(
     close.sort(key=lambda one: one[0] + worth * one[1])
     found = list[tuple[float, Slip]]()
     for _, slips, reading, table in close[:_TRIED]:
-        metres, radians = best_fit(chain, table, tolerance)
+        try:
+            metres, radians = best_fit(chain, table, tolerance)
+        except RangeError:  # lengths that only this reading makes so large
+            continue
         off_here = metres + radians * chain.reach
         if off_here <= max(tolerance, min(_EXPLAINS * off, _EXPLAINS * chain.reach)):
             found.append((off_here + tolerance * slips, Slip(reading, said, metres, radians)))
             if off_here <= tolerance:
                 break
     return min(found, key=lambda one: one[0])[1] if found else None
+
+
+def convention_that_fits(
+    chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
+) -> Convention:
+    """The convention of a table that names none: the one in which it fits a path.
+
+    Args:
+        chain: The path of the URDF.
+        data: The table's plain data.
+        tolerance: Metres at the tip up to which a table agrees.
+        where: The table's file.
+
+    Raises:
+        InputError: both conventions fit equally well, or none does in any unit.
+    """
+    found = list[tuple[Convention, Comparison]]()
+    refused = list[InputError]()
+    for convention in Convention:
+        try:
+            table = table_from_mapping({**data, "convention": convention})
+            found.append((convention, compare(chain, table, tolerance)))
+        except InputError as error:
+            refused.append(error)
+    written = [one for one, how in found if how.agrees and how.written_metres <= tolerance]
+    passing = [one for one, how in found if how.passes]
+    agreeing = [one for one, how in found if how.agrees]
+    mistaken = [one for one, how in found if how.mistakes]
+    best = written or passing or agreeing or mistaken
+    if len(best) == 1:
+        return best[0]
+    if not best and (slip := diagnose(chain, data, tolerance)) and slip.reading.convention:
+        return slip.reading.convention
+    if refused and not found:
+        raise refused[0]
+    raise InputError(
+        f"the table does not say its convention, and {'both conventions fit' if best else 'neither fits'}",
+        where=where,
+        found=f"off by {' and '.join(f'{how.metres * 1e3:.3g} mm as {one}' for one, how in found)}",
+        remedy="write convention = 'standard' or 'modified', in a sheet a line `convention: standard`",
+        question=Question.WHICH_DH_CONVENTION,
+    )
 
 
 def shape(table: DHTable, scale: float) -> FloatArray:

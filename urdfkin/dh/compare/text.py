@@ -7,27 +7,43 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from urdfkin.dh.compare.result import EXPLAINED, CellDifference, Comparison, TakenUp
+from urdfkin.dh.compare.result import (
+    EXPLAINED,
+    CellDifference,
+    Comparison,
+    Mistake,
+    MistakeKind,
+    TakenUp,
+    resolution,
+)
 from urdfkin.dh.elements import nearest_twelfth
 from urdfkin.dh.export.cells import added, pose_lines
 from urdfkin.dh.export.terminal import aligned
 from urdfkin.dh.row import DHRow
+from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors.printable import printable
 from urdfkin.errors.questions import Question
 
-#: Radians, or of the reach: fitted numbers are shown no finer, however well the table fits.
-_FINEST = 1e-12
-
 
 def comparison_text(found: Comparison, units: Units) -> str:
     """Lines for a terminal, the last one ended."""
-    lines = [*_verdict(found), *_cells(found, units)]
-    if found.residual > EXPLAINED * found.reach:
+    lines = [*_verdict(found), *(_mistakes(found, units) if found.mistakes else _cells(found, units))]
+    if found.residual > EXPLAINED * found.reach and not found.mistakes:
         lines.append(f"No change of cells explains the URDF: {found.residual * 1e3:.3g} mm are left.")
         if not found.fitted:
             lines.append("Its frames may stand elsewhere: without --no-fit, base and tool are fitted.")
-    table, fine = found.reference, resolution(found)
+    if found.agrees or not found.mistakes:
+        lines += _fitted(found, units)
+    if not found.agrees:
+        lines += ["", str(Question.DH_AND_URDF_DISAGREE)]
+    return "\n".join(map(printable, lines)) + "\n"
+
+
+def _fitted(found: Comparison, units: Units) -> list[str]:
+    """Variables, base and tool as they were fitted, where they are not the identity."""
+    lines = list[str]()
+    table, fine = found.reference, resolution(found.metres / found.reach, found.radians)
     moved = [
         f"  {row.joint}: {added('-q' if sense < 0 else 'q', shown_offset(offset, row, fine, units))}"
         for row, sense, offset in zip(table.rows, found.senses, found.offsets, strict=True)
@@ -39,16 +55,15 @@ def comparison_text(found: Comparison, units: Units) -> str:
         rounded = np.round(T / fine) * fine
         if np.abs(rounded - np.eye(4)).max() > fine:
             lines += ["", f"{what} (metres):", *("  " + line for line in pose_lines(rounded, 6))]
-    if not found.agrees:
-        lines += ["", str(Question.DH_AND_URDF_DISAGREE)]
-    return "\n".join(map(printable, lines)) + "\n"
+    return lines
 
 
 def _verdict(found: Comparison) -> list[str]:
     """What the table is, with what was fitted and without."""
     table = found.reference
     path = f"{table.robot}, {table.base_frame} to {table.tip_frame}"
-    verdict = "agrees exactly" if found.exact else "agrees" if found.agrees else "DIFFERS"
+    agrees = "agrees only" if found.mistakes else "agrees exactly" if found.exact else "agrees"
+    verdict = agrees if found.agrees else "DIFFERS"
     off = _off(found.metres, found.radians)
     proof = f"{found.samples} samples; proven for all values of the joints: {_proven(found)}"
     if found.as_written:
@@ -58,7 +73,7 @@ def _verdict(found: Comparison) -> list[str]:
             f"The table {verdict}: {path}: {off}",
             f"({proof}; nothing fitted: base, tool and joint variables as written).",
         ]
-    fine = resolution(found)
+    fine = resolution(found.metres / found.reach, found.radians)
     ends = [
         f"{what} {taken.metres * 1e3:.3g} mm and {taken.radians:.3g} rad"
         for what, taken in (("the base", found.base), ("the tool", found.tool))
@@ -78,6 +93,11 @@ def _verdict(found: Comparison) -> list[str]:
     lines.append(f"As it is written {_off(found.written_metres, found.written_radians)}.")
     if ends:
         lines.append(f"Fitting gave {', '.join(ends)}; --no-fit keeps to what is written.")
+        moved = [max(end.metres / found.reach, end.radians) > fine for end in (found.base, found.tool)]
+        if found.agrees and not found.mistakes and (all(moved) or zeros or reversed_):
+            lines.append(
+                "A wrong sign can hide behind these. Write base, tool and zeros into the table to find it."
+            )
     return lines
 
 
@@ -96,6 +116,35 @@ def _proven(found: Comparison) -> str:
 
 def _is_taken(taken: TakenUp, found: Comparison) -> bool:
     return taken.metres > found.rounding * found.reach or taken.radians > found.rounding
+
+
+def _mistakes(found: Comparison, units: Units) -> list[str]:
+    """The single changes after which the least has to be fitted."""
+    first = found.mistakes[0]
+    left = "as written" if not first.fitted.count else f"with these fitted alone: {first.fitted}"
+    count = "One change makes" if len(found.mistakes) == 1 else "Each of these changes makes"
+    lines = ["", f"{count} the table right {left}:"]
+    for one in found.mistakes:
+        off = _off(one.metres, one.radians)
+        lines.append(f"  {_change(one, found.reference, units)}; {off}")
+    if found.agrees:
+        lines.append("Correct the table. If base, tool and zeros are meant, write them into it.")
+    return lines
+
+
+def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
+    """A change in words."""
+    if mistake.cell is None:
+        if mistake.kind is MistakeKind.REVERSED:
+            return "the rows in reverse order"
+        return f"rows {' and '.join(str(row + 1) for row in mistake.rows)} exchanged"
+    one = mistake.cell
+    write, unit = (
+        (units.length, units.length_name) if one.cell in ("a", "d") else (units.angle, units.angle_name)
+    )
+    why = "its sign" if mistake.kind is MistakeKind.SIGN else "a right angle"
+    row = f"row {one.row + 1}, {table.rows[one.row].joint}"
+    return f"{row}: {one.cell} = {write(one.urdf)} {unit}, not {write(one.reference)} ({why})"
 
 
 def _cells(found: Comparison, units: Units) -> list[str]:
@@ -129,12 +178,6 @@ def _table(cells: Sequence[CellDifference], units: Units) -> list[str]:
         star = "*" if one.is_rounding else ""
         body.append([str(one.row + 1), one.joint, one.cell + star, *texts])
     return aligned(body)
-
-
-def resolution(found: Comparison) -> float:
-    """A power of ten below which fitted numbers only reflect how well the table fits."""
-    error = max(found.metres / found.reach, found.radians, _FINEST)
-    return float(10.0 ** math.ceil(math.log10(2.0 * error)))
 
 
 def shown_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:

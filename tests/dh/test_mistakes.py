@@ -1,0 +1,162 @@
+"""A wrong sign, a right angle too many, rows in the wrong order: the change that undoes it is named."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.cli.test_dh import run
+from tests.dh.test_compare import elbow
+from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows, units_of
+from urdfkin.dh.compare import Comparison, compare, comparison_text
+from urdfkin.dh.references import reference_path, references
+from urdfkin.dh.to_tree import to_tree
+from urdfkin.loading import load
+from urdfkin.model.chain import FrameChain, chain
+
+pytestmark = pytest.mark.slow
+
+#: Tables that are the URDF's as they are written. Kinova's has frames of its own.
+AS_WRITTEN = ("panda", "ur5", "xarm7_standard")
+
+
+def shipped(name: str) -> tuple[FrameChain, DHTable]:
+    table = read_table(reference_path(name))
+    return load(table.robot).chain(table.tip_frame, table.base_frame), table
+
+
+def with_cell(table: DHTable, row: int, cell: str, value: float) -> DHTable:
+    rows = list(table.rows)
+    rows[row] = replace(rows[row], **{cell: value})  # type: ignore[arg-type]
+    return replace(table, rows=tuple(rows))
+
+
+def with_wrong_signs(table: DHTable) -> Iterator[tuple[int, str, DHTable]]:
+    """Each table with one sign reversed that has an effect."""
+    for i, row in enumerate(table.rows):
+        for cell in ("a", "alpha", "d", "theta"):
+            value = getattr(row, cell)
+            if abs(value if cell in ("a", "d") else math.sin(value)) > 1e-9:
+                yield i, cell, with_cell(table, i, cell, -value)
+
+
+def named(found: Comparison) -> list[tuple[int, str, float]]:
+    cells = [one.cell for one in found.mistakes]
+    return [(one.row, one.cell, one.urdf) for one in cells if one is not None]
+
+
+@pytest.mark.parametrize("name", AS_WRITTEN)
+def test_a_wrong_sign_is_named_alone(name: str) -> None:
+    path, table = shipped(name)
+    for row, cell, wrong in with_wrong_signs(table):
+        found = compare(path, wrong)
+        assert named(found) == [(row, cell, getattr(table.rows[row], cell))]
+        assert found.mistakes[0].fitted.count == 0
+        assert [(one.row, one.cell) for one in found.differences] == [(row, cell)]
+        assert found.instead == ()
+        assert not found.passes
+
+
+@pytest.mark.parametrize("name", AS_WRITTEN)
+def test_an_alpha_with_a_right_angle_too_many_is_named_alone(name: str) -> None:
+    path, table = shipped(name)
+    for row in range(len(table.rows)):
+        alpha = table.rows[row].alpha
+        found = compare(path, with_cell(table, row, "alpha", alpha + math.pi / 2))
+        assert [one[:2] for one in named(found)] == [(row, "alpha")]
+        assert named(found)[0][2] == pytest.approx(alpha, abs=1e-15)
+        assert not found.passes
+
+
+@pytest.mark.parametrize("name", ["kinova", "panda", "ur5"])
+def test_rows_that_changed_places_are_named(name: str) -> None:
+    path, table = shipped(name)
+    last = len(table.rows) - 1
+    for i, j in ((0, 1), (1, 2), (last - 1, last)):
+        rows = list(table.rows)
+        rows[i], rows[j] = rows[j], rows[i]
+        found = compare(path, replace(table, rows=tuple(rows)))
+        assert [(str(one.kind), one.rows) for one in found.mistakes] == [("rows exchanged", (i, j))]
+    found = compare(path, replace(table, rows=tuple(reversed(table.rows))))
+    assert [str(one.kind) for one in found.mistakes] == ["rows reversed"]
+    assert "the rows in reverse order" in comparison_text(found, units_of())
+
+
+@pytest.mark.parametrize("name", references())
+def test_a_right_table_has_no_mistake(name: str) -> None:
+    path, table = shipped(name)
+    found = compare(path, table)
+    assert found.mistakes == ()
+    assert found.passes
+    ends = compare(path, replace(table, base=np.eye(4), tool=np.eye(4)))
+    assert ends.mistakes == ()
+    assert ends.passes
+
+
+def test_a_wrong_sign_is_named_where_the_table_leaves_out_its_tool() -> None:
+    path, table = shipped("panda")
+    bare = replace(table, tool=np.eye(4))
+    for row, cell, wrong in with_wrong_signs(bare):
+        found = compare(path, wrong)
+        assert [one[:2] for one in named(found)] == [(row, cell)]
+        assert str(found.mistakes[0].fitted) == "tool"
+
+
+def test_a_table_on_other_frames_says_that_a_wrong_sign_can_hide() -> None:
+    path, table = shipped("kinova")
+    text = comparison_text(compare(path, table), units_of())
+    assert "A wrong sign can hide behind these." in text
+    path, table = shipped("panda")
+    assert "can hide" not in comparison_text(compare(path, replace(table, tool=np.eye(4))), units_of())
+
+
+def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
+    rows = [[0.1, 0.5, 0.3, 0.0], [0.2, 0.0, 0.05, 0.0], [0.15, 0.9, 0.05, 0.0], [0.1, 0.4, 0.1, 0.0]]
+    wrong = table_from_rows(rows, "standard")
+    right = with_cell(wrong, 1, "d", -0.05)  # along parallel axes only the sum of the offsets shows
+    tree = to_tree(right)
+    found = compare(chain(tree, right.tip_frame, right.base_frame), wrong)
+    assert [one[:2] for one in named(found)] == [(1, "d"), (2, "d")]
+    assert found.differences == ()
+    assert "Each of these changes makes the table right as written:" in comparison_text(found, units_of())
+
+
+def test_a_wrong_sign_is_named_beside_a_difference_that_is_smaller() -> None:
+    """A calibrated robot is off by a millimetre; the sign of a sheet is off by a hundred."""
+    path, table = shipped("panda")
+    near = with_cell(table, 6, "a", table.rows[6].a + 1e-3)
+    found = compare(path, with_cell(near, 3, "a", -near.rows[3].a))
+    assert not found.agrees
+    assert [one[:2] for one in named(found)] == [(3, "a")]
+    assert 5e-4 < found.mistakes[0].metres < 2e-3
+
+
+def test_a_value_that_is_wrong_is_no_mistake_of_its_sign() -> None:
+    table = dh_table(elbow(), "tip")
+    found = compare(chain(elbow(), "tip"), with_cell(table, 2, "a", table.rows[2].a + 5e-3))
+    assert not found.agrees
+    assert found.mistakes == ()
+
+
+def test_the_command_fails_for_a_wrong_sign_and_says_what_to_do(tmp_path: Path) -> None:
+    file = tmp_path / "slip.toml"
+    text = reference_path("ur5").read_text()
+    file.write_text(text.replace("d = 0.10915", "d = -0.10915"))
+    result = run("ur5", "--compare", str(file), "--millimetres")
+    assert result.exit_code == 1
+    assert "agrees only once base, tool and joint offsets are fitted" in result.stdout
+    assert "One change makes the table right as written:" in result.stdout
+    assert "  row 4, wrist_1_joint: d = 109.15 mm, not -109.15 (its sign)" in result.stdout
+    data = json.loads(run("ur5", "--compare", str(file), "--format", "json").stdout)
+    assert data["agrees"]
+    assert not data["passes"]
+    assert data["likely_mistakes"][0]["cell"]["urdf"] == 0.10915
+    without = run("ur5", "--compare", str(file), "--no-fit")
+    assert without.exit_code == 1
+    assert "One change makes the table right as written:" in without.stdout
