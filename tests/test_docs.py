@@ -11,8 +11,10 @@ from types import ModuleType
 
 import pytest
 
+from tests.cli.running import urdfkin as run
 from tests.pages import pages
 from urdfkin.cli import cli
+from urdfkin.verify.quantities import QUANTITIES, compared, not_compared
 
 ROOT = Path(__file__).parents[1]
 DOCS = [f"docs/{page}" for page in pages()]
@@ -77,6 +79,48 @@ def test_links_lead_to_files_and_headings(page: str) -> None:
             for head in (re.findall(r"^#+ (.*)", there.read_text(), re.M) if there.suffix == ".md" else ())
         ]
         assert not anchor or anchor in heads, target
+
+
+def plain(text: str) -> str:
+    """Words with one blank between them."""
+    return " ".join(re.sub(r"<[^>]+>", "", text).split())
+
+
+def test_what_a_validation_compares_is_said_as_the_table_of_quantities_has_it() -> None:
+    validate = cli.get_command(cli.make_context("urdfkin", ["--help"], resilient_parsing=True), "validate")
+    assert validate is not None
+    assert validate.help is not None
+    template = (ROOT / "urdfkin/report/templates/report.html.j2").read_text("utf-8")
+    assert "{{ compared }}" in template
+    assert "{{ not_compared }}" in template
+    for page in ("README.md", "docs/ci.md"):
+        assert compared() in plain((ROOT / page).read_text("utf-8")), page
+        assert not_compared() in plain((ROOT / page).read_text("utf-8")), page
+    assert compared() in plain(validate.help)
+    assert not_compared() in plain(validate.help)
+    assert not_compared() in plain((ROOT / "docs/known-limits.md").read_text("utf-8"))
+    named = [row for row in QUANTITIES.values() if row.of == "frames"]
+    assert {row.title for row in named} == {*re.split(", | and ", f"{compared()}, {not_compared()}")}
+
+
+def test_no_page_says_that_a_validation_compares_every_quantity() -> None:
+    texts = [ROOT / page for page in PAGES] + sorted((ROOT / "urdfkin").rglob("*.py"))
+    claims = [
+        path for path in texts if re.search(r"(?i)every quantity (of every|but the)", path.read_text("utf-8"))
+    ]
+    assert claims == []
+
+
+def test_the_exit_status_without_a_robot_is_the_tables() -> None:
+    (row,) = re.findall(r"^\| (\d) \|.*none was named", (ROOT / "docs/ci.md").read_text("utf-8"), re.M)
+    assert run("validate").code == int(row)
+
+
+def test_the_guide_and_the_finding_name_the_same_size() -> None:
+    (size,) = re.findall(
+        r"URDF604, a robot (smaller than .*):", (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    )
+    assert size in run("explain", "URDF604").text
 
 
 def leads_somewhere(name: str) -> bool:
