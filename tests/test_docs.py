@@ -11,6 +11,7 @@ from types import ModuleType
 
 import pytest
 
+from scripts import check_exports, measure_size
 from tests.cli.running import urdfkin as run
 from tests.pages import pages
 from urdfkin.cli import cli
@@ -79,6 +80,43 @@ def test_links_lead_to_files_and_headings(page: str) -> None:
             for head in (re.findall(r"^#+ (.*)", there.read_text(), re.M) if there.suffix == ".md" else ())
         ]
         assert not anchor or anchor in heads, target
+
+
+def test_every_script_that_writes_a_page_is_run_by_make_docs() -> None:
+    target = re.findall(r"^docs:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text("utf-8"), re.M)[0]
+    run_by_make = set(re.findall(r"python scripts/(\w+)\.py", target))
+    writers = {
+        path.stem for path in (ROOT / "scripts").glob("*.py") if "PAGE.write_text" in path.read_text("utf-8")
+    }
+    makers = {path.stem for path in (ROOT / "scripts").glob("make_*.py")}
+    assert run_by_make == writers | makers - {"make_pictures"}  # photographs need a browser
+
+
+@pytest.mark.slow
+def test_the_sizes_of_exported_code_are_those_on_the_page() -> None:
+    text = check_exports.PAGE.read_text("utf-8")
+    assert check_exports.page(text) == text, "run python scripts/check_exports.py --sizes"
+
+
+def test_the_size_of_an_installation_is_written_by_its_script() -> None:
+    text = measure_size.PAGE.read_text("utf-8")
+    (checking,) = re.findall(r"needs urdfkin and click, (\d+) MB\.", text)
+    assert abs(int(checking) - (measure_size.own() + measure_size.closure("click")["click"]) / 1e6) < 1.0
+    said = measure_size.sentence(2_000_000_000, 10**9, 5 * 10**8, 7_000_000)
+    assert "takes 2.0 GB: 1.00 are" in measure_size.page(text, said)
+    with pytest.raises(ValueError, match="0 places"):
+        measure_size.page("", said)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pair", ["icub icub_reduced", "talos talos_reduced", "ur5 ur5_gripper", "ur5 ur10"])
+def test_the_distances_of_the_catalogues_pairs_are_those_that_same_finds(pair: str) -> None:
+    page = (ROOT / "docs/same.md").read_text("utf-8")
+    (found,) = re.findall(rf"^\| {pair.replace(' ', ' [|] ')} \| (.*) \|$", page, re.M)
+    figures = re.findall(r"[\d.]+(?= mm)|[\d.]+e-\d+(?= rad)", found)
+    text = run("same", *pair.split()).text.replace("e-09", "e-9")
+    assert figures
+    assert [figure for figure in figures if figure not in text] == []
 
 
 def plain(text: str) -> str:

@@ -100,7 +100,7 @@ def command(
     files = {name: asked.pop(name) for name in FILES}
     store, shard, retry = (asked[name] for name in ("store", "shard", "retry"))
     if bool(robots) == all_:
-        raise click.UsageError("name robots, or say --all for the whole catalogue")
+        raise click.UsageError("name robots, or say --all for every robot of example-robot-data")
     if (retry or shard) and store is None:
         raise click.UsageError("--retry and --shard go with --store DIR")
     if scheduler and (asked["jobs"] > 1 or asked["isolate"]):
