@@ -45,8 +45,8 @@ def sentence(all_: int, robots: int, pinocchio: int, checking: int) -> str:
     """What the page says; bytes."""
     return (
         f"An installation takes {all_ / 1e9:.1f} GB: {robots / 1e9:.2f} are the robots of example-robot-data,"
-        f"\n{pinocchio / 1e9:.2f} Pinocchio with its libraries, the rest mostly NumPy, Numba and its compiler."
-        f" A job that only [checks\nfiles](ci.md) needs urdfkin and click, {checking / 1e6:.0f} MB."
+        f"\n{pinocchio / 1e9:.2f} Pinocchio with its libraries, the rest mostly NumPy, Numba and its"
+        f" compiler. A job that only [checks\nfiles](ci.md) needs urdfkin and click, {checking / 1e6:.0f} MB."
     )
 
 
