@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
@@ -36,6 +40,27 @@ def searched(name: str, what: str, link: str) -> tuple[Search, FramePair]:
     found = align(*judge.mechanisms, {})
     frame = next(one for one in found.frames if a.tree.links[one.a] == link)
     return judge.search(found, variables_of(found, judge.tolerance)), frame
+
+
+@pytest.mark.parametrize("variables", [1, 2, 5])
+def test_the_first_derivatives_bound_of_a_box_is_no_less_than_its_corners(variables: int) -> None:
+    rng = np.random.default_rng(variables)
+    D, G = rng.normal(size=(50, 3)), rng.normal(size=(50, 3, variables))
+    D[0] = 0.0
+    h = rng.uniform(0.1, 2.0, variables)
+    boxes = cast(Boxes, SimpleNamespace(at_middles=lambda c: (D, G)))
+    bound = Boxes.bounds(boxes, np.zeros((50, variables)), h)
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=variables)))
+    corners = np.linalg.norm(D[:, np.newaxis] + np.einsum("nij,sj->nsi", G, signs * h), axis=-1).max(axis=1)
+    assert (bound >= corners * (1.0 - 1e-12)).all()
+    along = (
+        np.abs((D[:, :, np.newaxis] * G).sum(axis=1)) / np.maximum(np.linalg.norm(D, axis=1), 1e-300)[:, None]
+    )
+    size = np.linalg.norm(D, axis=1) + along @ h
+    assert (bound <= np.linalg.norm(D, axis=1) + np.linalg.norm(G, axis=1) @ h + 1e-12).all()
+    assert (bound >= size).all()
+    if variables == 1:
+        np.testing.assert_allclose(bound, corners, rtol=1e-12)
 
 
 @pytest.mark.slow
