@@ -8,7 +8,7 @@ from urdfkin.compiled.plan import Plan
 from urdfkin.kinematics.roundings import EPS, of_joints
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify import bounds
+from urdfkin.verify import bounds, imu
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.magnitudes import Magnitudes
 from urdfkin.verify.quantities import ACCELERATION, HESSIAN, JACOBIAN, JACOBIAN_RATE, PLACEMENT, VELOCITY
@@ -158,3 +158,19 @@ def test_mujocos_levers_are_twice_as_long_and_its_roundings_two_and_a_half_times
     assert size.alpha == ALPHA
     assert size.acc == ACC + W * VEL + (ALPHA + W * W) * lever
     assert size.roundings == 2.0 * 30.0 * JOINTS
+
+
+def test_an_imus_reading_has_an_accelerations_factors_in_its_own_axes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found: list[tuple[FloatArray, int, Magnitudes, Reference]] = []
+
+    def asked(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference) -> Bound:
+        found.append((scale, factors, size, reference))
+        return bounds.bound_of(scale, factors, size, reference)
+
+    monkeypatch.setattr(imu, "bound_of", asked)
+    urdfkin.load(ARM).imu([0.1, 0.2], [1.0, 2.0], [3.0, 4.0], "l3")
+    ((scale, factors, size, reference),) = found
+    assert (factors, reference) == (ACCELERATION.factors, LOCAL)
+    assert (scale == bounds.imu_scale(size, np.array([0.0, 0.0, -9.81]))).all()
