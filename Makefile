@@ -34,6 +34,12 @@ docs:  ## the pages that are generated from the code, then the site
 	python scripts/make_reports.py
 	python scripts/make_performance.py
 	python scripts/make_tour.py
+	python scripts/make_architecture.py
+	python scripts/make_conventions.py
+	python scripts/make_judge.py
+	python scripts/make_enclosures.py
+	python scripts/check_exports.py --sizes
+	python scripts/measure_size.py
 	$(MAKE) site
 
 site:  ## the documentation as a site, in site/index.html: no network, now or later

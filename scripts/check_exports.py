@@ -3,7 +3,7 @@
     python scripts/check_exports.py --keep leaves.jsonl         # every leaf; goes on where it was ended
     python scripts/check_exports.py --keep leaves.jsonl --tell  # what was found, nothing computed
     python scripts/check_exports.py --tips       # the leaf of each robot that most joints lie before
-    python scripts/check_exports.py --sizes      # how large the code is, and how long it takes to write
+    python scripts/check_exports.py --sizes      # writes into docs/export.md how large the code is
 
 Each function is held against Pinocchio as it is written, and against fifty digits as it runs: by GCC and by
 Clang, where they are installed, one configuration and in batches, and by NumPy. Exit 1 if any number is
@@ -19,7 +19,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -34,6 +33,8 @@ from urdfkin.export.code import Code, code_of
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import examples
 
+PAGE = Path(__file__).parents[1] / "docs" / "export.md"
+_SIZES = re.compile(r"(<!-- sizes -->\n).*?(<!-- end -->)", re.DOTALL)
 _STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror")
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
@@ -123,30 +124,31 @@ def tell(lines: Sequence[dict[str, Any]]) -> int:
     return bool(wrong)
 
 
-def sizes() -> int:
-    """A row of Markdown for each of three robots."""
-    print("| robot, frame | quantity | operations | lines of C | kB | written in s | with its proof in s |")
-    print("|---|---|---:|---:|---:|---:|---:|")
-    chain = urdfkin.load(chain_urdf(100))
+def sizes() -> str:
+    """A table in Markdown: three frames, each quantity by itself."""
+    rows = ["| robot, frame | quantity | operations | lines of C | kB |", "|---|---|---:|---:|---:|"]
     for robot, frame in (
         (urdfkin.load("panda"), "panda_hand"),
         (urdfkin.load("talos"), "gripper_left_base_link"),
-        (chain, "tip"),
+        (urdfkin.load(chain_urdf(100)), "tip"),
     ):
         for quantity in QUANTITIES:
-            begin = time.process_time()
             written = code(robot, frame, (quantity,))
-            proven = time.process_time()
-            text = write(written, "c")
-            end = time.process_time()
             (function,) = written.functions
-            lines = text.partition("#ifdef " + written.name.upper() + "_MAIN")[0]
-            print(
+            lines = write(written, "c").partition("#ifdef " + written.name.upper() + "_MAIN")[0]
+            rows.append(
                 f"| {robot.name}, {frame} | {quantity} | {function.operations:,} | {lines.count(chr(10)):,} |"
-                f" {len(lines) / 1000:.0f} | {end - proven:.2f} | {end - begin:.1f} |",
-                flush=True,
+                f" {len(lines) / 1000:.0f} |"
             )
-    return 0
+    return "\n".join(rows) + "\n"
+
+
+def page(text: str) -> str:
+    """The page with the table of sizes as it is now."""
+    found, count = _SIZES.subn(lambda place: place[1] + sizes() + place[2], text)
+    if count != 1:
+        raise ValueError(f"the page has {count} places for the sizes")
+    return found
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -155,12 +157,18 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--keep", type=Path, help="a file of results, a line each, to go on with")
     parser.add_argument("--tell", action="store_true", help="only add up what is kept")
     parser.add_argument("--tips", action="store_true", help="one leaf a robot")
-    parser.add_argument("--sizes", action="store_true", help="sizes and times of three robots")
+    parser.add_argument(
+        "--sizes", action="store_true", help="write the sizes of three robots' code into docs/export.md"
+    )
     arguments = parser.parse_args(words)
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
     if arguments.tell:
         return tell(lines_of(arguments.keep))
-    return sizes() if arguments.sizes else check(arguments.tips, arguments.keep)
+    if arguments.sizes:
+        PAGE.write_text(page(PAGE.read_text("utf-8")), "utf-8")
+        print(PAGE)
+        return 0
+    return check(arguments.tips, arguments.keep)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,21 @@
-"""How large an installation of urdfkin is, package by package: what a fresh environment of it holds."""
+"""Write how large an installation of urdfkin is into docs/index.md: what a fresh environment of it holds.
+
+    python scripts/measure_size.py
+
+The largest packages and the sums are printed too. Python, pip and bytecode are not counted.
+"""
 
 from __future__ import annotations
 
 import importlib.metadata
+import re
 from pathlib import Path
 
 from packaging.requirements import Requirement
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "index.md"
+_PLACE = re.compile(r"(<!-- size -->\n).*?(\n<!-- end -->)", re.DOTALL)
 
 
 def closure(name: str) -> dict[str, int]:
@@ -24,13 +34,43 @@ def closure(name: str) -> dict[str, int]:
     return found
 
 
+def own() -> int:
+    """Bytes of urdfkin's wheel, unpacked: the package, and what pyproject.toml puts into it."""
+    places = (ROOT / "urdfkin", ROOT / "robots", ROOT / "docs" / "questions.md")
+    files = (file for place in places for file in (place.rglob("*") if place.is_dir() else (place,)))
+    return sum(file.stat().st_size for file in files if file.is_file() and file.suffix != ".pyc")
+
+
+def sentence(all_: int, robots: int, pinocchio: int, checking: int) -> str:
+    """What the page says; bytes."""
+    return (
+        f"An installation takes {all_ / 1e9:.1f} GB: {robots / 1e9:.2f} are the robots of example-robot-data,"
+        f"\n{pinocchio / 1e9:.2f} Pinocchio with its libraries, the rest mostly NumPy, Numba and its"
+        f" compiler. A job that only [checks\nfiles](ci.md) needs urdfkin and click, {checking / 1e6:.0f} MB."
+    )
+
+
+def page(text: str, said: str) -> str:
+    """The page with that sentence in its place."""
+    found, count = _PLACE.subn(lambda place: place[1] + said + place[2], text)
+    if count != 1:
+        raise ValueError(f"the page has {count} places for the size")
+    return found
+
+
 def main() -> None:
     """The largest, and sums."""
-    sizes = closure("urdfkin")
+    sizes = closure("urdfkin") | {"urdfkin": own()}
     for name, size in sorted(sizes.items(), key=lambda item: -item[1])[:10]:
         print(f"{size / 1e6:7.0f} MB  {name}")
-    print(f"{sum(sizes.values()) / 1e6:7.0f} MB  urdfkin and the {len(sizes) - 1} packages that it needs")
-    print(f"{sum(closure('pin').values()) / 1e6:7.0f} MB  of these for pin, which is Pinocchio")
+    everything, pinocchio = sum(sizes.values()), sum(closure("pin").values())
+    checking = own() + sizes["click"]
+    print(f"{everything / 1e6:7.0f} MB  urdfkin and the {len(sizes) - 1} packages that it needs")
+    print(f"{pinocchio / 1e6:7.0f} MB  of these for pin, which is Pinocchio")
+    print(f"{checking / 1e6:7.0f} MB  urdfkin and click, which `urdfkin check` needs")
+    said = sentence(everything, sizes["example-robot-data"], pinocchio, checking)
+    PAGE.write_text(page(PAGE.read_text("utf-8"), said), "utf-8")
+    print(PAGE)
 
 
 if __name__ == "__main__":

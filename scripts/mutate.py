@@ -1,13 +1,14 @@
 """Make small slips in the package, one at a time, and see whether a test fails for each.
 
     python scripts/mutate.py --sample 40 --seed 1          forty slips, drawn from the whole package
-    python scripts/mutate.py verification validation       every slip of two parts
+    python scripts/mutate.py validation dh/snapping        every slip of two parts
     python scripts/mutate.py --only urdfkin.validation.tally:17
     python scripts/mutate.py --named                       those of tests/attacks/named_slips.toml
 
 The tests that are near the file are asked first, those that are quick; then, with --slow, the slow ones near
 it, and with --whole the whole suite. Every slip that nobody noticed is printed, and kept in --json with the
-others. What docs/mutation.md argues is not asked again. Exit 0: all were noticed or are argued; 1: some not.
+others. What docs/mutation.md argues is not asked again. Exit 0: all were noticed or are argued. 1: some were
+not, or there was no mutant. 2: a part that does not exist.
 """
 
 from __future__ import annotations
@@ -163,16 +164,19 @@ def main() -> int:
     )
     parser.add_argument("--whole", action="store_true", help="ask the whole suite where those are silent")
     parser.add_argument("--only", help="this mutant alone")
-    parser.add_argument("--named", action="store_true", help="the named slips, each by its own test")
+    parser.add_argument(
+        "--named", action="store_true", help="the named slips (of these parts), each by its own test"
+    )
     parser.add_argument("--count", action="store_true", help="say how many there are, and end")
     parser.add_argument("--json", type=Path, help="keep what happened to each")
     options = parser.parse_args()
-    asks: list[Callable[[], Outcome]]
-    if options.named:
-        asks = [partial(judge_named, slip, timeout=options.timeout) for slip in named_slips()]
-    else:
-        how = {"timeout": options.timeout, "slow": options.slow, "whole": options.whole}
-        asks = [partial(_unless_argued, mutant, **how) for mutant in _chosen(options)]
+    try:
+        asks = _asks(options)
+    except ValueError as error:
+        parser.error(str(error))
+    if not asks:
+        print("there is no such mutant; see --count", file=sys.stderr)
+        return 1
     if options.count:
         print(len(asks))
         return 0
@@ -191,6 +195,15 @@ def main() -> int:
     counts = Counter(outcome.word for outcome in outcomes)
     print(f"{len(outcomes)} mutants: " + ", ".join(f"{n} {word}" for word, n in counts.most_common()))
     return 0 if counts.keys() <= {"noticed", "argued"} else 1
+
+
+def _asks(options: argparse.Namespace) -> list[Callable[[], Outcome]]:
+    if options.named:
+        modules = {module_of(path) for path in files(options.parts)}
+        named = [slip for slip in named_slips() if not options.parts or slip.module in modules]
+        return [partial(judge_named, slip, timeout=options.timeout) for slip in named]
+    how = {"timeout": options.timeout, "slow": options.slow, "whole": options.whole}
+    return [partial(_unless_argued, mutant, **how) for mutant in _chosen(options)]
 
 
 def _chosen(options: argparse.Namespace) -> list[Mutant]:

@@ -11,8 +11,11 @@ from types import ModuleType
 
 import pytest
 
+from scripts import check_exports, measure_size
+from tests.cli.running import urdfkin as run
 from tests.pages import pages
 from urdfkin.cli import cli
+from urdfkin.verify.quantities import QUANTITIES, compared, not_compared
 
 ROOT = Path(__file__).parents[1]
 DOCS = [f"docs/{page}" for page in pages()]
@@ -77,6 +80,85 @@ def test_links_lead_to_files_and_headings(page: str) -> None:
             for head in (re.findall(r"^#+ (.*)", there.read_text(), re.M) if there.suffix == ".md" else ())
         ]
         assert not anchor or anchor in heads, target
+
+
+def test_every_script_that_writes_a_page_is_run_by_make_docs() -> None:
+    target = re.findall(r"^docs:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text("utf-8"), re.M)[0]
+    run_by_make = set(re.findall(r"python scripts/(\w+)\.py", target))
+    writers = {
+        path.stem for path in (ROOT / "scripts").glob("*.py") if "PAGE.write_text" in path.read_text("utf-8")
+    }
+    makers = {path.stem for path in (ROOT / "scripts").glob("make_*.py")}
+    assert run_by_make == writers | makers - {"make_pictures"}  # photographs need a browser
+
+
+@pytest.mark.slow
+def test_the_sizes_of_exported_code_are_those_on_the_page() -> None:
+    text = check_exports.PAGE.read_text("utf-8")
+    assert check_exports.page(text) == text, "run python scripts/check_exports.py --sizes"
+
+
+def test_the_size_of_an_installation_is_written_by_its_script() -> None:
+    text = measure_size.PAGE.read_text("utf-8")
+    (checking,) = re.findall(r"needs urdfkin and click, (\d+) MB\.", text)
+    assert abs(int(checking) - (measure_size.own() + measure_size.closure("click")["click"]) / 1e6) < 1.0
+    said = measure_size.sentence(2_000_000_000, 10**9, 5 * 10**8, 7_000_000)
+    assert "takes 2.0 GB: 1.00 are" in measure_size.page(text, said)
+    with pytest.raises(ValueError, match="0 places"):
+        measure_size.page("", said)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pair", ["icub icub_reduced", "talos talos_reduced", "ur5 ur5_gripper", "ur5 ur10"])
+def test_the_distances_of_the_catalogues_pairs_are_those_that_same_finds(pair: str) -> None:
+    page = (ROOT / "docs/same.md").read_text("utf-8")
+    (found,) = re.findall(rf"^\| {pair.replace(' ', ' [|] ')} \| (.*) \|$", page, re.M)
+    figures = re.findall(r"[\d.]+(?= mm)|[\d.]+e-\d+(?= rad)", found)
+    text = run("same", *pair.split()).text.replace("e-09", "e-9")
+    assert figures
+    assert [figure for figure in figures if figure not in text] == []
+
+
+def plain(text: str) -> str:
+    """Words with one blank between them."""
+    return " ".join(re.sub(r"<[^>]+>", "", text).split())
+
+
+def test_what_a_validation_compares_is_said_as_the_table_of_quantities_has_it() -> None:
+    validate = cli.get_command(cli.make_context("urdfkin", ["--help"], resilient_parsing=True), "validate")
+    assert validate is not None
+    assert validate.help is not None
+    template = (ROOT / "urdfkin/report/templates/report.html.j2").read_text("utf-8")
+    assert "{{ compared }}" in template
+    assert "{{ not_compared }}" in template
+    for page in ("README.md", "docs/ci.md"):
+        assert compared() in plain((ROOT / page).read_text("utf-8")), page
+        assert not_compared() in plain((ROOT / page).read_text("utf-8")), page
+    assert compared() in plain(validate.help)
+    assert not_compared() in plain(validate.help)
+    assert not_compared() in plain((ROOT / "docs/known-limits.md").read_text("utf-8"))
+    named = [row for row in QUANTITIES.values() if row.of == "frames"]
+    assert {row.title for row in named} == {*re.split(", | and ", f"{compared()}, {not_compared()}")}
+
+
+def test_no_page_says_that_a_validation_compares_every_quantity() -> None:
+    texts = [ROOT / page for page in PAGES] + sorted((ROOT / "urdfkin").rglob("*.py"))
+    claims = [
+        path for path in texts if re.search(r"(?i)every quantity (of every|but the)", path.read_text("utf-8"))
+    ]
+    assert claims == []
+
+
+def test_the_exit_status_without_a_robot_is_the_tables() -> None:
+    (row,) = re.findall(r"^\| (\d) \|.*none was named", (ROOT / "docs/ci.md").read_text("utf-8"), re.M)
+    assert run("validate").code == int(row)
+
+
+def test_the_guide_and_the_finding_name_the_same_size() -> None:
+    (size,) = re.findall(
+        r"URDF604, a robot (smaller than .*):", (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    )
+    assert size in run("explain", "URDF604").text
 
 
 def leads_somewhere(name: str) -> bool:

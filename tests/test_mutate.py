@@ -3,11 +3,13 @@
 import ast
 import os
 import random
+import re
+import sys
 from pathlib import Path
 
 import pytest
 
-from scripts.mutate import Mutant, judge, mutants
+from scripts.mutate import Mutant, judge, main, mutants
 from scripts.mutating.arguments import argued
 from scripts.mutating.operators import function_at, mutated, slips
 from scripts.mutating.selection import PACKAGE, ROOT, files, module_of, near_tests
@@ -88,6 +90,9 @@ def test_what_no_test_looks_at_survives_and_what_one_does_is_noticed(
     assert judge(mutant, timeout=100.0).word == word
 
 
+#: Parts of earlier versions.
+GONE = ("verification", "judge", "keeping")
+
 #: Quick to ask about, and to be relied on by everything that is handed out or reported.
 PARTS = ["validation/outcome", "validation/tally", "verify/certificate", "dh/statement"]
 SEED = int(os.environ.get("URDFKIN_MUTATION_SEED", "1"))
@@ -112,6 +117,49 @@ def test_what_is_argued_can_still_be_made_and_stands_on_the_page_once() -> None:
     named = {place: [name for name in modules if place.startswith(name)] for place, _ in argued()}
     parts = {str(modules[max(names, key=len)].relative_to(PACKAGE)) for names in named.values()}
     assert argued().keys() <= {(mutant.place, mutant.what) for mutant in mutants(sorted(parts))}
+
+
+@pytest.mark.parametrize(
+    "words", [["verification"], ["validation", "judge", "--count"], ["keeping", "--named"]]
+)
+def test_a_part_that_does_not_exist_is_an_error_and_named(
+    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["mutate.py", *words])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    gone = next(word for word in words if word in GONE)
+    assert f"{gone}: no file below urdfkin/" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--only", "urdfkin.validation.tally:99999"],
+        ["cli/__init__", "--named"],
+        ["cli/view", "--sample", "0"],
+    ],
+)
+def test_no_mutant_at_all_is_a_failure(
+    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["mutate.py", *words])
+    assert main() == 1
+    assert "no such mutant" in capsys.readouterr().err
+
+
+def test_every_part_that_the_page_names_exists() -> None:
+    page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
+    measured = re.findall(r"^\| `([\w/]+)` \|", page, re.M)
+    commands = [line.split() for line in re.findall(r"scripts/mutate\.py (.*?)  ", page)]
+    named = [
+        word
+        for words in commands
+        for word in words[: next((i for i, w in enumerate(words) if w[0] == "-"), 9)]
+    ]
+    assert len(measured) > 9
+    assert len(named) > 2
+    assert files(measured + named)
 
 
 @pytest.mark.parametrize(("line", "place"), [(3, "C"), (5, "C.f"), (7, "C.f.g"), (9, "h"), (1, "")])

@@ -6,6 +6,7 @@ import re
 import pytest
 
 from scripts import make_performance as maker
+from scripts.benchmarking.tables import number, tables
 
 TEXT = maker.PAGE.read_text("utf-8")
 FIGURES = json.loads(maker.FIGURES.read_text("utf-8"))
@@ -19,6 +20,22 @@ def test_another_figure_gives_another_page() -> None:
     first, *others = FIGURES["rows"]
     changed = {**FIGURES, "rows": [{**first, "median_ns": 12_345.0}, *others]}
     assert "| 12,345 |" in maker.page(TEXT, changed)
+
+
+def test_the_first_table_tells_all_threads_from_code_compiled_for_one_robot() -> None:
+    batch = {
+        (f"{row['robot']}, {row['quantity']}", row["who"]): row["ratio"]
+        for row in FIGURES["rows"]
+        if row["section"] == "batch"
+    }
+    (summary,) = [words for words in tables(FIGURES) if words.section == "summary"]
+    threads, compiled = (
+        next(i for i, head in enumerate(summary.head) if word in head) for word in ("all threads", "compiled")
+    )
+    several = f"urdfkin, {FIGURES['machine']['processors']} threads"
+    for row in summary.rows:
+        assert row[threads] == number(batch[row[0], several])
+        assert row[compiled] == number(batch[row[0], "urdfkin, compiled for this robot, 1 thread"])
 
 
 def test_figures_without_a_place_are_refused() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -10,7 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from scripts.benchmarking.contenders import FLOOR
+from scripts.benchmarking.contenders import COMPILED, FLOOR, ONE
 from scripts.benchmarking.generated import GENERATED
 from scripts.benchmarking.machine import EMPTY, KEPT
 
@@ -108,6 +109,8 @@ def _contest(section: str, title: str, rows: list[Entry]) -> Words:
 
 
 _SHARE = "times generated code"
+#: The figures may come from a machine with another number of processors: `SEVERAL` is not asked.
+_SEVERAL = re.compile(r"urdfkin, \d+ threads")
 
 
 def _generated(rows: Sequence[Entry]) -> float | None:
@@ -119,16 +122,18 @@ def _summary(rows: list[Entry]) -> Words:
     """One thread and all; against Pinocchio, code for this robot alone, and the fastest other library."""
     found = []
     for title, group in _tables_of(rows):
-        ours = [row for row in group if row["who"].startswith("urdfkin") and "no out" not in row["who"]]
-        one = float(ours[0]["median_ns"])
+        who = {row["who"]: row for row in group}
+        several = next((row for row in group if _SEVERAL.fullmatch(row["who"])), None)
+        one = float(who[ONE]["median_ns"])
         others = [row for row in group if not row["who"].startswith(("urdfkin", FLOOR, GENERATED))]
         best, ceiling = min(others, key=lambda row: float(row["median_ns"])), _generated(group)
         found.append(
             (
                 title,
                 number(one),
-                number(ours[0]["ratio"]),
-                number(ours[-1]["ratio"]),
+                number(who[ONE]["ratio"]),
+                number(several["ratio"]) if several else "one processor",
+                number(who[COMPILED]["ratio"]) if COMPILED in who else "not measured",
                 number(ceiling / one) if ceiling else "not measured",
                 f"{best['who']}, {number(best['median_ns'])}",
                 number(best["median_ns"] / one),
@@ -137,7 +142,8 @@ def _summary(rows: list[Entry]) -> Words:
     heads = (
         "1 thread, ns",
         "times Pinocchio's loop",
-        "all threads",
+        "the same, all threads",
+        "the same, compiled for this robot, 1 thread",
         _SHARE,
         "fastest other library, ns",
         "times that, 1 thread",

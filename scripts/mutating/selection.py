@@ -22,8 +22,15 @@ _OF_ROBOTS = ("test_robot.py", "verify", "laws")
 
 
 def files(parts: list[str]) -> list[Path]:
-    """The package's files, or those whose path below the package begins with one of the words."""
+    """The package's files, or those whose path below the package begins with one of the words.
+
+    Raises:
+        ValueError: no file's path begins with one of the words.
+    """
     found = sorted(path for path in PACKAGE.rglob("*.py") if path.stem not in _COMPILED)
+    for part in parts:
+        if not any(_below(path).startswith(part) for path in found):
+            raise ValueError(f"{part}: no file below {PACKAGE.name}/ that can be mutated begins so")
     return [path for path in found if not parts or _below(path).startswith(tuple(parts))]
 
 
@@ -37,7 +44,7 @@ def _below(path: Path) -> str:
 
 
 def near_tests(path: Path) -> list[str]:
-    """Test files that name the module, and those of its part: who is near it asks first.
+    """Test files that name the module or are called after it, and those of its part; the nearest come first.
 
     A part without tests of its own serves all the others, by way of a robot.
     """
@@ -46,7 +53,11 @@ def near_tests(path: Path) -> list[str]:
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
     )
     part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-    near = {test for test, text in _texts().items() if name in text and named.search(text)}
+    near = {
+        test
+        for test, text in _texts().items()
+        if test.stem == f"test_{path.stem}" or (name in text and named.search(text))
+    }
     own = _tests_of(part, f"test_{part}.py") or _tests_of(*_OF_ROBOTS)
     order = sorted(near | own, key=lambda test: (path.stem not in test.stem, test not in near, str(test)))
     return [str(test.relative_to(ROOT)) for test in order]

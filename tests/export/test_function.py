@@ -9,10 +9,12 @@ import pytest
 
 import urdfkin
 from scripts.benchmarking.operations import operations
+from tests.export.writing import code
 from tests.laws.subjects import robot_of
 from urdfkin.export.code import exported
 from urdfkin.export.expression import Node
-from urdfkin.export.function import function_of
+from urdfkin.export.function import Function, function_of
+from urdfkin.export.proof import CHECKED
 from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.verify.call import Call
@@ -45,6 +47,20 @@ def test_every_quantity_is_pinocchios_within_the_bound(name: str, reference: Ref
         found = function_of(call.plan, row, reference).evaluated((call.q, *call.rates))
         checker.check(row, call, found, True)
     assert checker.certificate().verified
+
+
+@pytest.mark.parametrize("quantity", ["placement", "jacobian", "acceleration"])
+def test_an_expression_that_is_wrong_is_never_written(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = urdfkin.load("ur5")
+    proof = code(robot, quantities=(quantity,)).proof
+    (line,) = proof.certificate.lines
+    assert line.checked >= CHECKED
+    assert line.unchecked == 0
+    assert proof.certificate.verified
+    right = Function.evaluated
+    monkeypatch.setattr(Function, "evaluated", lambda *given: right(*given) * (1.0 + 1e-9))
+    with pytest.raises(urdfkin.VerificationError):
+        code(robot, quantities=(quantity,))
 
 
 def arm() -> Robot:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 
+import urdfkin
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Mimic, build_tree
+from urdfkin.verify.chains import check_chain
+from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.tables import TableError
 
 EPS = np.finfo(np.float64).eps
 
@@ -145,3 +151,43 @@ def test_the_wrong_number_of_coordinates_names_the_right_ones(walker: KinematicT
         chain(walker, "left_foot").placement(np.zeros(3))
     with pytest.raises(InputError, match="numbers for walker"):
         chain(walker, "left_foot").coupling.select(walker, np.zeros(3))
+
+
+def moved(name: str, T: FloatArray) -> Callable[..., FloatArray]:
+    """Pinocchio's placements with one frame, by its name, moved in its own axes."""
+    right = Oracle.placements
+
+    def placements(self: Oracle, q: FloatArray, frames: Sequence[str], *more: object) -> FloatArray:
+        found = right(self, q, frames, *more).copy()  # type: ignore[arg-type]
+        found[:, [str(frame).endswith(name) for frame in frames]] @= T
+        return found
+
+    return placements
+
+
+@pytest.mark.parametrize(
+    ("frame", "T", "said"),
+    [
+        ("forearm", shift(1e-12, 0.0, 0.0), "an origin 1e-12 m off, a direction 0"),
+        ("forearm", rotation("x", 1e-12), "an origin 0 m off, a direction 1e-12"),
+        ("tool", rotation("z", 1e-12), "an origin 0 m off, a direction 1e-12"),
+        ("tool", shift(0.0, 1e-12, 0.0), "an origin 1e-12 m off, a direction 0"),
+    ],
+)
+def test_an_origin_or_a_direction_off_by_itself_is_a_disagreement(
+    frame: str, T: FloatArray, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = urdfkin.load(
+        """<robot name="r"><link name="base"/><link name="upper"/><link name="fore"/><link name="tool"/>
+    <joint name="arm" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/></joint>
+    <joint name="forearm" type="continuous"><parent link="upper"/><child link="fore"/>
+    <origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint>
+    <joint name="mount" type="fixed"><parent link="fore"/><child link="tool"/><origin xyz="1 0 0"/></joint>
+        </robot>"""
+    )
+    path, q = robot.chain("tool"), np.zeros((1, 2))
+    assert check_chain(robot.verifier, path, q) is not None
+    monkeypatch.setattr(Oracle, "placements", moved(frame, T))
+    with pytest.raises(TableError) as error:
+        check_chain(robot.verifier, path, q)
+    assert said in str(error.value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import re
@@ -108,6 +109,17 @@ def test_what_failed_is_said_in_words_and_not_by_colour_alone() -> None:
     assert "1 robot bad input, 1 robot disagrees, 1 robot verified." in text
     assert "✗ 3" in text
     assert "URDF502" in text
+
+
+def test_tables_agree_on_the_page_as_far_as_their_share_of_the_bound_allows() -> None:
+    document = copy.deepcopy(arms())
+    chains = [chain for robot in document["robots"] for chain in robot["chains"]]
+    assert as_html(document).count("Both tables agree with Pinocchio") == len(chains) > 0
+    for chain in chains[1:]:
+        chain["share_of_bound"] = 1.01
+    text = as_html(document)
+    assert text.count("Both tables agree with Pinocchio") == 1
+    assert text.count("The tables disagree with Pinocchio") == len(chains) - 1
 
 
 @pytest.mark.parametrize("name", [HOSTILE_ROBOT, HOSTILE_JOINT, HOSTILE_LINK])

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
@@ -9,9 +14,10 @@ import urdfkin
 from tests.sameness.pairs import changed, robot
 from urdfkin.model.mechanisms.aligning import align
 from urdfkin.model.mechanisms.alignment import FramePair
-from urdfkin.model.mechanisms.upper import FINE, behind_first, upper_bounds
+from urdfkin.model.mechanisms.upper import FINE, upper_bounds
 from urdfkin.model.mechanisms.variables import variables_of
-from urdfkin.sameness.boxes import Boxes, tightened
+from urdfkin.model.tree import FloatArray
+from urdfkin.sameness.boxes import Boxes, moved_together, tightened
 from urdfkin.sameness.certificate import certificate, recheck
 from urdfkin.sameness.curvature import curvature
 from urdfkin.sameness.judging import Judge
@@ -30,24 +36,20 @@ CASES = [
 
 
 def searched(name: str, what: str, link: str) -> tuple[Search, FramePair]:
-    a, b = robot(name), changed(name, what)
+    b = changed(name, what)
     assert b is not None
+    return laid(robot(name), b, link)
+
+
+def laid(a: urdfkin.Robot, b: urdfkin.Robot, link: str) -> tuple[Search, FramePair]:
     judge = Judge((a, b), {}, bounds=True)
     found = align(*judge.mechanisms, {})
     frame = next(one for one in found.frames if a.tree.links[one.a] == link)
     return judge.search(found, variables_of(found, judge.tolerance)), frame
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "what", "link"), CASES)
-def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, link: str) -> None:
-    search, frame = searched(name, what, link)
-    steps, some = behind_first(search.found, search.variables, frame)
-    pairs = [pair for pair in some if pair is not None]
-    names, M = curvature(steps, pairs, search.variables, frame)
-    if not np.isfinite(M).all():
-        assert what == "other rule"
-        return
+def hold_against_differences(search: Search, frame: FramePair, names: Sequence[str], M: FloatArray) -> None:
+    """Bounds M on second derivatives against difference quotients of the first ones."""
     boxes = Boxes(search, frame, names)
     c, step = search.random(200)[:, boxes.at], 1e-3
     largest = np.zeros_like(M)
@@ -61,6 +63,113 @@ def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, lin
         largest[i] = np.linalg.norm((ahead[1] - behind[1]) / (2.0 * step), axis=1).max(axis=0)
     assert (largest <= M + 1e-11).all()
     assert M.max() <= 10.0 * largest.max()
+
+
+def two_joints(elbow: str, multiplier: float | None) -> urdfkin.Robot:
+    """An arm whose second joint stands at an origin, and follows the first one if there is a multiplier."""
+    follows = "" if multiplier is None else f'<mimic joint="j1" multiplier="{multiplier}"/>'
+    limit = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
+    return urdfkin.load(
+        f"""<robot name="r"><link name="base"/><link name="upper"/><link name="fore"/><link name="tool"/>
+        <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
+        {limit}</joint>
+        <joint name="j2" type="revolute"><parent link="upper"/><child link="fore"/><origin {elbow}/>
+        <axis xyz="0 1 0"/>{limit}{follows}</joint>
+        <joint name="mount" type="fixed"><parent link="fore"/><child link="tool"/><origin xyz="1 0 0"/>
+        </joint></robot>"""
+    )
+
+
+@pytest.mark.parametrize("multiplier", [None, 5.0, -0.25])
+@pytest.mark.parametrize(
+    "elbow",
+    ['xyz="1.01 0.02 0" rpy="0.01 0 0.02"', 'xyz="1.5 0 0.3"', 'xyz="1 0 -0.9"', 'xyz="1 0 0" rpy="0.5 0 0"'],
+)
+def test_second_derivatives_are_bounded_for_tilted_and_for_parallel_axes_and_followers(
+    elbow: str, multiplier: float | None
+) -> None:
+    a, b = two_joints('xyz="1 0 0"', multiplier), two_joints(elbow, multiplier)
+    search, frame = laid(a, b, "tool")
+    steps, some = moved_together(search.found, search.variables, frame)
+    names, M = curvature(steps, [one for one in some if one is not None], search.variables, frame)
+    assert np.isfinite(M).all()
+    hold_against_differences(search, frame, names, M)
+
+
+def test_a_slide_that_follows_a_turn_in_front_of_it_is_bounded_with_that_turn() -> None:
+    s = 0.01
+
+    def arm(slide: str) -> urdfkin.Robot:
+        limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+        return urdfkin.load(
+            f"""<robot name="r"><link name="base"/><link name="upper"/><link name="fore"/><link name="tool"/>
+            <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
+            {limit}</joint>
+            <joint name="j2" type="prismatic"><parent link="upper"/><child link="fore"/><origin {slide}/>
+            <axis xyz="1 0 0"/>{limit}<mimic joint="j1"/></joint>
+            <joint name="j3" type="revolute"><parent link="fore"/><child link="tool"/><axis xyz="0 1 0"/>
+            {limit}</joint></robot>"""
+        )
+
+    search, frame = laid(arm('xyz="0 0 0"'), arm(f'xyz="{s} 0 0" rpy="0 0 {-s}"'), "tool")
+    upper = upper_bounds(search.found, search.variables, frame, FINE)[0]
+    attained = s * np.sqrt(2.0)
+    assert search.worst([frame])[0][0] == pytest.approx(attained, rel=0.01)
+    # What boxes prove is no less than what is attained, also where less would be enough.
+    assert tightened(search, frame, 1.01 * s, upper) >= 0.99 * attained
+
+
+def test_joints_that_follow_by_other_multipliers_have_no_bound_on_second_derivatives() -> None:
+    search, frame = laid(two_joints('xyz="1 0 0"', 0.5), two_joints('xyz="1 0 0"', 0.6), "tool")
+    steps, some = moved_together(search.found, search.variables, frame)
+    _, M = curvature(steps, [one for one in some if one is not None], search.variables, frame)
+    assert np.isinf(M).all()
+
+
+@pytest.mark.parametrize("variables", [1, 2, 5])
+def test_the_first_derivatives_bound_of_a_box_is_no_less_than_its_corners(variables: int) -> None:
+    rng = np.random.default_rng(variables)
+    D, G = rng.normal(size=(50, 3)), rng.normal(size=(50, 3, variables))
+    D[0] = 0.0
+    h = rng.uniform(0.1, 2.0, variables)
+    boxes = cast(Boxes, SimpleNamespace(at_middles=lambda c: (D, G)))
+    bound = Boxes.bounds(boxes, np.zeros((50, variables)), h)
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=variables)))
+    corners = np.linalg.norm(D[:, np.newaxis] + np.einsum("nij,sj->nsi", G, signs * h), axis=-1).max(axis=1)
+    assert (bound >= corners * (1.0 - 1e-12)).all()
+    along = (
+        np.abs((D[:, :, np.newaxis] * G).sum(axis=1)) / np.maximum(np.linalg.norm(D, axis=1), 1e-300)[:, None]
+    )
+    size = np.linalg.norm(D, axis=1) + along @ h
+    assert (bound <= np.linalg.norm(D, axis=1) + np.linalg.norm(G, axis=1) @ h + 1e-12).all()
+    assert (bound >= size).all()
+    if variables == 1:
+        np.testing.assert_allclose(bound, corners, rtol=1e-12)
+
+
+@pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.3)])
+def test_a_tools_point_moves_as_its_jacobian_says(tool: tuple[float, float, float]) -> None:
+    arm, none = robot("panda"), cast(Boxes, None)  # the point depends on no box
+    q, step = arm.sample(5, seed=1), 1e-6
+    p, J = Boxes._origin(none, arm, q, "panda_hand", np.array(tool))
+    expected = arm.placement(q, "panda_hand") @ [*tool, 1.0]
+    np.testing.assert_allclose(p, expected[:, :3], atol=1e-14)
+    for i, h in enumerate(step * np.eye(arm.nv)):
+        ahead, behind = (Boxes._origin(none, arm, x, "panda_hand", np.array(tool))[0] for x in (q + h, q - h))
+        np.testing.assert_allclose((ahead - behind) / (2.0 * step), J[..., i], atol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "what", "link"), CASES)
+def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, link: str) -> None:
+    search, frame = searched(name, what, link)
+    steps, some = moved_together(search.found, search.variables, frame)
+    pairs = [pair for pair in some if pair is not None]
+    names, M = curvature(steps, pairs, search.variables, frame)
+    if not np.isfinite(M).all():
+        assert what == "other rule"
+        return
+    hold_against_differences(search, frame, names, M)
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from urdfkin.errors import SourceError
+from urdfkin.system.files import read_standard_input
 from urdfkin.urdf.sources import MOST, read_source
 
 MOST_HERE = 1000
@@ -47,6 +48,11 @@ def test_a_robot_of_the_catalogue_is_read_no_further_either() -> None:
 def test_a_device_that_never_ends_is_read_up_to_what_is_allowed() -> None:
     assert len(read_source(Path("/dev/zero"), MOST_HERE).data) == MOST_HERE + 1
     assert MOST == 100_000_000
+
+
+def test_standard_input_is_read_whole_where_nothing_limits_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"0.1,0.2\n0.3,0.4\n")))
+    assert read_standard_input() == b"0.1,0.2\n0.3,0.4\n"
 
 
 def test_an_address_in_a_package_leads_to_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

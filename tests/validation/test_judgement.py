@@ -1,9 +1,12 @@
 """The judge reads decimals, is right to fifty digits, and finds an error of a few units in the last place."""
 
+import re
+
 import numpy as np
 import pytest
 
 import urdfkin
+from scripts import make_judge
 from tests.high_precision import mp as independent
 from tests.high_precision import rate, second_rate
 from tests.laws.subjects import robot_of
@@ -17,7 +20,8 @@ from urdfkin.kinematics.rotation.quaternion import quaternion_of
 from urdfkin.model import base_motion as recursion_base
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.validation.judgement import Errors, Line, exact_quaternion, judge
+from urdfkin.report.words import judged_on, nearer, nearer_counts
+from urdfkin.validation.judgement import Errors, Judgement, Line, exact_quaternion, judge
 from urdfkin.verify.asked import BaseRows
 from urdfkin.verify.exact import recursion as exact_recursion
 from urdfkin.verify.exact.decimals import read_exact
@@ -306,3 +310,23 @@ def test_an_analytical_jacobian_is_judged_in_every_representation_and_an_error_o
         assert found[name].pinocchio == line.pinocchio
     # Two samples of eleven links of up to six columns, in twelve sequences; singular ones are left out.
     assert 1000 < right["euler angles"].numbers < 2 * 11 * 6 * 6 * 12
+
+
+def test_errors_that_are_the_same_double_are_counted_as_equal_and_not_as_nearer() -> None:
+    def line(ours: float, theirs: float) -> Line:
+        return Line("placement", "", 9, Errors(1.0, ours), Errors(1.0, theirs))
+
+    judged = Judgement("arm", 1, 0, (line(0.1, 0.2), line(0.2, 0.2), line(0.3, 0.2), line(0.1, 0.1)))
+    lines = judged.as_dict()["lines"]
+    assert [nearer(one) for one in lines] == ["urdfkin", "equal", "Pinocchio", "equal"]
+    counts = "urdfkin is nearer in 1 of 4 lines, equal in 2, farther in 1"
+    assert nearer_counts(lines) == counts
+    assert judged_on(judged.as_dict()) == f"1 sample; {counts}"  # type: ignore[arg-type]
+    assert f"\n{counts}; " in make_judge.page({"arm": judged})
+
+
+def test_polar_has_as_many_equal_lines_as_its_page_says() -> None:
+    lines = judge(urdfkin.load("polar"), samples=make_judge.SAMPLES, seed=make_judge.SEED).as_dict()["lines"]
+    table = make_judge.PAGE.read_text("utf-8").partition("## polar")[2].partition("## ")[0]
+    rows = re.findall(r"\| ([\d.]+) \| ([\d.]+) \|$", table, re.M)
+    assert [ours == theirs for ours, theirs in rows] == [nearer(line) == "equal" for line in lines]

@@ -59,6 +59,26 @@ def test_a_wrong_table_fails_its_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     assert robot.verdict is Verdict.DISAGREES
 
 
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_of_both_conventions_the_worse_table_is_told(
+    convention: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, right = urdfkin.load("ur5"), dh_table
+    (good,) = chains_of(robot, robot.verifier.oracle())
+
+    def wrong(*args: str) -> object:
+        table = right(*args)  # type: ignore[arg-type]
+        return replace(table, tool=table.tool @ shifted) if args[-1] == convention else table
+
+    shifted = np.eye(4)
+    shifted[0, 3] = 1e-9
+    monkeypatch.setattr(chains_module, "dh_table", wrong)
+    (bad,) = chains_of(robot, robot.verifier.oracle())
+    assert bad["metres"] == pytest.approx(1e-9, rel=1e-3)
+    assert bad["worst"] > 1e4 * good["worst"]
+    assert bad["share_of_bound"] > 1.0 > good["share_of_bound"]
+
+
 def test_time_is_told_by_whose_work_it_was() -> None:
     robot = validate("ur5", samples=10).robots[0]
     assert robot.clock is not None

@@ -246,6 +246,23 @@ def test_a_damaged_store_is_reported_and_made_whole(undisturbed: str, tmp_path: 
     assert len(list((tmp_path / "damaged").iterdir())) == 4
 
 
+@pytest.mark.slow
+def test_a_renamed_chunk_is_reported_and_put_aside(undisturbed: str, tmp_path: Path) -> None:
+    validate(ROBOTS, samples=SAMPLES, store=tmp_path)
+    first, second, third, *_ = files(tmp_path)
+    first.rename(first.with_name("copy of it.chunk"))
+    second.rename(second.with_suffix(".old"))
+    third.rename(third.parents[1] / first.parent.name / third.name)
+    with pytest.warns(StoreWarning, match="no chunk of this campaign has this name") as told:
+        assert stored(tmp_path).interrupted
+    assert len(told) == 3
+    with pytest.warns(StoreWarning, match="no chunk of this campaign has this name") as told:
+        assert numbers(validate(ROBOTS, samples=SAMPLES, store=tmp_path)) == undisturbed
+    assert len(told) == 3
+    assert len(list((tmp_path / "damaged").iterdir())) == 3
+    assert numbers(stored(tmp_path)) == undisturbed
+
+
 @pytest.mark.parametrize(
     "content", [b"", b"{}", b"[]", b"\xff", b'{"layout": "urdfkin-campaign/2"}', b"null"]
 )

@@ -15,8 +15,10 @@ from urdfkin.report.html import as_html
 from urdfkin.report.junit import as_junit
 from urdfkin.report.markdown import as_markdown
 from urdfkin.report.reading import checked
+from urdfkin.validation import comparing
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.three_sides import ThreeSides, plus, three_sides
+from urdfkin.validation.tally import tally
+from urdfkin.validation.three_sides import Pair, ThreeSides, plus, three_sides
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.mujoco import MujocoOracle
 from urdfkin.verify.pinocchio import Oracle
@@ -66,9 +68,73 @@ def test_sums_add_up_in_any_order() -> None:
     assert total.urdfkin.failed == 2
 
 
+#: urdfkin and Pinocchio: 4 eps. urdfkin and the witness: 16 eps. Pinocchio and the witness: the sum, 20 eps.
+@pytest.mark.parametrize(
+    ("answers", "agree"),
+    [
+        ((0, 4, 4), (True, True, True)),
+        ((0, 5, 4), (False, True, True)),
+        ((0, 4, 16), (True, True, True)),
+        ((0, 4, 17), (True, False, True)),
+        ((0, -4, 16), (True, True, True)),
+        ((0, -4, 17), (True, False, False)),
+        ((0, -5, 16), (False, True, False)),
+    ],
+)
+def test_two_answers_agree_up_to_their_bound_and_no_further(
+    answers: tuple[float, float, float], agree: tuple[bool, bool, bool]
+) -> None:
+    found, (ours, pinocchios, witness) = asked(*answers), answers
+    ours_theirs, ours_witness, theirs_witness = agree
+    assert (found.urdfkin.failed, found.pinocchio.failed) == (not ours_witness, not theirs_witness)
+    assert found.urdfkin.share == abs(ours - witness) / 16
+    assert found.pinocchio.share == abs(pinocchios - witness) / 20
+    assert found.urdfkin.worst == abs(ours - witness) / 2
+    others = {
+        (True, True, True): ((0, 0, 0), 0),
+        (True, False, False): ((0, 0, 1), 0),
+        (False, True, False): ((0, 1, 0), 0),
+        (False, False, True): ((1, 0, 0), 0),
+    }
+    assert (found.alone, found.undecided) == others.get(
+        (ours_theirs, ours_witness, theirs_witness), ((0, 0, 0), 1)
+    )
+
+
+def test_of_several_blocks_the_worst_disagreement_is_kept() -> None:
+    small, large = asked(0, 2, 6), asked(0, -4, 14)
+    for total in (small + large, large + small):
+        assert total.urdfkin == Pair(0, large.urdfkin.worst, large.urdfkin.share)
+        assert total.pinocchio == Pair(0, large.pinocchio.worst, large.pinocchio.share)
+    assert small.urdfkin.worst < large.urdfkin.worst
+    assert small.pinocchio.share < large.pinocchio.share
+
+
 def document_of(**changes: Any) -> Document:
     report = validate(arm(), samples=3, oracle="mujoco", **changes)
     return checked(report.as_dict(), "the report")
+
+
+def test_each_pair_is_measured_against_its_own_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    bounds: list[tuple[Bound, Bound]] = []
+    own: list[Bound] = []
+
+    def sides(*given: Any) -> ThreeSides:
+        bounds.append(given[-2:])
+        return three_sides(*given)
+
+    def counted(ours: FloatArray, theirs: FloatArray, bound: Bound, *others: Any) -> Any:
+        own.append(bound)
+        return tally(ours, theirs, bound, *others)
+
+    monkeypatch.setattr(comparing, "three_sides", sides)
+    monkeypatch.setattr(comparing, "tally", counted)
+    assert validate(arm(), samples=0, oracle="mujoco").passed
+    assert len(bounds) == len(own) - 1 > 10  # Pinocchio's data.J is compared by itself
+    for (first, second), bound in zip(bounds, own, strict=False):
+        assert np.array_equal(first.scale, bound.scale)
+        assert np.array_equal(first.k, bound.k)
+        assert np.array_equal(second.k, 2.0 * 30.0 / 24.0 * bound.k)
 
 
 def off(method: Any) -> Any:

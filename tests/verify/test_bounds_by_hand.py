@@ -199,3 +199,30 @@ def test_a_tilt_adds_twice_itself_to_each_factor(plan: Plan) -> None:
     k = 24.0 * JOINTS + 2.0 * tilt / EPS
     assert six(VELOCITY.bound(plan, sizes(tilt), LOCAL))[2] == 3.0 * k
     assert columns(JACOBIAN.bound(plan, sizes(tilt), ALIGNED))[2] == 2.0 * k
+
+
+def test_mujocos_levers_are_twice_as_long_and_its_roundings_two_and_a_half_times_as_many() -> None:
+    size = bounds.about_the_root(sizes())
+    lever = 2.0 * P
+    assert size.p == lever
+    assert size.w == W
+    assert size.vel == VEL + W * lever
+    assert size.alpha == ALPHA
+    assert size.acc == ACC + W * VEL + (ALPHA + W * W) * lever
+    assert size.roundings == 2.0 * 30.0 * JOINTS
+
+
+def test_an_imus_reading_has_an_accelerations_factors_in_its_own_axes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found: list[tuple[FloatArray, int, Magnitudes, Reference]] = []
+
+    def asked(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference) -> Bound:
+        found.append((scale, factors, size, reference))
+        return bounds.bound_of(scale, factors, size, reference)
+
+    monkeypatch.setattr(imu, "bound_of", asked)
+    urdfkin.load(ARM).imu([0.1, 0.2], [1.0, 2.0], [3.0, 4.0], "l3")
+    ((scale, factors, size, reference),) = found
+    assert (factors, reference) == (ACCELERATION.factors, LOCAL)
+    assert (scale == bounds.imu_scale(size, np.array([0.0, 0.0, -9.81]))).all()

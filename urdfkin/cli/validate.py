@@ -1,11 +1,11 @@
-"""`urdfkin validate`: every quantity of every frame against Pinocchio."""
+"""`urdfkin validate`: every frame and joint against Pinocchio, on many samples."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
@@ -21,15 +21,25 @@ from urdfkin.cli.reports import FILES, check_writable, report_options, say_writt
 from urdfkin.cli.stopping import stoppable
 from urdfkin.errors import InputError
 from urdfkin.urdf.catalogue import examples
+from urdfkin.verify.quantities import compared, not_compared
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.validation.engine import Engine
     from urdfkin.validation.results import ValidationReport
 
+_T = TypeVar("_T", bound=click.Command)
 EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 
 
+def _with_quantities(command: _T) -> _T:
+    """The help, which names the quantities as the table has them."""
+    assert command.help is not None
+    command.help = command.help.format(compared=compared(), not_compared=not_compared())
+    return command
+
+
+@_with_quantities
 @click.command(epilog=f"Example: {EXAMPLE}")
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...", shell_complete=complete_robot)
 @click.option("--all", "all_", is_flag=True, help="Every robot of example-robot-data in the catalogue.")
@@ -74,7 +84,10 @@ def command(
     cases: bool,
     **asked: Any,
 ) -> None:
-    """Compare every quantity, frame, joint and reference with Pinocchio's, on many samples.
+    """Compare every frame and joint with Pinocchio's, in all three references, on many samples.
+
+    Compared: {compared}. Not compared: {not_compared}; calls of the library and commands check those one by
+    one.
 
     Configurations are drawn within limits; the neutral one and the ends of the limits are added, and every
     eighth sample has rates a hundred times larger. Disagreement is given in multiples of eps * scale: 1 to
@@ -87,7 +100,7 @@ def command(
     files = {name: asked.pop(name) for name in FILES}
     store, shard, retry = (asked[name] for name in ("store", "shard", "retry"))
     if bool(robots) == all_:
-        raise click.UsageError("name robots, or say --all for the whole catalogue")
+        raise click.UsageError("name robots, or say --all for every robot of example-robot-data")
     if (retry or shard) and store is None:
         raise click.UsageError("--retry and --shard go with --store DIR")
     if scheduler and (asked["jobs"] > 1 or asked["isolate"]):

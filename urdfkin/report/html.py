@@ -36,6 +36,7 @@ from urdfkin.report.words import (
     worst,
 )
 from urdfkin.validation.portrait import chain_disagreement
+from urdfkin.verify.quantities import compared, not_compared
 from urdfkin.view.figure import installed
 
 if TYPE_CHECKING:
@@ -135,6 +136,8 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
             summary=summary(document),
             when=when(document["started"]),
             pinocchio=pinocchio(document),
+            compared=compared(),
+            not_compared=not_compared(),
             totals=_totals(document),
             verdicts=verdict_counts(document),
             quantities=list(quantities),

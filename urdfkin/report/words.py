@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal
 
@@ -88,15 +89,25 @@ def worst_of(robot: Robot, names: Sequence[str]) -> str:
     return units(worst(check["worst"] for check in checks), compared=bool(checks))
 
 
-def nearer(line: Judged) -> str:
-    """Whose typical error is the smaller."""
-    return "urdfkin" if line["urdfkin"]["typical"] <= line["pinocchio"]["typical"] else "Pinocchio"
+def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
+    """Whose typical error is smaller; `equal` where both are the same double."""
+    ours, theirs = line["urdfkin"]["typical"], line["pinocchio"]["typical"]
+    return "equal" if ours == theirs else "urdfkin" if ours < theirs else "Pinocchio"
+
+
+def nearer_counts(lines: Sequence[Judged]) -> str:
+    """How often urdfkin is nearer to the true values, equally near, and farther."""
+    counts = Counter(nearer(line) for line in lines)
+    return (
+        f"urdfkin is nearer in {counts['urdfkin']:,} of {counted(len(lines), 'line')}, equal in "
+        f"{counts['equal']:,}, farther in {counts['Pinocchio']:,}"
+    )
 
 
 def judged_on(judgement: Judgement) -> str:
-    """The samples of a judgement, and whether they moved."""
+    """The samples of a judgement, whether the base moved, and how often urdfkin is nearer."""
     moving = " on a moving base" if judgement.get("moving_base") else ""
-    return counted(judgement["samples"], "sample") + moving
+    return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"
 
 
 def witness_title(robots: Sequence[Robot]) -> str | None:

@@ -18,9 +18,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from urdfkin.kinematics.roundings import NOT_ZERO
-from urdfkin.model.mechanisms.alignment import FramePair
+from urdfkin.model.mechanisms.alignment import Alignment, FramePair, Step
 from urdfkin.model.mechanisms.upper import behind_first
-from urdfkin.model.mechanisms.variables import Line
+from urdfkin.model.mechanisms.variables import Line, Pair, Variables
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -37,7 +37,7 @@ class Boxes:
     Args:
         search: Both robots.
         frame: The frame.
-        names: Of the variables that move it behind the first difference.
+        names: Of the variables that move it: see `moved_together`.
     """
 
     def __init__(self, search: Search, frame: FramePair, names: Sequence[str]) -> None:
@@ -99,7 +99,7 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
         most: How many boxes there may be at a time.
     """
     variables = search.variables
-    steps, pairs = behind_first(search.found, variables, frame)
+    steps, pairs = moved_together(search.found, variables, frame)
     some = [pair for pair in pairs if pair is not None]
     all_round = all(
         step.kind == "turns" and abs(line.slope) == 1.0
@@ -128,6 +128,27 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
             keep = proven > target
             c, proven = c[keep], proven[keep]
     return float(proven.max(initial=target))
+
+
+def moved_together(
+    found: Alignment, variables: Variables, frame: FramePair
+) -> tuple[list[Step], list[Pair | None]]:
+    """The steps on the way to a frame from the first that differs, or that moves with one that does.
+
+    What stands in front turns D and leaves its length, but a variable that moves a joint there, as the one
+    that a mimic joint behind it follows, bends D by that turn too.
+    """
+    steps, pairs = found.path(frame.previous), [variables.pairs[i] for i in found.indices(frame.previous)]
+    first = len(steps) - len(behind_first(found, variables, frame)[0])
+    for i in reversed(range(first)):
+        if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
+            first = i  # what stands between brings its own variables
+    return steps[first:], pairs[first:]
+
+
+def _variables(pairs: Sequence[Pair | None]) -> set[str]:
+    lines = (line for pair in pairs if pair is not None for line in (pair.a, pair.b))
+    return {line.variable for line in lines if line.slope}
 
 
 def _longest(h: FloatArray, M: FloatArray) -> int:

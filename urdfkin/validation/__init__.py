@@ -1,1 +1,1 @@
-"""Validation: many samples, every quantity, every frame, every joint, held against Pinocchio."""
+"""Validation: many samples, every frame and every joint, held against Pinocchio."""

@@ -56,7 +56,9 @@ def validate(
     shard: str | None = None,
     progress: Progress | None = None,
 ) -> ValidationReport:
-    """Hold every quantity of every frame and joint against Pinocchio's, in all three references.
+    """Hold every frame and joint against Pinocchio's, in all three references.
+
+    The quantities are `urdfkin.verify.quantities.compared()`; `not_compared()` names the others.
 
     Args:
         robots: One robot or several: anything `load` takes, or robots that were loaded.
@@ -180,6 +182,7 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
         SourceError, InputError: it is none.
     """
     store = Store.reading(Path(folder), _warn)
+    store.check_names()
     manifest, found = store.manifest, store.manifest.subjects()
     gathering = Gathering(found, manifest.cut, shares(len(found), manifest.cut))
     _Campaign(found, manifest.cut, manifest.seed, None, gathering).use(store)

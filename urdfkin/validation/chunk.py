@@ -168,7 +168,7 @@ def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondWitness | None]:
 
 
 def run_chunk(chunk: Chunk) -> ChunkResult:
-    """Compute every quantity of every frame in all references, and compare."""
+    """Compute what is compared of every frame, in all references, and compare it."""
     begin, clock = time.perf_counter(), Clock()
     robot, oracle, second = _loaded(chunk)
     portrait = Portrait.of(robot, oracle) if chunk.index == 0 else None

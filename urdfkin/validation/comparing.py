@@ -1,4 +1,4 @@
-"""Every quantity of every frame of a robot, ours against Pinocchio's, for some samples.
+"""Every frame of a robot, ours against Pinocchio's, for some samples.
 
 Frames are compared in blocks, so that memory is bounded whatever the robot: it is the Jacobians' arrays,
 samples * frames * 6 * rates, that grow. A frame's numbers do not depend on its neighbours, and tallies of

@@ -17,9 +17,7 @@ from urdfkin.validation.answer_file import DamagedError, packed, unpacked
 from urdfkin.validation.judgement import Errors, Judgement, Line
 from urdfkin.validation.manifest import LAYOUT
 from urdfkin.validation.provenance import version
-from urdfkin.validation.store import JUDGE, Store
-
-_KIND = ".judged"
+from urdfkin.validation.store import JUDGE, JUDGED, Store
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,16 +96,16 @@ class Judged:
 
     def found(self, robot: int) -> Judgement | NotJudged | None:
         """What is known of a robot."""
-        return self._store.kept(self._key(robot), _KIND, _read)
+        return self._store.kept(self._key(robot), JUDGED, _read)
 
     def has(self, robot: int) -> bool:
         """Whether something is known of a robot, by the file's name."""
-        return self._store.has(self._key(robot), _KIND)
+        return self._store.has(self._key(robot), JUDGED)
 
     def keep(self, robot: int, found: Judgement | NotJudged) -> None:
         """Write it down."""
         key = self._key(robot)
-        self._store.keep_part(key, _KIND, packed(key, {"judge": asdict(found)}))
+        self._store.keep_part(key, JUDGED, packed(key, {"judge": asdict(found)}))
 
     def stamp(self, robot: int) -> str:
         """The sha256 of the text that was compared."""

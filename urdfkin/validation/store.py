@@ -6,7 +6,7 @@
     DIR/lock                    held by who is at work
 
 It knows no engine: whoever computed a chunk, its answer lies under the chunk's key. A file that is no answer
-is reported, put aside and computed again.
+is reported, put aside and computed again; so is one under a name that no chunk of the campaign has.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
 #: What the judge was asked for; `urdfkin.validation.judging`.
 JUDGE = "judge.json"
+#: How the name of a file ends that holds what the judge found; its key is the judge's.
+JUDGED = ".judged"
 _DONE, _FAILED = ".chunk", ".failed"
 
 #: How often a lock is asked for, a tenth of a second apart.
@@ -83,7 +85,7 @@ class Store:
         except FileNotFoundError:
             return None
         except (DamagedError, OSError) as error:
-            self._put_aside(place, error)
+            self._put_aside(place, f"is computed again: {getattr(error, 'strerror', None) or error}")
             return None
 
     def keep(self, robot: int, index: int, found: Answer) -> None:
@@ -113,6 +115,18 @@ class Store:
         for place in self._files(_FAILED):
             place.unlink(missing_ok=True)
 
+    def check_names(self) -> None:
+        """Report files beside the chunks that have the name of none, as a renamed one, and put them aside."""
+        keys = (
+            self.manifest.key(robot, index)
+            for robot in range(len(self.manifest.robots))
+            for index in range(len(self.manifest.cut))
+        )
+        expected = {self._place(key, kind) for key in keys for kind in (_DONE, _FAILED)}
+        for place in sorted((self.folder / _CHUNKS).glob("*/*")):
+            if place not in expected and place.suffix != JUDGED:
+                self._put_aside(place, "is not used: no chunk of this campaign has this name")
+
     def counts(self) -> dict[int, tuple[int, bool]]:
         """For each robot how many of its chunks are there, and whether it failed; by the files' names."""
         names = {place.name for kind in (_DONE, _FAILED) for place in self._files(kind)}
@@ -125,6 +139,7 @@ class Store:
 
     def take(self, other: Store) -> int:
         """Copy what another store of the same campaign has and this one has not; how many chunks it were."""
+        other.check_names()
         taken = 0
         for robot in range(len(self.manifest.robots)):
             for index in range(len(self.manifest.cut)):
@@ -173,8 +188,8 @@ class Store:
     def _files(self, kind: str) -> Iterator[Path]:
         return (self.folder / _CHUNKS).glob(f"*/*{kind}")
 
-    def _put_aside(self, place: Path, error: Exception) -> None:
-        self.tell(f"{place} is computed again: {getattr(error, 'strerror', None) or error}")
+    def _put_aside(self, place: Path, why: str) -> None:
+        self.tell(f"{place} {why}")
         if self.scratch is not None:
             aside = self.folder / _ASIDE
             with contextlib.suppress(OSError):
@@ -231,7 +246,9 @@ def opened(
             shutil.rmtree(scratch, ignore_errors=True)  # what a killed one had begun
             scratch.mkdir(parents=True)
             try:
-                yield _opened(Store(folder, manifest, tell, scratch), retry_failed=retry_failed)
+                store = _opened(Store(folder, manifest, tell, scratch), retry_failed=retry_failed)
+                store.check_names()
+                yield store
             finally:
                 shutil.rmtree(scratch, ignore_errors=True)
     except OSError as error:

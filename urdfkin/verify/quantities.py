@@ -372,6 +372,22 @@ def validated(of: str = "frames") -> list[Quantity]:
     return [row for row in walked(of) if row.validated]
 
 
+def compared() -> str:
+    """What a validation compares of every frame, as a sentence has it."""
+    return _listed([row.title for row in validated()])
+
+
+def not_compared() -> str:
+    """What `Robot` computes of a frame that a validation does not compare; a call checks it all the same."""
+    return _listed(
+        [row.title for row in QUANTITIES.values() if row.of == "frames" and row not in validated()]
+    )
+
+
+def _listed(titles: Sequence[str]) -> str:
+    return f"{', '.join(titles[:-1])} and {titles[-1]}"
+
+
 def by_command() -> dict[str, Quantity]:
     """Those with a command of their own, by its name."""
     return {row.command: row for row in walked() if row.command}

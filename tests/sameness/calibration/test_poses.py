@@ -42,6 +42,13 @@ def test_every_form_reads_the_same(tmp_path: Path) -> None:
         np.testing.assert_allclose(found, T, atol=1e-15)
 
 
+def test_a_quaternion_with_few_digits_is_brought_to_length_one(tmp_path: Path) -> None:
+    quat = quaternion_of(T[:, :3, :3])
+    rows = np.hstack([quat * 1.0009, T[:, :3, 3], Q])
+    found = read_poses(csv(tmp_path / "long.csv", "qx,qy,qz,qw,x,y,z,a,b", rows), NAMES, NAMES)[1]
+    np.testing.assert_allclose(found, T, atol=1e-15)
+
+
 def test_positions_alone_are_positions_alone(tmp_path: Path) -> None:
     path = csv(tmp_path / "p.csv", "a,x,y,z", np.hstack([Q[:, :1], 1e3 * T[:, :3, 3]]))
     q, p = read_poses(path, NAMES, ("a",), "mm")
