@@ -20,6 +20,8 @@ from pathlib import Path
 
 import platformdirs
 
+from urdfkin.system.files import read_bytes
+
 _A_MONTH = 30 * 24 * 3600.0
 _USED = ".used"
 #: Whose folders may lie above one's own: the superuser's, and those of nobody, as which a container sees the
@@ -42,7 +44,7 @@ def kept_folder(kind: str, sources: Iterable[Path], *besides: str, root: Path | 
     """
     digest = hashlib.sha256("\n".join(besides).encode())
     for source in sources:
-        digest.update(source.read_bytes())
+        digest.update(read_bytes(source))
     root = root or Path(platformdirs.user_cache_dir("urdfkin"))
     try:
         root.mkdir(mode=0o700, parents=True, exist_ok=True)

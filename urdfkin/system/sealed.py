@@ -10,6 +10,8 @@ import hashlib
 import tempfile
 from pathlib import Path
 
+from urdfkin.errors import SourceError
+from urdfkin.system.files import MOST_DATA, read_if_there
 from urdfkin.system.keeping import say_once
 
 _DIGEST = hashlib.sha256().digest_size
@@ -33,11 +35,11 @@ def keep(place: Path, data: bytes) -> None:
 def kept(place: Path) -> bytes | None:
     """What a sealed file holds; None where there is none, or where it is damaged, which is said."""
     try:
-        content = place.read_bytes()
-    except FileNotFoundError:
+        content = read_if_there(place, MOST_DATA)
+    except SourceError as error:
+        damaged(place, error.found or error.what)
         return None
-    except OSError as error:
-        damaged(place, error.strerror or str(error))
+    if content is None:
         return None
     seal, data = content[:_DIGEST], content[_DIGEST:]
     if hashlib.sha256(data).digest() != seal:
