@@ -1,4 +1,4 @@
-"""One reader reads every file, up to a limit; other kinds than regular files only where the caller named them.
+"""One reader reads every file, up to a limit; pipes and devices only where the caller named them.
 
 The device here is /dev/zero: who reads it to its end runs out of memory.
 """

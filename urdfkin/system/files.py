@@ -1,8 +1,8 @@
 """The one reader of files: whole, up to a limit, regular files only, or refused in one clear line.
 
 A folder of a stranger may hold a link to a device that never ends, or a named pipe that nobody writes to.
-A path that the caller named may be a pipe, since `urdfkin check <(xacro arm.xacro)` names one; it is given up after a
-while, where Python's own `open` would wait for ever.
+A path that the caller named may be a pipe, since `urdfkin check <(xacro arm.xacro)` names one; it is given up
+after a while, where Python's own `open` would wait for ever.
 """
 
 from __future__ import annotations
