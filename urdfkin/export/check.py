@@ -1,7 +1,7 @@
 """Run what a file brings with it: compile or import it, and have it compute its test vectors.
 
-The file is run as code, as its user would run it: from someone else's hands it deserves the same care. What runs
-is a copy in a folder of its own, so that nothing beside the file runs with it.
+The file is run as code, as its user would run it: from someone else's hands it deserves the same care. A copy
+runs, in a folder of its own, so that nothing beside the file runs with it.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.errors.numerals import decimal
+from urdfkin.errors.printable import log_line
 from urdfkin.loading import load
 from urdfkin.model.tree import Joint, KinematicTree
 from urdfkin.robot import Robot
@@ -53,8 +54,8 @@ class Change:
 
     def __str__(self) -> str:
         if not self.what:
-            return f"{self.element}: {'new' if self.old is None else 'gone'}"
-        return f"{self.element}: {self.what} {word(self.old)} -> {word(self.new)}"
+            return log_line(f"{self.element}: {'new' if self.old is None else 'gone'}")
+        return log_line(f"{self.element}: {self.what} {word(self.old)} -> {word(self.new)}")
 
 
 def word(value: Value | None) -> str:
@@ -81,7 +82,7 @@ class Effect:
         return f"moves {frame.frame} by up to {up_to(frame.lower, frame.upper)}"
 
     def __str__(self) -> str:
-        return f"alone {self.words}"
+        return log_line(f"alone {self.words}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError
+from urdfkin.errors.printable import log_line
 from urdfkin.model.configuration import checked, neutral
 from urdfkin.model.mechanisms.conversion import Conversion
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -131,7 +132,7 @@ class Sameness:
         return self.verdict is not Verdict.DIFFERS
 
     def __repr__(self) -> str:
-        return f"<Sameness {self.names[0]}, {self.names[1]}: {self.verdict.value}>"
+        return log_line(f"<Sameness {self.names[0]}, {self.names[1]}: {self.verdict.value}>")
 
     @property
     def worst(self) -> Interval | None:
