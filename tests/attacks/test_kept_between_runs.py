@@ -123,6 +123,46 @@ def test_a_damaged_tree_is_said_read_again_and_mended(damage: str, folder: Path)
     assert list(folder.iterdir()) == [file]
 
 
+@pytest.fixture
+def trees(folder: Path) -> dict[str, Path]:
+    """Two robots' trees that are kept, and exchanged."""
+    kept_as = {}
+    for name in ("ur5", "ur10"):
+        before = set(folder.iterdir())
+        remembered_tree(records(read_source(name).data))
+        (kept_as[name],) = set(folder.iterdir()) - before
+    ur5, ur10 = (kept_as[name].read_bytes() for name in ("ur5", "ur10"))
+    kept_as["ur5"].write_bytes(ur10)
+    kept_as["ur10"].write_bytes(ur5)
+    return kept_as
+
+
+def test_a_tree_in_another_ones_place_is_noticed_and_made_anew(trees: dict[str, Path]) -> None:
+    for name in ("ur5", "ur10"):
+        data = records(read_source(name).data)
+        with pytest.warns(CacheWarning, match=f"{trees[name].name} is damaged and is made anew"):
+            found = remembered_tree(data)
+        assert found.name == name
+        assert remembered_tree(data).name == name  # and nothing is said
+
+
+def test_a_kept_file_in_another_folder_of_its_name_is_noticed(tmp_path: Path) -> None:
+    first, second = tmp_path / "library-1" / "machine.code", tmp_path / "library-2" / "machine.code"
+    for place in (first, second):
+        place.parent.mkdir()
+    keep(first, b"of the first")
+    second.write_bytes(first.read_bytes())
+    with pytest.warns(CacheWarning, match="its content is not what was written under this name"):
+        assert kept(second) is None
+    assert kept(first) == b"of the first"
+    first.parent.rename(tmp_path / "moved")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "moved").rename(tmp_path / "elsewhere" / "library-1")
+    assert (
+        kept(tmp_path / "elsewhere" / "library-1" / "machine.code") == b"of the first"
+    )  # the cache as a whole
+
+
 # -- no room ---------------------------------------------------------------------------------------------
 
 
