@@ -9,6 +9,7 @@ import ast
 import io
 import os
 import resource
+import time
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,6 +21,7 @@ import urdfkin
 from tests.cli.running import urdfkin as command
 from urdfkin.errors import SourceError
 from urdfkin.motion.archive import read_arrays
+from urdfkin.system import files
 from urdfkin.system.files import MOST, read_bytes, read_if_there, read_start
 from urdfkin.system.git import version_before
 from urdfkin.system.sealed import kept
@@ -258,3 +260,56 @@ def test_an_older_version_that_is_too_large_is_refused(
     monkeypatch.setattr("urdfkin.system.git.MOST", 1000)
     with pytest.raises(SourceError, match=r"arm\.urdf: too large in the older version: found 1008 bytes"):
         version.read(tmp_path / "arm.urdf")
+
+
+# -- folders and meshes ---------------------------------------------------------------------------------
+
+
+def test_a_pipe_or_a_device_in_a_folder_that_is_checked_is_refused_and_the_others_are_checked(
+    tmp_path: Path,
+) -> None:
+    os.mkfifo(tmp_path / "a.urdf")
+    (tmp_path / "b.urdf").symlink_to("/dev/zero")
+    (tmp_path / "c.urdf").write_text('<robot name="r"><link name="a"/></robot>')
+    begin = time.monotonic()
+    done = command("check", str(tmp_path))
+    assert time.monotonic() - begin < files.PATIENCE
+    assert done.code == 2
+    assert "a.urdf: not a regular file: found a pipe" in done.err
+    assert "b.urdf: not a regular file: found a character device" in done.err
+    assert "no errors" in done.text or "1 file" in done.text
+
+
+OBJ = "mtllib {}\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+@pytest.mark.parametrize("name", ["device.mtl", "pipe.mtl", "../outside.mtl", "leading_out.mtl"])
+def test_what_a_mesh_names_is_read_from_regular_files_of_its_own_folder(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("trimesh")
+    from urdfkin.view import meshes  # noqa: PLC0415
+    from urdfkin.view.shapes import shapes  # noqa: PLC0415
+
+    folder = tmp_path / "mesh"
+    folder.mkdir()
+    (tmp_path / "outside.mtl").write_text("newmtl m\nKd 1 0 0\n")
+    (folder / "device.mtl").symlink_to("/dev/zero")
+    (folder / "leading_out.mtl").symlink_to(tmp_path / "outside.mtl")
+    os.mkfifo(folder / "pipe.mtl")
+    (folder / "a.obj").write_text(OBJ.format(name))
+    (folder / "own.mtl").write_text("newmtl m\nKd 1 0 0\n")
+    (folder / "own.obj").write_text(OBJ.format("own.mtl"))
+    read: list[str] = []
+
+    def told(path: Path, most: int) -> bytes:
+        read.append(path.name)
+        return files.read_bytes(path, most)
+
+    monkeypatch.setattr(meshes, "read_bytes", told)
+    for mesh in ("a.obj", "own.obj"):
+        visual = f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual>'
+        (folder / "r.urdf").write_text(f'<robot name="r"><link name="l">{visual}</link></robot>')
+        (shape,) = shapes(urdfkin.load(folder / "r.urdf", verify=False))
+        assert meshes.mesh(shape) is not None
+    assert read == ["a.obj", "own.obj", "own.mtl"]

@@ -57,13 +57,8 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
             kind = os.fstat(descriptor).st_mode
             if stat.S_ISDIR(kind):
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-            if not (pipes or stat.S_ISREG(kind)):
-                raise SourceError(
-                    "not a regular file",
-                    where=shortened(path),
-                    found=_KINDS.get(stat.S_IFMT(kind), "another kind"),
-                    remedy="put a regular file in its place",
-                )
+            if not pipes:
+                _demand_regular(path, kind)
             first = _first_of_pipe(descriptor, path) if stat.S_ISFIFO(kind) else b""
             os.set_blocking(descriptor, True)
             return _up_to(count, descriptor, first)
@@ -74,6 +69,29 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         reason = getattr(error, "strerror", None) or str(error)
         raise SourceError("cannot be read", where=shortened(path), found=reason) from error
+
+
+def demand_regular(path: Path) -> None:
+    """Refuse a pipe, a socket or a device; what is not there is for whoever reads it.
+
+    Raises:
+        SourceError: it is one.
+    """
+    try:
+        kind = path.stat().st_mode
+    except (OSError, ValueError):
+        return
+    _demand_regular(path, kind)
+
+
+def _demand_regular(path: Path, kind: int) -> None:
+    if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
+        raise SourceError(
+            "not a regular file",
+            where=shortened(path),
+            found=_KINDS.get(stat.S_IFMT(kind), "another kind"),
+            remedy="put a regular file in its place",
+        )
 
 
 def read_if_there(path: Path, most: int = MOST) -> bytes | None:
