@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.attacks.hostile import NAMES
+from tests.attacks.hostile import NAMES, urdf
 from urdfkin.dh.export import export
 from urdfkin.dh.units import units_of
 from urdfkin.errors.showing import Sheet, Table
@@ -217,3 +218,50 @@ def test_a_table_shows_itself_whatever_was_imported_first() -> None:
     code = "from urdfkin.dh.rows import table_from_rows as t; print(t([[1, 0, 0, 0]], 'standard'))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "standard Denavit-Hartenberg parameters" in done.stdout
+
+
+#: Names that a URDF can hold; printed as they are, they would act on a terminal or a log.
+ACTING = ("line", "carriage", "workflow", "workflow after a blank", "azure", "colours of one byte", "bidi")
+
+
+def printed(name: str) -> dict[str, str]:
+    """What `print` and `repr` say of the objects of a robot that bears a name."""
+    text = urdf(name)
+    robot = urdfkin.load(text)
+    q = [0.1, 0.2]
+    robot.jacobian(q)
+    other = urdfkin.load(text.replace('xyz="0.3', 'xyz="0.4'))
+    compared = urdfkin.same(robot, other)
+    changed = urdfkin.diff(text, text.replace('xyz="0.3', 'xyz="0.4'))
+    found: dict[str, Any] = {
+        "robot": robot,
+        "certificate": robot.certificate(),
+        "chain": robot.chain(),
+        "table": robot.dh(),
+        "breakdown": robot.acceleration_breakdown(q, q, q),
+        "enclosures": robot.enclose(q, q, q),
+        "same": compared,
+        "findings": robot.findings,
+        "report": urdfkin.validate([text], samples=0),
+    }
+    found |= {f"finding {k}": one for k, one in enumerate(robot.findings)}
+    found |= {f"change {k}": one for k, one in enumerate(changed.changes)}
+    found |= {f"effect {k}": one for k, one in enumerate(changed.effects)}
+    said = {f"str of {kind}": str(one) for kind, one in found.items()}
+    said |= {f"repr of {kind}": repr(one) for kind, one in found.items() if "<" in repr(one)[:1]}
+    with pytest.raises(urdfkin.UrdfkinError) as error:
+        robot.placement(q, name[::-1])
+    return said | {"error": str(error.value), "error of a file": str(urdfkin.SourceError("x", where=name))}
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+@pytest.mark.parametrize("kind", ACTING)
+def test_nothing_that_an_object_prints_acts_on_a_terminal_or_a_log(kind: str) -> None:
+    tame = printed("tame")
+    for where, text in printed(NAMES[kind]).items():
+        for line in text.split("\n"):
+            assert line.isprintable(), where
+            assert not re.match(r"\s*::", line), where
+            assert not re.search(r"##(vso|teamcity)?\[", line), where
+        if not where.startswith(("str of find", "repr of find", "str of report")) and where in tame:
+            assert text.count("\n") == tame[where].count("\n"), where

@@ -32,7 +32,7 @@ from urdfkin.urdf.mjcf import is_mjcf, is_text, name_of
 from urdfkin.urdf.origin import Origin
 from urdfkin.urdf.pinocchio_model import is_model, tree_of_model
 from urdfkin.urdf.reader import read_tree
-from urdfkin.urdf.sources import MOST, Source, Text, as_word, read_source
+from urdfkin.urdf.sources import Source, Text, as_word, read_source
 from urdfkin.urdf.trees import XmlElement, XmlTree, text_of, without_rotation
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.choosing import Verify, checked_choice
@@ -179,17 +179,13 @@ def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
     """What its digest is of.
 
     Raises:
-        InputError: a file that is larger than what is read of any.
-        SourceError: it cannot be read.
+        SourceError: it cannot be read, or is too large.
     """
     if isinstance(source, bytes):
         return source
     if is_text(source):
         return str(source).encode("utf-8", "surrogatepass")
-    data = read_bytes(at_home(source), MOST)
-    if len(data) > MOST:
-        raise InputError("this MJCF is too large", where=name_of(source), found=f"more than {MOST} bytes")
-    return data
+    return read_bytes(at_home(source))
 
 
 def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[How]) -> Robot:

@@ -23,6 +23,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
 from urdfkin.errors.demands import choice, real_number, shown, switch, whole_number, word, words
+from urdfkin.errors.printable import log_line
 from urdfkin.errors.showing import Sheet, Shown
 from urdfkin.export import QUANTITIES as EXPORTED
 from urdfkin.kinematics.bodies.frames import seen_from
@@ -125,7 +126,7 @@ class Robot(Shown):
         return {**self.__dict__, "verifier": copy(self.verifier), **made}
 
     def __repr__(self) -> str:
-        return f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>"
+        return log_line(f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>")
 
     def __dir__(self) -> list[str]:
         # What the package's own parts ask of a robot is not what people complete names for.

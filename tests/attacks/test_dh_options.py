@@ -86,15 +86,19 @@ def xacro(tmp_path: Path) -> Path:
     return file
 
 
+def _nowhere(package: str) -> str:
+    raise LookupError(package)
+
+
 def test_declared_used_and_included_arguments_are_known(xacro: Path) -> None:
-    assert arguments_of(xacro) == {"length", "width", "colour"}
+    assert arguments_of(xacro, _nowhere) == {"length", "width", "colour"}
 
 
 def test_where_an_include_is_computed_nothing_is_known(xacro: Path) -> None:
     xacro.write_text(XACRO.replace("part.xacro", "$(arg width).xacro"))
-    assert arguments_of(xacro) is None
+    assert arguments_of(xacro, _nowhere) is None
     xacro.write_text(XACRO.replace("part.xacro", "missing.xacro"))
-    assert arguments_of(xacro) is None
+    assert arguments_of(xacro, _nowhere) is None
 
 
 @pytest.mark.slow

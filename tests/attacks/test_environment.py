@@ -14,7 +14,7 @@ import urdfkin
 from tests.cli import running
 from urdfkin.errors import SourceError
 from urdfkin.system import files
-from urdfkin.system.files import read_bytes
+from urdfkin.system.files import read_bytes, read_start
 
 ARM = (
     '<robot name="Ärmchen"><link name="a"/><link name="Hand Größe 3 手"/>'
@@ -236,15 +236,15 @@ def test_a_named_pipe_is_read_as_soon_as_somebody_writes_however_slowly(pause: f
     writer = threading.Thread(target=write)
     writer.start()
     try:
-        assert read_bytes(path) == content
+        assert read_bytes(path, pipes=True) == content
     finally:
         writer.join()
 
 
-def test_reading_ends_one_byte_after_what_is_allowed(tmp_path: Path) -> None:
+def test_reading_ends_where_it_is_told_to(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(bytes(5000))
-    assert len(read_bytes(tmp_path / "file", 1000)) == 1001
-    assert len(read_bytes(Path("/dev/zero"), 3_000_000)) == 3_000_001
+    assert len(read_start(tmp_path / "file", 1000)) == 1000
+    assert len(read_start(Path("/dev/zero"), 3_000_000, pipes=True)) == 3_000_000
     assert len(read_bytes(tmp_path / "file", 5000)) == 5000
 
 

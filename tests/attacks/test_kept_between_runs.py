@@ -105,6 +105,23 @@ def test_a_kernel_that_is_whole_but_of_another_time_is_compiled_again(folder: Pa
     assert not was_compiled(fresh())
 
 
+def test_a_kept_file_in_another_folder_of_its_name_is_noticed(tmp_path: Path) -> None:
+    first, second = tmp_path / "library-1" / "machine.code", tmp_path / "library-2" / "machine.code"
+    for place in (first, second):
+        place.parent.mkdir()
+    keep(first, b"of the first")
+    second.write_bytes(first.read_bytes())
+    with pytest.warns(CacheWarning, match="its content is not what was written under this name"):
+        assert kept(second) is None
+    assert kept(first) == b"of the first"
+    first.parent.rename(tmp_path / "moved")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "moved").rename(tmp_path / "elsewhere" / "library-1")
+    assert (
+        kept(tmp_path / "elsewhere" / "library-1" / "machine.code") == b"of the first"
+    )  # the cache as a whole
+
+
 # -- no room ---------------------------------------------------------------------------------------------
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -71,3 +73,89 @@ def test_a_file_on_a_terminal_commands_nobody() -> None:
     )
     assert done.code == 3
     assert "##vso[" not in done.text
+
+
+@pytest.fixture(scope="module")
+def exported() -> str:
+    """A small file of NumPy."""
+    return urdfkin("export", "planar_two_link", "--to", "numpy", "--quantity", "placement").text
+
+
+CHANGES = {
+    "the URDF's digest": (r"URDF sha256 \w{8}", "URDF sha256 00000000"),
+    "the bound's share": (r"[\d.]+% of the bound", "900.00% of the bound"),
+    "the number of configurations": (r"103 configurations", "999 configurations"),
+    "the robot's name": (r"Kinematics of planar_two_link", "Kinematics of another"),
+    "the oracle": (r"Pinocchio \S+,", "Pinocchio 9.9.9,"),
+    "a comment in the code": (r"    # tip", "    # top"),
+    "the seal": (r"Seal sha256 \w{8}", "Seal sha256 00000000"),
+    "no seal": (r"Seal sha256 \w{64}\n", ""),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_file_whose_head_was_changed_is_not_verified(change: str, exported: str, tmp_path: Path) -> None:
+    pattern, by = CHANGES[change]
+    changed = re.sub(pattern, by, exported, count=1)
+    assert changed != exported
+    path = tmp_path / "arm.py"
+    path.write_text(changed, "utf-8")
+    done = urdfkin("export", "--check", str(path))
+    assert done.code == 3
+    assert "good placement: 4 test vectors" in done.text
+    assert "UNVERIFIED: the file " in done.err
+    assert "export it again" in done.err
+
+
+@pytest.mark.slow
+def test_a_file_with_other_line_ends_is_still_as_it_was_written(exported: str, tmp_path: Path) -> None:
+    path = tmp_path / "arm.py"
+    path.write_bytes(exported.replace("\n", "\r\n").encode())
+    assert urdfkin("export", "--check", str(path)).code == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("beside", ["numpy.py", "math.py", "numpy/__init__.py", "sitecustomize.py"])
+def test_a_check_runs_nothing_that_lies_beside_the_file(beside: str, exported: str, tmp_path: Path) -> None:
+    mark, planted = tmp_path / "mark", tmp_path / "arm" / beside
+    planted.parent.mkdir(parents=True)
+    planted.write_text(f"open({str(mark)!r}, 'w').close()")
+    (tmp_path / "arm" / "arm.py").write_text(exported, "utf-8")
+    done = urdfkin("export", "--check", str(tmp_path / "arm" / "arm.py"))
+    assert done.code == 0, done.err
+    assert not mark.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_a_check_includes_nothing_that_lies_beside_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "arm.c"
+    path.write_text(
+        urdfkin("export", "planar_two_link", "--to", "c", "--quantity", "placement").text, "utf-8"
+    )
+    (tmp_path / "math.h").write_text("#error run by urdfkin")
+    assert urdfkin("export", "--check", str(path)).code == 0
+    path.write_text('#include "own.h"\n' + path.read_text("utf-8"), "utf-8")
+    (tmp_path / "own.h").write_text("")
+    assert urdfkin("export", "--check", str(path)).code == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["x'); system('touch mark'); y=('.m", "2 x.m", "disp.m"])
+def test_octave_is_told_the_functions_name_and_never_the_files(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program stands in for Octave, and writes down how it was called."""
+    octave, path = tmp_path / "bin" / "octave-cli", tmp_path / name
+    octave.parent.mkdir()
+    octave.write_text(
+        f'#!/bin/sh\nprintf "%s\\n" "$@" > "{tmp_path}/said"; ls > "{tmp_path}/there"; echo good x'
+    )
+    octave.chmod(0o700)
+    monkeypatch.setenv("PATH", f"{octave.parent}:{os.environ['PATH']}")
+    text = urdfkin("export", "planar_two_link", "--to", "matlab", "--quantity", "placement").text
+    path.write_text(text, "utf-8")
+    assert urdfkin("export", "--check", str(path)).code == 0
+    assert (tmp_path / "said").read_text().splitlines()[-1] == "planar_two_link_tip_kinematics().check();"
+    assert (tmp_path / "there").read_text() == "planar_two_link_tip_kinematics.m\n"

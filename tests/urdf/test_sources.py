@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from urdfkin.errors import SourceError
-from urdfkin.system.files import read_standard_input
-from urdfkin.urdf.sources import MOST, read_source
+from urdfkin.system.files import MOST, read_standard_input
+from urdfkin.urdf.sources import read_source
 
 MOST_HERE = 1000
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import pickle
+import re
+import shutil
 import signal
+import stat
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from functools import cache
@@ -18,11 +23,13 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
+import yaml
 from distributed import Client, LocalCluster
 from distributed.comm.core import CommClosedError
 
 from tests.validation.test_store import numbers
 from urdfkin.errors import InputError
+from urdfkin.system.interpreter import own_python
 from urdfkin.validation import cluster
 from urdfkin.validation.campaign import stored, validate
 from urdfkin.validation.cluster import Cluster, ClusterError, connected
@@ -50,8 +57,154 @@ def two() -> Iterator[Cluster]:
     """Two workers, for all tests here."""
     said: list[str] = []
     with connected("local:2", said.append) as found:
-        assert "2 workers; dashboard: http://127.0.0.1:" in said[0]
+        assert said == ["2 workers"]
         yield found
+
+
+@pytest.fixture(scope="module")
+def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    """Two of Dask's worker processes, which can be killed."""
+    folder = str(tmp_path_factory.mktemp("dask"))
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", local_directory=folder
+        ) as there,
+    ):
+        # Dask's own workers import the main module again, which would run these tests where it has no guard.
+        patch.delattr(sys.modules["__main__"], "__file__", raising=False)
+        with connected(there.scheduler_address) as found:
+            yield found
+
+
+def test_workers_of_a_local_cluster_open_no_port_that_anybody_could_reach(two: Cluster) -> None:
+    validate("planar_two_link", samples=SAMPLES, executor=two)
+    mine = psutil.Process()
+    for process in (mine, *mine.children(recursive=True)):
+        listening = [c.laddr for c in process.net_connections() if c.status == psutil.CONN_LISTEN]
+        assert listening == []
+    assert all(address.startswith("inproc://") for address in two._client.nthreads())
+
+
+def test_a_version_of_dask_that_opens_a_port_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(cluster._Portless, "start_http_server")
+    with pytest.raises(ClusterError, match="this version of Dask opens a port"), connected("local:1"):
+        pass
+
+
+def test_nothing_of_a_local_cluster_lies_where_another_user_could_have_put_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Dask puts its scratch folder first on the path; another user may have made it, with modules in it."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    planted = tmp_path / "dask-scratch-space"
+    planted.mkdir()
+    mark = tmp_path / "mark"
+    for name in ("json.py", "numpy.py", "pinocchio.py"):
+        (planted / name).write_text(f"open({str(mark)!r}, 'w').close()")
+    before, seen = list(sys.path), dict[str, int]()
+    with connected("local:1") as there:
+        assert sys.path == before
+        for folder in there._client.run(lambda dask_worker: dask_worker.local_directory).values():
+            above = [place for place in Path(folder).parents if tmp_path in place.parents]
+            assert above
+            assert planted not in (Path(folder), *above)
+            seen |= {str(place): stat.S_IMODE(place.stat().st_mode) for place in above}
+        assert seen[min(seen, key=len)] == 0o700
+        assert validate("planar_two_link", samples=SAMPLES, executor=there).passed
+    assert not mark.exists()
+    assert [place.name for place in tmp_path.iterdir()] == ["dask-scratch-space"]
+
+
+def test_a_process_of_ours_takes_no_module_from_dasks_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a worker on a real cluster has it, where Dask has put it on the path before urdfkin is there."""
+    for folder in ("dask-scratch-space", "dask-scratch-space-1000/worker-x"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "planted.py").write_text("")
+        monkeypatch.syspath_prepend(str(tmp_path / folder))
+        done = subprocess.run(own_python("import planted"), capture_output=True, text=True, check=False)
+        assert "No module named 'planted'" in done.stderr
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl")
+def test_a_cluster_with_the_settings_of_the_page_serves_who_has_its_key_and_nobody_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import dask  # noqa: PLC0415
+
+    page = (Path(__file__).parents[2] / "docs" / "campaigns.md").read_text("utf-8")
+    make = re.search(r"^openssl req .*$", page, re.MULTILINE)
+    settings = re.search(r"^```yaml\n(distributed:.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert make is not None
+    assert settings is not None
+    stranger = tmp_path / "stranger"
+    stranger.mkdir()
+    for folder in (tmp_path, stranger):
+        subprocess.run(make[0].split(), cwd=folder, check=True, capture_output=True)
+    config = tmp_path / "dask.yaml"
+    text = settings[1]
+    config.write_text(text.replace("/home/me/dask", str(tmp_path)))
+
+    def key_of(folder: Path) -> dict[str, Any]:
+        """Dask's settings with the key in a folder."""
+        mine = yaml.safe_load(text.replace("/home/me/dask", str(folder)))
+        merged: dict[str, Any] = dask.config.merge(dask.config.config, mine)
+        return merged
+
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+        "DASK_CONFIG": str(config),
+    }
+    place, started = tmp_path / "scheduler.json", list[subprocess.Popen[bytes]]()
+
+    def start(role: str, *words: str) -> None:
+        command = [
+            sys.executable,
+            "-m",
+            f"distributed.cli.dask_{role}",
+            "--scheduler-file",
+            str(place),
+            *words,
+        ]
+        out = (tmp_path / f"{role}.txt").open("wb")
+        started.append(subprocess.Popen(command, env=environment, stdout=out, stderr=out))
+
+    try:
+        start("scheduler", "--port", "0", "--host", "127.0.0.1", "--no-dashboard")
+        words = (
+            "--host",
+            "127.0.0.1",
+            "--nthreads",
+            "1",
+            "--no-dashboard",
+            "--local-directory",
+            str(tmp_path),
+        )
+        start("worker", "--no-nanny", *words)
+        while not place.exists():
+            time.sleep(0.1)
+        address = json.loads(place.read_text())["address"]
+        assert address.startswith("tls://127.0.0.1:")
+        with dask.config.set({"distributed.comm.timeouts.connect": "2s"}):
+            for other in (address, address.replace("tls", "tcp")):
+                with pytest.raises(ClusterError, match="no scheduler answers"), connected(other):
+                    pass
+            with (
+                dask.config.set(key_of(stranger)),
+                pytest.raises(ClusterError, match="no scheduler answers"),
+                connected(address),
+            ):
+                pass
+        with dask.config.set(key_of(tmp_path)), connected(address) as there:
+            there._client.wait_for_workers(1, timeout=60)
+            assert validate("planar_two_link", samples=SAMPLES, executor=there).passed
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
 
 
 def test_a_cluster_changes_no_number_and_sends_each_robot_once(
@@ -128,7 +281,7 @@ def _deadly(deaths: str, module: str) -> None:
 
 
 @pytest.mark.parametrize("seed", range(SEEDS))
-def test_workers_killed_at_random_times_cost_time_and_nothing_else(two: Cluster, seed: int) -> None:
+def test_workers_killed_at_random_times_cost_time_and_nothing_else(processes: Cluster, seed: int) -> None:
     """Dask starts another; `test_workers` has twenty seeds of the processes that compute."""
     rng, killed = np.random.default_rng(seed), list[int]()
     times = rng.choice(np.arange(1, 12), 2, replace=False)
@@ -141,7 +294,7 @@ def test_workers_killed_at_random_times_cost_time_and_nothing_else(two: Cluster,
             killed.append(int(rng.choice(workers)))
             os.kill(killed[-1], signal.SIGKILL)
 
-    assert numbers(validate(KILLED, samples=400, executor=two, progress=kill)) == _serial()
+    assert numbers(validate(KILLED, samples=400, executor=processes, progress=kill)) == _serial()
     assert len(set(killed)) == 2
 
 
@@ -151,11 +304,11 @@ def _serial() -> str:
 
 
 def _workers() -> list[int]:
-    """Dask's: each the child of its nanny, beside a process that keeps the books of multiprocessing."""
+    """Dask's, beside a process that keeps the books of multiprocessing."""
     found = []
-    for nanny in psutil.Process().children():
+    for process in psutil.Process().children():
         with contextlib.suppress(psutil.Error):
-            found += [p.pid for p in nanny.children() if "spawn_main" in " ".join(p.cmdline())]
+            found += [process.pid] if "spawn_main" in " ".join(process.cmdline()) else []
     return found
 
 
@@ -173,7 +326,13 @@ def test_workers_may_come_and_go(monkeypatch: pytest.MonkeyPatch) -> None:
                 scaled.maximum = 1
             time.sleep(0.2)  # Dask looks once a second
 
-        with connected(there.scheduler_address, lambda said: counts.append(int(said[0]))) as engine:
+        def tell(said: str) -> None:
+            if "workers; dashboard: http://127.0.0.1:" in said:
+                counts.append(int(said[0]))
+            else:
+                assert said.startswith("tcp:// asks for no key")
+
+        with connected(there.scheduler_address, tell) as engine:
             found = numbers(validate(KILLED, samples=400, executor=engine, progress=count))
     assert found == _serial()
     assert counts[0] == 0

@@ -23,8 +23,8 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Heading of the help page -> command name -> (module that holds `command`, one-line summary). The rows of the
-#: table of quantities come first under `_COMPUTE`.
+#: Heading of the help page -> command name -> (module that holds `command`, one-line summary). The rows of
+#: the table of quantities come first under `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {

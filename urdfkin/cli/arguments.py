@@ -17,7 +17,7 @@ from urdfkin.cli.numbers import Whole
 from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.numerals import whole
 from urdfkin.errors.questions import Question
-from urdfkin.system.files import read_standard_input, read_text
+from urdfkin.system.files import MOST_DATA, read_standard_input, read_text
 
 if TYPE_CHECKING:
     from urdfkin.model.base_motion import BaseMotion
@@ -271,7 +271,7 @@ def read_batch(path: Path, option: str, layouts: Sequence[Sequence[str]]) -> tup
 
     from urdfkin.motion.columns import read_columns, width_of  # noqa: PLC0415
 
-    text = _standard_input() if str(path) == "-" else read_text(path)
+    text = _standard_input() if str(path) == "-" else read_text(path, MOST_DATA, pipes=True)
     width = width_of(text, str(path)) if len(layouts) > 1 else None
     names = next((names for names in layouts if len(names) == width), layouts[0])
     columns = read_columns(text, str(path), option, names)
@@ -285,6 +285,6 @@ def read_batch(path: Path, option: str, layouts: Sequence[Sequence[str]]) -> tup
 
 def _standard_input() -> str:
     try:
-        return read_standard_input().decode("utf-8-sig")
+        return read_standard_input(MOST_DATA).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SourceError("cannot be read", where="-", found=f"no UTF-8 text ({error})") from None

@@ -26,7 +26,7 @@ from urdfkin.lint.mending import mend
 from urdfkin.lint.pages import RULES
 from urdfkin.lint.runner import Examined, examine, file_of
 from urdfkin.lint.settings import INCLUDE, Settings, codes, find_settings, read_settings
-from urdfkin.system.files import write_file
+from urdfkin.system.files import demand_regular, write_file
 from urdfkin.system.git import Version, version_before
 from urdfkin.urdf.sources import Text, is_xacro, read_source
 from urdfkin.urdf.xacro import XacroError
@@ -216,6 +216,8 @@ class Run:
             if file not in self._taken:
                 self._taken.add(file)
                 try:
+                    if file not in (word, f"./{word}"):  # found in a folder, not named
+                        demand_regular(Path(file))
                     self._check(file)
                 except (SourceError, UnknownNameError, XacroError) as error:
                     self.outcome.unreadable.append(error)

@@ -13,14 +13,10 @@ from typing import Any, TextIO
 
 import click
 
-from urdfkin.errors.printable import escape, printable
+from urdfkin.errors.printable import COMMAND_ANYWHERE, COMMANDS, escape, printable
 
 #: What rich writes to a terminal: colours, and moves of the cursor for a bar.
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: What a CI service would take for a command: GitHub at a line's beginning, Azure and TeamCity anywhere. The
-#: group is what is written as an escape; JSON and TOML read it back as it was.
-_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
-_COMMANDS = (re.compile(r"\A\s*:(:)"), _ANYWHERE)
 #: How much of a line is remembered for what is written to it next.
 _KEPT = 64
 
@@ -50,7 +46,7 @@ class Door:
 
     def write_commands(self, text: str) -> None:
         """What is meant as commands for a CI service."""
-        self._hand_on(_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
+        self._hand_on(COMMAND_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
 
     def write_file(self, text: str) -> None:
         """A file's text: the same bytes whatever letters the stream knows."""
@@ -76,7 +72,7 @@ class Door:
     def _tamed_line(self, piece: str) -> str:
         before = len(self._line)
         whole = self._line + piece
-        at = [m.start(1) for command in _COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
+        at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
         # Where the line is long, what was blank from its beginning must still be so.
         self._line = whole if len(whole) <= _KEPT else ("x" if whole.strip() else "") + whole[-16:]
         return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece

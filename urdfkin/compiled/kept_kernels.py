@@ -15,6 +15,7 @@ from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+from urdfkin.system.files import read_bytes
 from urdfkin.system.sealed import damaged, keep, kept
 
 _Null: Any = NullCache  # numba has no types
@@ -32,7 +33,7 @@ class KeptKernel(_Null):  # type: ignore[misc]
 
     def __init__(self, function: Callable[..., int], folder: Path, missed: Callable[[], None]) -> None:
         self._folder, self._name, self._missed = folder, function_name(function), missed
-        self._source = Path(function.__code__.co_filename).read_bytes()
+        self._source = read_bytes(Path(function.__code__.co_filename))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was kept for these arguments; None where there is nothing of use."""

@@ -51,7 +51,7 @@ def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | Screws:
 
 def read_mapping(path: str | os.PathLike[str]) -> Mapping[str, Any]:
     """The plain data of a table's file, its numbers as they are written; errors as for `read_table`."""
-    return mapping_from_text(read_text(Path(path)), Path(path).suffix.lower(), where=str(path))
+    return mapping_from_text(read_text(Path(path), pipes=True), Path(path).suffix.lower(), where=str(path))
 
 
 def table_from_text(text: str, suffix: str, where: str = "table") -> DHTable:

@@ -23,6 +23,7 @@ from urdfkin.dh.row import Convention, DHRow, convention_of
 from urdfkin.dh.statement import SnapStatement
 from urdfkin.dh.units import Units, units_of
 from urdfkin.errors import InputError
+from urdfkin.errors.printable import log_line
 from urdfkin.errors.showing import Shown
 from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.coupling import Coupling, coupling_of
@@ -80,10 +81,10 @@ class DHTable(Shown):
 
     def __repr__(self) -> str:
         ends = f"{self.base_frame} to {self.tip_frame}"
-        return f"<DHTable {self.robot}: {ends}, {len(self.rows)} rows, {self.convention}>"
+        return log_line(f"<DHTable {self.robot}: {ends}, {len(self.rows)} rows, {self.convention}>")
 
     def __str__(self) -> str:
-        return self._written("terminal", units_of())
+        return "\n".join(map(log_line, self._written("terminal", units_of()).split("\n")))
 
     def to_markdown(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
         """The table in Markdown, for a README or an issue.

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Self, TypeVar
 
 from urdfkin.errors.nearest import nearest
-from urdfkin.errors.printable import printable
+from urdfkin.errors.printable import log_line
 from urdfkin.errors.questions import Question
 
 _E = TypeVar("_E", bound="UrdfkinError")
@@ -53,7 +53,7 @@ class UrdfkinError(Exception):
         apart = " " if remedy.endswith("?") else "; "
         question = f"{apart}{self.question}" if self.question else ""
         # Names and files are in it: none of them may add a line or act on a terminal.
-        return printable(f"{place}{self.what}{found}{remedy}{question}")
+        return log_line(f"{place}{self.what}{found}{remedy}{question}")
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
         # Errors cross process borders in `validate --jobs`; the default would lose the keyword fields.

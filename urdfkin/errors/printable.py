@@ -15,6 +15,10 @@ from typing import Any
 
 #: What a spreadsheet takes for the beginning of a formula.
 FORMULA = ("=", "+", "-", "@")
+#: What a CI service would take for a command: Azure and TeamCity anywhere, GitHub at a line's beginning. The
+#: group, which ends it, is written as an escape; JSON and TOML read it back as it was.
+COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
+COMMANDS = (re.compile(r"\A\s*:(:)"), COMMAND_ANYWHERE)
 #: Joins letters without being seen: what is split by it is no address, mention or number of an issue.
 _JOINER = "&#8288;"
 
@@ -29,6 +33,19 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def log_line(text: str) -> str:
+    r"""One line for a terminal or a CI service's log: as `printable`, and no command for the service.
+
+    Example:
+        >>> print(log_line("::error::a\n##vso[b]"))
+        :\u003aerror::a\n##vso\u005bb]
+    """
+    line = printable(text)
+    for command in COMMANDS:
+        line = command.sub(lambda found: found[0][:-1] + escape(found[1]), line)
+    return line
 
 
 def markdown_text(words: str) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from urdfkin.errors.printable import latex_text, markdown_text, printable
+from urdfkin.errors.printable import latex_text, log_line, markdown_text, printable
 
 #: What a tree is drawn with before its parts, and in ASCII.
 LINES = "├│└ "
@@ -52,7 +52,7 @@ class Table:
 
     def text(self) -> str:
         """Columns side by side."""
-        body = [[printable(cell) for cell in row] for row in (self.heads, *self._cells())]
+        body = [[log_line(cell) for cell in row] for row in (self.heads, *self._cells())]
         widths = [max(map(len, column)) for column in zip(*body, strict=True)]
         lines = [
             "  ".join(
@@ -119,7 +119,7 @@ class Sheet:
 
     def text(self) -> str:
         """Lines for a terminal."""
-        return self._joined("\n", printable, printable, Table.text)
+        return self._joined("\n", log_line, log_line, Table.text)
 
     def markdown(self) -> str:
         """Markdown."""

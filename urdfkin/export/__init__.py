@@ -6,6 +6,7 @@ import importlib
 from typing import TYPE_CHECKING, cast
 
 from urdfkin.errors import UnknownNameError
+from urdfkin.export.seal import seal
 
 if TYPE_CHECKING:
     from urdfkin.export.code import Code
@@ -34,4 +35,4 @@ def write(code: Code, to: str) -> str:
     """
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)
-    return cast("str", importlib.import_module(LANGUAGES[to][0]).write(code, to))
+    return seal(cast("str", importlib.import_module(LANGUAGES[to][0]).write(code, to)))

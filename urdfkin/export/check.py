@@ -1,6 +1,7 @@
 """Run what a file brings with it: compile or import it, and have it compute its test vectors.
 
-The file is run as code, as its user would run it: from someone else's hands it deserves the same care.
+The file is run as code, as its user would run it: from someone else's hands it deserves the same care. A copy
+runs, in a folder of its own, so that nothing beside the file runs with it.
 """
 
 from __future__ import annotations
@@ -8,18 +9,20 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from urdfkin.errors import InputError
+from urdfkin.export.seal import is_sealed
 from urdfkin.system.files import read_text
+from urdfkin.system.interpreter import own_python
 
 #: What every file says in its first lines.
 _MARK = "straight-line code for this robot and frame"
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
+_FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
 _STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
 #: Of a file's first lines.
 _HEAD = 2000
@@ -34,12 +37,17 @@ class Checked:
     Attributes:
         lines: One for each function and precision.
         good: Whether all of them compute what they should.
-        verified: Whether Pinocchio confirmed what was printed.
+        doubts: Why its head does not vouch for it, in words; empty where it does.
     """
 
     lines: tuple[str, ...]
     good: bool
-    verified: bool
+    doubts: tuple[str, ...]
+
+    @property
+    def verified(self) -> bool:
+        """Whether Pinocchio confirmed what was printed, and the file is as it was written."""
+        return not self.doubts
 
 
 def check(file: Path) -> Checked:
@@ -62,10 +70,22 @@ def check(file: Path) -> Checked:
                 found=file.suffix or "no ending",
                 remedy=f"check a file that ends in {', '.join(runs)}",
             )
-        lines = tuple(line for words in run(file, text, Path(folder)) for line in words)
+        lines = tuple(
+            line for words in run(file, text, Path(folder)) for line in words
+        )  # a copy, alone there
     if not lines:
         raise InputError("a file without test vectors", where=str(file))
-    return Checked(lines, all(line.startswith("good ") for line in lines), "UNVERIFIED" not in head)
+    return Checked(lines, all(line.startswith("good ") for line in lines), tuple(_doubts(text)))
+
+
+def _doubts(text: str) -> Iterator[str]:
+    if "UNVERIFIED" in text[:_HEAD]:
+        yield "nobody held these expressions against Pinocchio when they were written"
+    sealed = is_sealed(text)
+    if sealed is None:
+        yield "the file has no seal, so that its head may belong to other numbers; export it again"
+    elif not sealed:
+        yield "the file was changed after it was written, its head or its numbers; export it again"
 
 
 def _compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
@@ -75,28 +95,37 @@ def _compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
         raise InputError("a file without test vectors", where=str(file))
     plain = file.suffix == ".c"
     compiler = _program("cc" if plain else "c++", file)
+    copy = _copied(text, folder / f"checked{file.suffix}")
     language = ["-std=c99", "-x", "c"] if plain else ["-std=c++11", "-x", "c++"]
     for real in ("double", "float"):
         macros = [f"-D{found[1]}_MAIN", f"-D{found[1]}_REAL={real}"]
         built = folder / real
         _run(
-            [compiler, *language, "-O1", *_STRICT, *macros, str(file.resolve()), "-o", str(built), "-lm"],
+            [compiler, *language, "-O1", *_STRICT, *macros, str(copy), "-o", str(built), "-lm"],
             file,
         )
         yield [f"{line} ({real})" for line in _run([str(built)], file)]
 
 
 def _imported(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
-    yield _run([sys.executable, str(file.resolve())], file, cwd=folder)
+    copy = _copied(text, folder / "checked.py")
+    code = f"import runpy; runpy.run_path({str(copy)!r}, run_name='__main__')"
+    yield _run(own_python(code), file, cwd=folder)
 
 
 def _octave(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
-    shutil.copy(file, folder / file.name)
-    yield _run(
-        [_program("octave-cli", file), "--no-init-file", "--eval", f"{file.stem}().check();"],
-        file,
-        cwd=folder,
-    )
+    found = _FUNCTION.search(text)
+    if found is None:
+        raise InputError("a file without test vectors", where=str(file))
+    _copied(text, folder / f"{found[1]}.m")
+    octave = [_program("octave-cli", file), "--no-init-file", "--no-site-file"]
+    yield _run([*octave, "--eval", f"{found[1]}().check();"], file, cwd=folder)
+
+
+def _copied(text: str, place: Path) -> Path:
+    """The text that was read, in a folder of its own: neither its name nor what lies beside it is run."""
+    place.write_text(text, encoding="utf-8")
+    return place
 
 
 def _program(name: str, file: Path) -> str:

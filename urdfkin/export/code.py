@@ -14,6 +14,7 @@ from urdfkin.export.expression import Node, Number
 from urdfkin.export.function import Function, function_of
 from urdfkin.export.naming import all_safe, shown, title
 from urdfkin.export.proof import Proof, prove
+from urdfkin.export.seal import SEAL
 from urdfkin.model.configuration import coordinate_names, rate_names
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import KinematicTree
@@ -82,7 +83,7 @@ class Code:
         lines += [
             f"Kinematics of {self.robot}, frame {self.frame}: straight-line code for this robot and frame."
         ]
-        lines += ["", *([verdict] if not lines[0].startswith("UNVERIFIED") else []), *rest, ""]
+        lines += ["", *([verdict] if not lines[0].startswith("UNVERIFIED") else []), *rest, SEAL, ""]
         lines += [
             "Metres, radians, seconds. Results are row by row; six-vectors and Jacobian rows are [linear;"
         ]

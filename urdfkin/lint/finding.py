@@ -12,7 +12,7 @@ from enum import Enum
 from typing import Any
 
 from urdfkin.errors import UrdfkinError
-from urdfkin.errors.printable import printable
+from urdfkin.errors.printable import log_line, printable
 from urdfkin.errors.showing import Sheet, Shown, Table
 from urdfkin.lint.escape import shortened
 from urdfkin.lint.fixes import Fix
@@ -113,7 +113,7 @@ class Finding:
 
     def __str__(self) -> str:
         place = f"{printable(self.file)}:{self.line}:{self.column}"
-        return f"{place}: {self.code} {self.severity.value}: {self.sentence}"
+        return log_line(f"{place}: {self.code} {self.severity.value}: {self.sentence}")
 
     def as_dict(self) -> dict[str, Any]:
         """The finding as a report's JSON has it: the words of the enums, lists for tuples, no `fix`."""

@@ -89,16 +89,16 @@ def read_settings(file: Path) -> Settings:
         SourceError: it cannot be read.
         InputError: it has no such table, or a setting in it is wrong.
     """
-    if (found := _table(file)) is None:
+    if (found := _table(file, pipes=True)) is None:
         raise InputError(
             "no table [tool.urdfkin]", where=str(file), remedy="write one, or leave out --config"
         )
     return _checked(file, found)
 
 
-def _table(file: Path) -> Any:
+def _table(file: Path, *, pipes: bool = False) -> Any:
     try:
-        return tomllib.loads(read_text(file)).get("tool", {}).get("urdfkin")
+        return tomllib.loads(read_text(file, pipes=pipes)).get("tool", {}).get("urdfkin")
     except (tomllib.TOMLDecodeError, AttributeError, RecursionError) as error:
         raise InputError("not TOML", where=str(file), found=str(error)) from None
 

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from urdfkin.errors import InputError
+from urdfkin.errors.printable import log_line
 from urdfkin.errors.showing import Sheet, Shown, Table
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.model.coupling import Coupling, coupling_of
@@ -75,7 +76,7 @@ class FrameChain(Shown):
     folded: tuple[int, ...]
 
     def __repr__(self) -> str:
-        return f"<FrameChain {self.robot}: {self.base} to {self.tip}, {len(self.joints)} joints>"
+        return log_line(f"<FrameChain {self.robot}: {self.base} to {self.tip}, {len(self.joints)} joints>")
 
     def _sheet(self) -> Sheet:
         heads = ("joint", "kind", "lower", "upper", "x", "y", "z", "axis x", "axis y", "axis z")

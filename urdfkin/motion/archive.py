@@ -12,7 +12,7 @@ import numpy as np
 
 from urdfkin.errors import InputError, SourceError
 from urdfkin.kinematics.inputs import FloatArray, scalars
-from urdfkin.system.files import read_bytes
+from urdfkin.system.files import MOST_DATA, read_bytes
 
 #: An array's shape after its first axis, which counts samples.
 Shapes = Mapping[str, tuple[int, ...]]
@@ -31,12 +31,24 @@ def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str
         InputError: an array that is unknown, missing, of another shape, or not of finite numbers.
     """
     try:
-        with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
+        with np.load(io.BytesIO(read_bytes(path, MOST_DATA, pipes=True)), allow_pickle=False) as archive:
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise ValueError("a single array")
             _check_names(path, archive.files, shapes, required)
+            entries = archive.zip.infolist() if archive.zip else []
+            size = sum(entry.file_size for entry in entries)
+            if size > MOST_DATA:
+                raise ValueError(f"arrays of {size} bytes, more than {MOST_DATA}")
             given = {name: archive[name] for name in archive.files}
-    except (ValueError, EOFError, OSError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
+    except (
+        ValueError,
+        EOFError,
+        OSError,
+        zipfile.BadZipFile,
+        zlib.error,
+        NotImplementedError,
+        MemoryError,
+    ) as error:
         raise SourceError(
             "no .npz file of numbers", where=str(path), found=str(error), remedy="write it with numpy.savez"
         ) from error

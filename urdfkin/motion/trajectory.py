@@ -25,7 +25,7 @@ from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
 from urdfkin.motion.archive import read_arrays
 from urdfkin.motion.columns import read_columns
 from urdfkin.motion.unwrapping import unwrapped
-from urdfkin.system.files import read_text
+from urdfkin.system.files import MOST_DATA, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -150,7 +150,7 @@ def _table(robot: Robot, path: Path) -> dict[str, FloatArray]:
     """What a CSV file has of t, q, v and a."""
     columns = {x: [f"{x}:{name}" for name in robot.rate_names] for x in "va"}
     optional = ["t", *columns["v"], *columns["a"]]
-    text = read_text(path)
+    text = read_text(path, MOST_DATA, pipes=True)
     data = read_columns(text, str(path), "a trajectory", robot.coordinate_names, optional, named=True)
     found = {"q": _columns(path, data, robot.coordinate_names)}
     if "t" in data:

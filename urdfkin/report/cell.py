@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING, Any, cast
 
+from urdfkin.errors.printable import log_line
 from urdfkin.report.document import Model, asset
 from urdfkin.report.html import as_is, environment
 from urdfkin.report.model_consistency import moving_names
@@ -30,7 +31,7 @@ class Cell:
         self._description, self._q = describe(robot), q.tolist()
 
     def __repr__(self) -> str:
-        return f"<a view of {self._name}: the last line of a notebook's cell shows it>"
+        return log_line(f"<a view of {self._name}: the last line of a notebook's cell shows it>")
 
     def page(self) -> str:
         """The page."""

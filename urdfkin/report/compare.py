@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from urdfkin.errors.printable import log_line
 from urdfkin.report.document import Check, Document, Robot, Units, outcome_of
 from urdfkin.report.model_changes import model_changes
 from urdfkin.report.tip_motion import tip_motion
@@ -46,7 +47,7 @@ class Change:
 
     def __str__(self) -> str:
         where = f"{self.robot}: " if self.robot else ""
-        return f"{where}{self.what}: {self.old or 'nothing'} -> {self.new or 'nothing'}"
+        return log_line(f"{where}{self.what}: {self.old or 'nothing'} -> {self.new or 'nothing'}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import cast
 from urdfkin.errors import InputError
 from urdfkin.report.consistency import contradictions
 from urdfkin.report.document import Document, schema
-from urdfkin.system.files import read_bytes
+from urdfkin.system.files import MOST_DATA, read_bytes
 from urdfkin.validation.results import SCHEMA
 
 #: How many contradictions of a report are told.
@@ -33,7 +33,9 @@ def read_document(path: Path) -> Document:
 def read_json(path: Path) -> object:
     """What a file of JSON says; raises SourceError, or InputError where it is none."""
     try:
-        return json.loads(read_bytes(path), parse_constant=_number, parse_float=_number)
+        return json.loads(
+            read_bytes(path, MOST_DATA, pipes=True), parse_constant=_number, parse_float=_number
+        )
     except (ValueError, RecursionError) as error:
         raise InputError("not a JSON file", where=str(path), found=str(error)) from error
 

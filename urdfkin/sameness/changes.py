@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.errors.numerals import decimal
+from urdfkin.errors.printable import log_line
 from urdfkin.loading import load
 from urdfkin.model.tree import Joint, KinematicTree
 from urdfkin.robot import Robot
@@ -53,8 +54,8 @@ class Change:
 
     def __str__(self) -> str:
         if not self.what:
-            return f"{self.element}: {'new' if self.old is None else 'gone'}"
-        return f"{self.element}: {self.what} {word(self.old)} -> {word(self.new)}"
+            return log_line(f"{self.element}: {'new' if self.old is None else 'gone'}")
+        return log_line(f"{self.element}: {self.what} {word(self.old)} -> {word(self.new)}")
 
 
 def word(value: Value | None) -> str:
@@ -84,7 +85,7 @@ class Effect:
         return motion_words(self.interval, "moves", "turns")
 
     def __str__(self) -> str:
-        return f"alone {self.words}"
+        return log_line(f"alone {self.words}")
 
 
 @dataclass(frozen=True, slots=True)

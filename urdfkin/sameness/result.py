@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError
+from urdfkin.errors.printable import log_line
 from urdfkin.model.configuration import checked, neutral
 from urdfkin.model.mechanisms.conversion import Conversion
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -162,7 +163,7 @@ class Sameness:
     def __repr__(self) -> str:
         after = self.verdict is Verdict.SAME_AFTER
         how = f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
-        return f"<Sameness {self.names[0]}, {self.names[1]}: {how}>"
+        return log_line(f"<Sameness {self.names[0]}, {self.names[1]}: {how}>")
 
     @property
     def worst(self) -> Interval | None:

@@ -1,7 +1,8 @@
-"""The one door for files that users name: read whole, or refused in one clear line.
+"""The one reader of files: whole, up to a limit, regular files only, or refused in one clear line.
 
-A pipe is a file here too, since `urdfkin check <(xacro arm.xacro)` names one; but a named pipe that nobody
-writes to is given up after a while, where Python's own `open` would wait for ever.
+A folder of a stranger may hold a link to a device that never ends, or a named pipe that nobody writes to.
+A path that the caller named may be a pipe, since `urdfkin check <(xacro arm.xacro)` names one; it is given up
+after a while, where Python's own `open` would wait for ever.
 """
 
 from __future__ import annotations
@@ -19,29 +20,50 @@ from urdfkin.errors import SourceError
 
 #: How long to wait for somebody to open the other end of a named pipe, seconds.
 PATIENCE = 10.0
+#: Bytes that a file may hold: a robot, a table, a setting, what is kept between runs.
+MOST = 100_000_000
+#: Bytes of recorded or computed data: trajectories, samples, reports.
+MOST_DATA = 2_000_000_000
 _AT_A_TIME = 2**20
+_KINDS = {
+    stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a character device",
+    stat.S_IFBLK: "a block device",
+}  # fmt: skip
 
 
-def read_bytes(path: Path, most: int | None = None) -> bytes:
-    """What a file holds.
+def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
+    """The content of a file.
 
     Args:
-        path: A file, a device, or a pipe.
-        most: Bytes after which reading ends, with one more, so that a caller sees that there are too many.
+        path: A regular file, or a link to one.
+        most: Bytes that it may hold.
+        pipes: Whether pipes and devices are read too: for paths that the caller named.
 
     Raises:
-        SourceError: it cannot be read; the message says why.
+        SourceError: it cannot be read, is of another kind, or is larger; the message says which.
     """
+    data = read_start(path, most + 1, pipes=pipes)
+    if len(data) > most:
+        raise _too_large(shortened(path), most)
+    return data
+
+
+def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
+    """The first bytes of a file, at most so many; arguments and errors as `read_bytes`."""
     try:
         # Without O_NONBLOCK, opening a pipe waits for its writer.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-        with open(descriptor, "rb", buffering=0) as file:  # noqa: PTH123  a descriptor has no path
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
+        try:
             kind = os.fstat(descriptor).st_mode
             if stat.S_ISDIR(kind):
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            if not pipes:
+                _demand_regular(path, kind)
             first = _first_of_pipe(descriptor, path) if stat.S_ISFIFO(kind) else b""
             os.set_blocking(descriptor, True)
-            return _all_of(file.fileno(), most, first)
+            return _up_to(count, descriptor, first)
+        finally:
+            os.close(descriptor)
     except SourceError:
         raise
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
@@ -49,16 +71,61 @@ def read_bytes(path: Path, most: int | None = None) -> bytes:
         raise SourceError("cannot be read", where=shortened(path), found=reason) from error
 
 
-def read_text(path: Path) -> str:
-    """What a file holds, as UTF-8 with or without a byte order mark; errors as `read_bytes`."""
+def demand_regular(path: Path) -> None:
+    """Refuse a pipe, a socket or a device; what is not there is for whoever reads it.
+
+    Raises:
+        SourceError: it is one.
+    """
     try:
-        return read_bytes(path).decode("utf-8-sig")
+        kind = path.stat().st_mode
+    except (OSError, ValueError):
+        return
+    _demand_regular(path, kind)
+
+
+def _demand_regular(path: Path, kind: int) -> None:
+    if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
+        raise SourceError(
+            "not a regular file",
+            where=shortened(path),
+            found=_KINDS.get(stat.S_IFMT(kind), "another kind"),
+            remedy="put a regular file in its place",
+        )
+
+
+def read_if_there(path: Path, most: int = MOST) -> bytes | None:
+    """The content of a file, None where there is none; other errors as `read_bytes`."""
+    try:
+        return read_bytes(path, most)
+    except SourceError as error:
+        if isinstance(error.__cause__, FileNotFoundError):
+            return None
+        raise
+
+
+def read_text(path: Path, most: int = MOST, *, pipes: bool = False) -> str:
+    """The content of a file as UTF-8 with or without a byte order mark; errors as `read_bytes`."""
+    try:
+        return read_bytes(path, most, pipes=pipes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SourceError("cannot be read", where=str(path), found=f"no UTF-8 text ({error})") from None
 
 
-def read_standard_input(most: int | None = None) -> bytes:
-    """What standard input holds.
+def read_standard_input(most: int = MOST) -> bytes:
+    """The content of standard input.
+
+    Raises:
+        SourceError: it is closed, cannot be read, or is larger.
+    """
+    data = read_start_of_standard_input(most + 1)
+    if len(data) > most:
+        raise _too_large("standard input", most)
+    return data
+
+
+def read_start_of_standard_input(count: int) -> bytes:
+    """The first bytes of standard input, at most so many.
 
     Raises:
         SourceError: it is closed, or cannot be read.
@@ -66,7 +133,7 @@ def read_standard_input(most: int | None = None) -> bytes:
     try:
         if sys.stdin is None:  # closed by whoever started the process
             raise OSError(errno.EBADF, os.strerror(errno.EBADF))
-        data: bytes = sys.stdin.buffer.read(-1 if most is None else most + 1)
+        data: bytes = sys.stdin.buffer.read(count)
     except OSError as error:
         raise SourceError("cannot be read", where="standard input", found=error.strerror) from error
     return data
@@ -106,11 +173,20 @@ def shortened(path: Path) -> str:
     return text if len(text) <= 300 else f"{text[:60]}...{text[-60:]} ({len(text)} characters)"
 
 
-def _all_of(descriptor: int, most: int | None, first: bytes) -> bytes:
-    pieces, left = [first], (_AT_A_TIME if most is None else most + 1 - len(first))
+def _too_large(where: str, most: int) -> SourceError:
+    return SourceError(
+        "too large",
+        where=where,
+        found=f"more than {most} bytes",
+        remedy="split it, or leave out what is not needed",
+    )
+
+
+def _up_to(count: int, descriptor: int, first: bytes) -> bytes:
+    pieces, left = [first[:count]], count - len(first)
     while left > 0 and (piece := os.read(descriptor, min(left, _AT_A_TIME))):
         pieces.append(piece)
-        left -= len(piece) if most is not None else 0
+        left -= len(piece)
     return b"".join(pieces)
 
 

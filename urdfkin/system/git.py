@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from urdfkin.errors import SourceError
-from urdfkin.system.files import read_bytes
+from urdfkin.system.files import MOST, read_bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +55,18 @@ class Version:
         """What a file held; None where it was not there.
 
         Raises:
-            SourceError: git cannot tell.
+            SourceError: git cannot tell, or it was larger than a file may be.
         """
-        digest = self.files.get(self.name(path))
-        return None if digest is None else _git("cat-file", "blob", digest, cwd=self.root)
+        if (digest := self.files.get(self.name(path))) is None:
+            return None
+        if int(size := _text("cat-file", "-s", digest, cwd=self.root)) > MOST:
+            raise SourceError(
+                "too large in the older version",
+                where=str(path),
+                found=f"{size} bytes, more than {MOST}",
+                remedy="leave out --changed-since",
+            )
+        return _git("cat-file", "blob", digest, cwd=self.root)
 
 
 def version_before(reference: str, folder: Path) -> Version:

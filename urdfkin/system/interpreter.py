@@ -34,7 +34,12 @@ def _path() -> list[str]:
     # An empty or relative entry stands for the current folder or one below it; urdfkin itself may have
     # been found through it.
     home = str(Path(__file__).resolve().parents[2])
-    return [*(entry for entry in sys.path if Path(entry).is_absolute()), home]
+    return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_scratch(entry)), home]
+
+
+def _is_scratch(entry: str) -> bool:
+    """Whether Dask has put it on the path: it lies in the common temporary folder, where others write."""
+    return any(part.startswith("dask-scratch-space") for part in Path(entry).parts)
 
 
 def ask_python(command: list[str], request: bytes, patience: float, most: int) -> tuple[bytes, int | None]:

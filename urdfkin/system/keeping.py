@@ -20,6 +20,10 @@ from pathlib import Path
 
 import platformdirs
 
+from urdfkin.system.files import read_bytes
+
+#: How files in a folder are sealed: what was sealed otherwise lies in other folders.
+_SEAL = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
 _USED = ".used"
 #: Whose folders may lie above one's own: the superuser's, and those of nobody, as which a container sees the
@@ -40,9 +44,9 @@ def kept_folder(kind: str, sources: Iterable[Path], *besides: str, root: Path | 
         besides: Other things on which it depends.
         root: Where; None for the user's cache.
     """
-    digest = hashlib.sha256("\n".join(besides).encode())
+    digest = hashlib.sha256("\n".join([_SEAL, *besides]).encode())
     for source in sources:
-        digest.update(source.read_bytes())
+        digest.update(read_bytes(source))
     root = root or Path(platformdirs.user_cache_dir("urdfkin"))
     try:
         root.mkdir(mode=0o700, parents=True, exist_ok=True)

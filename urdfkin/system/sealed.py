@@ -1,15 +1,20 @@
-"""Files that are kept between runs, each with a digest: what was damaged is noticed, and made anew.
+"""Files that are kept between runs, each with a digest: damaged or renamed ones are noticed, and made anew.
 
-Half a file, or one with a flipped bit, might not be read, kill the process, or compute something else.
+Half a file, or one with a flipped bit, might not be read, kill the process, or compute something else. The
+digest is of the file's name too, and of its folder's, which say what the content was made from: a file in
+another one's place would be another robot's.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import tempfile
 from pathlib import Path
 
+from urdfkin.errors import SourceError
+from urdfkin.system.files import MOST_DATA, read_if_there
 from urdfkin.system.keeping import say_once
 
 _DIGEST = hashlib.sha256().digest_size
@@ -21,7 +26,7 @@ def keep(place: Path, data: bytes) -> None:
     try:
         with tempfile.NamedTemporaryFile(dir=place.parent, prefix=f".{place.name}.", delete=False) as file:
             name = file.name
-            file.write(hashlib.sha256(data).digest() + data)
+            file.write(_seal(place, data) + data)
         Path(name).replace(place)
     except OSError as error:
         if name:
@@ -33,17 +38,24 @@ def keep(place: Path, data: bytes) -> None:
 def kept(place: Path) -> bytes | None:
     """What a sealed file holds; None where there is none, or where it is damaged, which is said."""
     try:
-        content = place.read_bytes()
-    except FileNotFoundError:
+        content = read_if_there(place, MOST_DATA)
+    except SourceError as error:
+        damaged(place, error.found or error.what)
         return None
-    except OSError as error:
-        damaged(place, error.strerror or str(error))
+    if content is None:
         return None
     seal, data = content[:_DIGEST], content[_DIGEST:]
-    if hashlib.sha256(data).digest() != seal:
-        damaged(place, "its content is not what was written")
+    if _seal(place, data) != seal:
+        damaged(place, "its content is not what was written under this name")
         return None
     return data
+
+
+def _seal(place: Path, data: bytes) -> bytes:
+    digest = hashlib.sha256()
+    for part in (os.fsencode(place.parent.name), os.fsencode(place.name), data):
+        digest.update(len(part).to_bytes(8, "big") + part)
+    return digest.digest()
 
 
 def damaged(place: Path, reason: str) -> None:

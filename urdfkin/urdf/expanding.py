@@ -17,6 +17,7 @@ from typing import Any
 from urdfkin.urdf.confinement import MEMORY, Ground, confine, limit
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.packages import find_package
+from urdfkin.urdf.xacro_arguments import arguments_of
 
 #: What xacro lets expressions call although it gives them more than values.
 _NEVER = ("type", "vars")
@@ -35,7 +36,7 @@ def serve() -> None:
     os.chdir(Path(request["path"]).parent)  # what the file includes without a package is relative to it
     ground = Ground(**request["ground"])
     try:
-        answer = {"urdf": _expand(Path(request["path"]), request["arguments"], request["search"], ground)}
+        answer = _expand(Path(request["path"]), request["arguments"], request["search"], ground)
     except MemoryError:
         answer = {"error": _TOO_MUCH}
     except (Exception, SystemExit) as error:
@@ -45,15 +46,19 @@ def serve() -> None:
     os._exit(0)  # what an interpreter does at its end may not be allowed any more
 
 
-def _expand(path: Path, arguments: dict[str, str], search: Mapping[str, str], ground: Ground) -> str:
+def _expand(
+    path: Path, arguments: dict[str, str], search: Mapping[str, str], ground: Ground
+) -> dict[str, Any]:
+    """The URDF, and which arguments the file takes: None where that is not known, or nobody asks."""
     import xacrodoc  # noqa: PLC0415  the border: nobody else needs it
 
     _tame(path, search, ground)
     importlib.import_module("xml.dom.expatbuilder")  # which minidom imports when it first reads a file
     confine(ground.holds)
     document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, walk_up=False, resolve_packages=False)
-    urdf: str = document.to_urdf_string()
-    return urdf
+    urdf = document.to_urdf_string()
+    takes = arguments_of(path, _finder(path, search, ground)) if arguments else None
+    return {"urdf": urdf, "takes": None if takes is None else sorted(takes)}
 
 
 def _tame(path: Path, search: Mapping[str, str], ground: Ground) -> None:

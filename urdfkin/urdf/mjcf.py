@@ -27,7 +27,7 @@ from urdfkin.kinematics.rotation.axis_angle import rotation_about
 from urdfkin.kinematics.rotation.quaternion import rotation_of
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree
-from urdfkin.system.files import at_home
+from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 
 #: A sliding joint that the file does not bound: a URDF must say something. A kilometre either way.
@@ -233,8 +233,7 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
     if not isinstance(source, str | os.PathLike) or Path(source).suffix.lower() not in _ENDINGS:
         return False
     try:
-        with at_home(source).open("rb") as file:
-            head = file.read(_HEAD)
+        head = read_start(at_home(source), _HEAD)
     except OSError:
         return False  # whoever reads it says so
     return _ROOT.match(head.decode("utf-8-sig", "replace")) is not None

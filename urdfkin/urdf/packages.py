@@ -16,7 +16,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from urdfkin.system.files import is_folder
+from urdfkin.system.files import is_folder, read_start
 
 #: The environment's search paths.
 VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
@@ -78,7 +78,7 @@ def _candidates(name: str, beside: Path | None, environ: Mapping[str, str]) -> I
 def _declares(manifest: Path, name: str) -> bool:
     """Whether a package's manifest gives it this name."""
     try:
-        match = _NAME.search(manifest.read_bytes()[:100_000])
+        match = _NAME.search(read_start(manifest, 100_000))
     except OSError:
         return False
     return match is not None and match[1].decode("utf-8", "replace").strip() == name

@@ -12,15 +12,12 @@ from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.errors.demands import shown
 from urdfkin.errors.nearest import nearest
 from urdfkin.errors.questions import Question
-from urdfkin.system.files import at_home, exists, read_bytes, read_standard_input
+from urdfkin.system.files import MOST, at_home, exists, read_start, read_start_of_standard_input
 from urdfkin.urdf.catalogue import Entry, catalogue
 from urdfkin.urdf.packages import find_package, split_uri
 
 #: What `load` and `check` take.
 Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
-
-#: Bytes that are read unless a caller allows more; the checks refuse more than this too.
-MOST = 100_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,12 +96,9 @@ def is_xacro(source: object) -> TypeGuard[str | os.PathLike[str]]:
 
 def _expanded(path: Path, arguments: Mapping[str, object]) -> Text:
     from urdfkin.urdf.xacro import expand  # noqa: PLC0415  only for those who pass xacro
-    from urdfkin.urdf.xacro_arguments import check_arguments  # noqa: PLC0415
 
     words = {name: str(value) for name, value in arguments.items()}
-    data = expand(path, words)
-    check_arguments(path, words)
-    return Text(data, f"{path} (expanded)", as_word(path), xacro_args=tuple(words.items()))
+    return Text(expand(path, words), f"{path} (expanded)", as_word(path), xacro_args=tuple(words.items()))
 
 
 def _read_word(word: str, most: int) -> Text:
@@ -113,7 +107,7 @@ def _read_word(word: str, most: int) -> Text:
             "no robot is named", found=repr(word), remedy="a path, a name that 'urdfkin robots' lists, or '-'"
         )
     if word == "-":
-        return Text(read_standard_input(most), "<stdin>", "-")
+        return Text(read_start_of_standard_input(most + 1), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):
         return _encoded(word, "<text>", "<text>")
     if (entry := catalogue().get(word)) is not None:
@@ -146,7 +140,7 @@ def _encoded(content: str | bytes, label: str, source: str) -> Text:
 
 def _read_file(path: Path, most: int) -> Text:
     try:
-        return Text(read_bytes(path, most), str(path), as_word(path))
+        return Text(read_start(path, most + 1, pipes=True), str(path), as_word(path))
     except SourceError as error:
         if isinstance(error.__cause__, FileNotFoundError):
             raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None

@@ -21,6 +21,7 @@ from urdfkin.errors.questions import Question
 from urdfkin.system.interpreter import ask_python, own_python
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.packages import VARIABLES
+from urdfkin.urdf.xacro_arguments import check_arguments
 
 #: Seconds after which an expansion is given up: a macro may call itself.
 PATIENCE = 60.0
@@ -43,6 +44,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
 
     Raises:
         SourceError: there is no such file.
+        UnknownNameError: an argument that the file does not take.
         XacroError: xacrodoc is not installed, xacro cannot expand the file, or the file asks for what it may
             not have: other files, programs, too much memory or time.
     """
@@ -63,6 +65,8 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         raise XacroError("xacro makes too long a URDF", where=str(path), found=f"more than {MOST} bytes")
     answer = _answer(output)
     if "urdf" in answer:
+        takes = answer.get("takes")
+        check_arguments(path, arguments, [str(name) for name in takes] if isinstance(takes, list) else None)
         return str(answer["urdf"]).encode()
     reason = answer.get("error") or f"its process ended with status {status}"
     raise XacroError(

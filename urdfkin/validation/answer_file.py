@@ -23,7 +23,7 @@ from urdfkin.validation.three_sides import Pair, ThreeSides
 _MAGIC = b"urdfkin-chunk/1\n"
 _DIGEST = hashlib.sha256().digest_size
 #: What a file may become when it is unpacked: more is nobody's answer.
-_MOST = 2**30
+_MOST = 2**27
 
 
 class DamagedError(Exception):

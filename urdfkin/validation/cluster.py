@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import pickle
-import subprocess
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -15,10 +15,10 @@ from importlib import metadata
 from itertools import chain
 from typing import Any
 
-from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
+import dask
+from distributed import Client, Future, KilledWorker, Scheduler, SpecCluster, Worker, as_completed
 
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.system.interpreter import own_python
 from urdfkin.urdf.origin import Origin
 from urdfkin.validation import remote
 from urdfkin.validation.answer import Answer, Failure, failure
@@ -32,8 +32,6 @@ _FOR_EACH, _MORE = 2, 4
 _TRIES = 20
 #: Seconds between two counts of the workers.
 _COUNT = 1.0
-#: Seconds that workers of our own may take to start, and to end.
-_START, _END = 120.0, 10.0
 #: What the scheduler must have as we do, if it has it.
 _COMPARED = ("urdfkin", "pin")
 _NOBODY = Subject(b"", Origin(""))
@@ -48,9 +46,9 @@ def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> I
     """An engine on a cluster, for `validate(executor=...)`.
 
     Args:
-        scheduler: The address of a running scheduler, `tcp://host:8786`; or `local:N`, for N workers here
-            that end with it.
-        tell: Told where to watch it.
+        scheduler: The address of a running scheduler, `tls://host:8786`; or `local:N`, for N workers here
+            that end with it and open no port.
+        tell: Told how many workers there are, and where to watch those of a running scheduler.
 
     Raises:
         ClusterError: nobody answers there, or the versions of urdfkin or Pinocchio differ.
@@ -59,7 +57,12 @@ def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> I
     with _client(scheduler) as client:
         _demand_same(client)
         threads = client.nthreads()
-        tell(f"{len(threads)} workers; dashboard: {client.dashboard_link}")
+        watched = f"; dashboard: {client.dashboard_link}" if client.dashboard_link else ""
+        tell(f"{len(threads)} workers{watched}")
+        if scheduler.startswith("tcp://"):
+            tell(
+                "tcp:// asks for no key: who reaches the scheduler runs programs; docs/campaigns.md leads to tls://"
+            )
         yield Cluster(client)
 
 
@@ -69,59 +72,72 @@ def _client(scheduler: str) -> Iterator[Client]:
     if kind != "local":
         try:
             client = Client(scheduler, set_as_default=False)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, TypeError) as error:  # TypeError: tls:// without a certificate
+            keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md says"
             raise ClusterError(
-                "no scheduler answers", where=scheduler, found=str(error), remedy="start one: dask scheduler"
+                "no scheduler answers",
+                where=scheduler,
+                found=str(error),
+                remedy="start one: dask scheduler" + (keyed if kind == "tls" else ""),
             ) from error
         with client:
             yield client
         return
     if not number.isdecimal() or not int(number):
         raise InputError("local:N starts N workers", found=repr(scheduler), remedy="local:2")
-    with (
-        LocalCluster(
-            n_workers=0, processes=True, dashboard_address="127.0.0.1:0", silence_logs=logging.ERROR
-        ) as cluster,
-        _workers(cluster.scheduler_address, int(number)),
-        Client(cluster, set_as_default=False) as client,
-    ):
-        try:
-            client.wait_for_workers(int(number), timeout=_START)
-        except TimeoutError as error:
-            raise ClusterError("the workers did not start", where=scheduler, found=str(error)) from error
+    with _without_ports(int(number)) as cluster, Client(cluster, set_as_default=False) as client:
         yield client
 
 
-@contextmanager
-def _workers(address: str, number: int) -> Iterator[None]:
-    """Workers that run nothing from the current folder or the main module, and end with their scheduler.
+class _Portless:
+    """A part of a cluster that serves no pages: they would be open to all users of the machine."""
 
-    Dask would start them by multiprocessing, which imports the main module again: scripts would need a guard.
+    def start_http_server(self, *_: object, **__: object) -> None:
+        """Dask's, left out."""
+
+
+class _Scheduler(_Portless, Scheduler):
+    pass
+
+
+class _Worker(_Portless, Worker):
+    pass
+
+
+@contextmanager
+def _without_ports(number: int) -> Iterator[SpecCluster]:
+    """A scheduler and workers in this process, out of others' reach: chunks have processes of their own.
+
+    Dask puts its scratch folders first on the path. They lie in one of this run and this user alone, and the
+    path is what it was before anything is imported by it.
+
+    Raises:
+        ClusterError: Dask listens all the same.
     """
-    command = own_python("from distributed.cli.dask_worker import main; main()")
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
-        options = ["--nthreads", "1", "--no-dashboard", "--local-directory", scratch]
-        processes = [
-            subprocess.Popen(
-                [*command, address, *options],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                process_group=0,  # an interrupt by the terminal is for the client, which keeps what is there
-            )
-            for _ in range(number)
-        ]
-        try:
-            yield
-        finally:
-            for process in processes:
-                process.terminate()
-            for process in processes:
-                try:
-                    process.wait(_END)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait()
+        here: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
+        mine = {"nthreads": 1, "memory_limit": 0, "local_directory": scratch, "dashboard": False}
+        path = list(sys.path)
+        with (
+            dask.config.set({"temporary-directory": scratch}),
+            SpecCluster(
+                scheduler={"cls": _Scheduler, "options": here},
+                workers={place: {"cls": _Worker, "options": mine} for place in range(number)},
+                silence_logs=logging.ERROR,
+            ) as cluster,
+        ):
+            sys.path[:] = path
+            for server in (cluster.scheduler, *cluster.workers.values()):
+                if server.services or not str(server.address).startswith("inproc://"):
+                    raise ClusterError(
+                        "this version of Dask opens a port for local workers",
+                        found=str(server.address),
+                        remedy="use --jobs, or another version of distributed",
+                    )
+            try:
+                yield cluster
+            finally:
+                remote.end_idle()
 
 
 def _demand_same(client: Client) -> None:

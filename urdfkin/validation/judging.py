@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from urdfkin.errors import InputError
+from urdfkin.system.files import read_if_there
 from urdfkin.validation.answer_file import DamagedError, packed, unpacked
 from urdfkin.validation.judgement import Errors, Judgement, Line
 from urdfkin.validation.manifest import LAYOUT
@@ -79,10 +80,10 @@ class Judged:
     def of(cls, store: Store) -> Judged | None:
         """Those that were asked for last; None: the judge was not asked."""
         try:
-            data = json.loads((store.folder / JUDGE).read_bytes())
+            if (content := read_if_there(store.folder / JUDGE)) is None:
+                return None
+            data = json.loads(content)
             asked = Asked(int(data["samples"]), int(data["seed"]), bool(data["moving_base"]))
-        except FileNotFoundError:
-            return None
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             store.tell(
                 f"{store.folder / JUDGE} says nothing ({type(error).__name__}): judgements are left out"

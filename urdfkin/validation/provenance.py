@@ -6,6 +6,7 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
+from urdfkin.system.files import read_bytes
 from urdfkin.system.versions import installed_version
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -18,7 +19,7 @@ LIBRARIES = ("urdfkin", "pin", "numpy", "numba", "llvmlite", "yourdfpy", "mujoco
 @cache
 def provenance() -> dict[str, str]:
     """Versions, and digests of urdfkin's own files: of all that compute, and of the equations."""
-    equations = hashlib.sha256((_PACKAGE / "kinematics" / "equations.py").read_bytes()).hexdigest()
+    equations = hashlib.sha256(read_bytes(_PACKAGE / "kinematics" / "equations.py")).hexdigest()
     return {name: version(name) for name in LIBRARIES} | {"code": _code(), "equations": equations}
 
 
@@ -32,6 +33,6 @@ def _code() -> str:
     for path in sorted(_PACKAGE.rglob("*")):
         place = path.relative_to(_PACKAGE)
         if path.suffix in (".py", ".toml", ".json") and place.parts[0] not in _SHOWING:
-            content = path.read_bytes()
+            content = read_bytes(path)
             digest.update(f"{place.as_posix()}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()

@@ -59,6 +59,13 @@ def run(robot: bytes, chunk: bytes, by: dict[str, str]) -> Found:
     return "died", cause
 
 
+def end_idle() -> None:
+    """End the processes that wait for chunks."""
+    with _lock:
+        while _idle:
+            _idle.pop().end()
+
+
 class _DiedError(Exception):
     """The process that had a chunk; the message says how."""
 

@@ -12,11 +12,13 @@ is reported, put aside and computed again; so is one under a name that no chunk 
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import json
 import os
 import shutil
 import socket
+import stat
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -24,7 +26,7 @@ from pathlib import Path
 from typing import IO, TypeVar
 
 from urdfkin.errors import InputError, SourceError
-from urdfkin.system.files import read_bytes
+from urdfkin.system.files import read_bytes, read_if_there
 from urdfkin.validation.answer import Answer, Failure
 from urdfkin.validation.answer_file import DamagedError, read, written
 from urdfkin.validation.manifest import Manifest
@@ -81,11 +83,11 @@ class Store:
         """What lies under a key; what cannot be read as that is put aside."""
         place = self._place(key, kind)
         try:
-            return read(key, place.read_bytes())
-        except FileNotFoundError:
-            return None
+            content = read_if_there(place)
+            return None if content is None else read(key, content)
         except (DamagedError, OSError) as error:
-            self._put_aside(place, f"is computed again: {getattr(error, 'strerror', None) or error}")
+            why = f"{error.what}: {error.found}" if isinstance(error, SourceError) else str(error)
+            self._put_aside(place, f"is computed again: {why}")
             return None
 
     def keep(self, robot: int, index: int, found: Answer) -> None:
@@ -165,7 +167,7 @@ class Store:
     def at_work(self) -> str | None:
         """Who is at work on it; None: nobody."""
         try:
-            with (self.folder / _LOCK).open("rb") as file:
+            with _lock_file(self.folder / _LOCK, os.O_RDONLY) as file:
                 return None if _try_lock(file, fcntl.LOCK_SH) else _holder(file)
         except OSError:
             return None
@@ -242,6 +244,12 @@ def opened(
                 remedy="name a folder that is empty or not there yet",
             )
         with _locked(folder, shard):
+            if (folder / _WRITING).is_symlink():
+                raise SourceError(
+                    "a link in place of the store's folder",
+                    where=str(folder / _WRITING),
+                    remedy="delete the link",
+                )
             scratch = folder / _WRITING / (shard or "all").replace("/", "-of-")
             shutil.rmtree(scratch, ignore_errors=True)  # what a killed one had begun
             scratch.mkdir(parents=True)
@@ -300,16 +308,36 @@ def _only_failed_ones_differ(store: Store, manifest: Manifest) -> bool:
 def _locked(folder: Path, shard: str | None) -> Iterator[None]:
     """One at a time on the whole, or one on each part."""
     with contextlib.ExitStack() as stack:
-        whole = stack.enter_context((folder / _LOCK).open("a+b"))
+        whole = stack.enter_context(_lock_file(folder / _LOCK))
         _lock(whole, fcntl.LOCK_SH if shard else fcntl.LOCK_EX, folder)
         if shard:
-            part = stack.enter_context((folder / f"{_LOCK}-{shard.replace('/', '-of-')}").open("a+b"))
+            part = stack.enter_context(_lock_file(folder / f"{_LOCK}-{shard.replace('/', '-of-')}"))
             _lock(part, fcntl.LOCK_EX, folder)
             whole = part
         whole.truncate(0)
         whole.write(json.dumps({"host": socket.gethostname(), "process": os.getpid()}).encode())
         whole.flush()
         yield
+
+
+def _lock_file(place: Path, how: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
+    """A lock's file, which is never another file: a link, a pipe or a device in its place is refused."""
+    try:
+        descriptor = os.open(place, how | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise _no_lock(place, "a link") from error
+        raise
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise _no_lock(place, "another kind of file")
+    return os.fdopen(descriptor, "rb" if how == os.O_RDONLY else "a+b")
+
+
+def _no_lock(place: Path, found: str) -> SourceError:
+    return SourceError(
+        "the store's lock is no file of its own", where=str(place), found=found, remedy="delete it"
+    )
 
 
 def _lock(file: IO[bytes], how: int, folder: Path) -> None:
@@ -336,7 +364,7 @@ def _try_lock(file: IO[bytes], how: int) -> bool:
 def _holder(file: IO[bytes]) -> str:
     try:
         file.seek(0)
-        data = json.loads(file.read())
+        data = json.loads(file.read(1000))
         return f"process {int(data['process'])} on {data['host']}"
     except (OSError, ValueError, KeyError, TypeError):
         return "a process that has not said which"

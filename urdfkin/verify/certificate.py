@@ -11,7 +11,7 @@ import numpy as np
 
 from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import UrdfkinError
-from urdfkin.errors.printable import json_text
+from urdfkin.errors.printable import json_text, log_line
 from urdfkin.errors.showing import Sheet, Shown, Table
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.files import at_home, write_file
@@ -224,7 +224,8 @@ class Certificate(Shown):
             for line in self.lines
         ]
         rows += [f"  read: {self.reading}"] if self.reading else []
-        return "\n".join(rows + [f"  not verified: {reason}" for reason in self.not_verified])
+        rows += [f"  not verified: {reason}" for reason in self.not_verified]
+        return "\n".join(map(log_line, rows))
 
 
 @dataclass(slots=True)

@@ -2,30 +2,44 @@
 
 from __future__ import annotations
 
+import io
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from urdfkin.system.files import read_bytes
 from urdfkin.view.shapes import GREY, Shape
 
-#: More faces than this make a browser slow; such a mesh is shown all the same.
-_LARGEST_FILE = 200_000_000
+#: Bytes of a mesh, a material or a texture; what is larger is not shown.
+LARGEST_FILE = 200_000_000
 
 
 @lru_cache(maxsize=256)
 def _read(file: Path) -> Any:
     import trimesh  # noqa: PLC0415  half a second
 
-    return trimesh.load(file, force="scene", process=False)
+    class Beside(trimesh.resolvers.FilePathResolver):
+        """Materials and textures: regular files in the mesh's folder or below it."""
+
+        def get(self, name: str) -> bytes:
+            folder = Path(self.parent).resolve()
+            for path in (folder / name.strip().lstrip("/"), folder / Path(name).name):
+                if path.resolve().is_relative_to(folder) and path.is_file():
+                    return read_bytes(path, LARGEST_FILE)
+            raise FileNotFoundError(name)
+
+    data = io.BytesIO(read_bytes(file, LARGEST_FILE))
+    kind = file.suffix.lower().removeprefix(".")
+    return trimesh.load(data, file_type=kind, resolver=Beside(str(file)), force="scene", process=False)
 
 
 def mesh(shape: Shape) -> Any | None:
     """A trimesh.Trimesh in the link's axes, coloured as the URDF or the file says; None if unreadable."""
     import trimesh  # noqa: PLC0415
 
-    if shape.file is None or shape.file.stat().st_size > _LARGEST_FILE:
+    if shape.file is None:
         return None
     try:
         whole = _read(shape.file).to_mesh().copy()

@@ -18,7 +18,7 @@ from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.model.tree import FloatArray
 from urdfkin.motion.archive import read_arrays
 from urdfkin.motion.columns import read_columns
-from urdfkin.system.files import read_text
+from urdfkin.system.files import MOST_DATA, read_text
 
 #: By how much written digits may leave a matrix, or a quaternion's length, off what it should be.
 _WRITTEN = 1e-3
@@ -59,7 +59,7 @@ def read_poses(
 def _table(
     path: Path, coordinates: tuple[str, ...], needed: tuple[str, ...]
 ) -> tuple[FloatArray, FloatArray]:
-    text, where = read_text(path), str(path)
+    text, where = read_text(path, MOST_DATA, pipes=True), str(path)
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     names = {cell.strip() for cell in first.split(",")}
     kind = _MATRIX if "T00" in names else _POSITION

@@ -55,7 +55,7 @@ def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]
     if order not in ORDERS:
         raise UnknownNameError("order of turns", order, ORDERS)
     try:
-        data = yaml.safe_load(read_text(path))
+        data = yaml.safe_load(read_text(path, pipes=True))
     except (yaml.YAMLError, RecursionError) as error:
         raise InputError("no YAML", where=str(path), found=" ".join(str(error).split())[:100]) from None
     kinematics = data.get("kinematics") if isinstance(data, Mapping) else None

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from urdfkin.errors.printable import log_line
 from urdfkin.kinematics.arrays import chapter as eq
 from urdfkin.kinematics.rotation.euler import coordinate_rotation
 from urdfkin.kinematics.roundings import EPS, ROUNDINGS
@@ -43,7 +44,7 @@ class Parameter:
     end: bool = False
 
     def __str__(self) -> str:
-        return f"{self.where} {self.what}"
+        return log_line(f"{self.where} {self.what}")
 
 
 @dataclass(frozen=True, slots=True)

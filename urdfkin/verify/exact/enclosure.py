@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from urdfkin.compiled.plan import Plan
 from urdfkin.errors import InputError
 from urdfkin.errors.demands import whole_number, word
+from urdfkin.errors.printable import log_line
 from urdfkin.kinematics.inputs import floats
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import checked
@@ -131,7 +132,7 @@ class Enclosures:
     def __str__(self) -> str:
         quantities = [self.placement, self.velocity, self.acceleration, self.jacobian, self.jacobian_rate]
         quantities += [] if self.hessian is None else [self.hessian]
-        head = f"{self.frame} in {self.reference.name.lower()}, proven with {self.digits} digits"
+        head = f"{log_line(self.frame)} in {self.reference.name.lower()}, proven with {self.digits} digits"
         return "\n  ".join((head, *map(str, quantities)))
 
     def __repr__(self) -> str:

@@ -1,0 +1,315 @@
+"""One reader reads every file, up to a limit; pipes and devices only where the caller named them.
+
+The device here is /dev/zero: who reads it to its end runs out of memory.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import os
+import resource
+import time
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as command
+from urdfkin.errors import SourceError
+from urdfkin.motion.archive import read_arrays
+from urdfkin.system import files
+from urdfkin.system.files import MOST, read_bytes, read_if_there, read_start
+from urdfkin.system.git import version_before
+from urdfkin.system.sealed import kept
+from urdfkin.urdf import mjcf, xacro_arguments
+from urdfkin.urdf.packages import find_package
+from urdfkin.validation.campaign import StoreWarning, validate
+from urdfkin.validation.store import Store
+
+PACKAGE = Path(urdfkin.__file__).parent
+
+#: Who opens files besides the reader, and which: no stranger can put another in their place.
+OTHERS = {
+    "cli/streams.py": "/dev/null",
+    "export/c.py": "urdfkin's own frames of code",
+    "export/library.py": "/proc, and what the compiler has just made in a folder of its own",
+    "kinematics/registry/entries.py": "urdfkin's own data",
+    "lint/pages.py": "urdfkin's own pages",
+    "report/document.py": "urdfkin's own pages",
+    "system/files.py": "the reader",
+    "system/interpreter.py": "the current folder, to return to it",
+    "urdf/catalogue.py": "urdfkin's own catalogue",
+    "validation/memory.py": "/proc and /sys",
+    "validation/store.py": "a store's lock, refused unless it is a regular file; files that are written",
+    "view/server.py": "the page of the installed viser",
+}
+_OPENING = {"open", "read_bytes", "read_text", "fdopen"}
+
+
+@pytest.fixture(autouse=True)
+def _bounded() -> Iterator[None]:
+    """Memory has an end before the machine's."""
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + 2 * 2**30, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def _opens(source: str) -> bool:
+    """Whether a module opens files by itself: by a method of a path, or by `open`."""
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.Call):
+            continue
+        if isinstance(node.func, ast.Name) and node.func.id == "open":
+            return True
+        if isinstance(node.func, ast.Attribute) and node.func.attr in _OPENING:
+            of = node.func.value
+            if not (isinstance(of, ast.Name) and of.id == "webbrowser"):
+                return True
+    return False
+
+
+def test_no_module_but_the_reader_opens_files_that_a_stranger_may_have_put_there() -> None:
+    found = {
+        path.relative_to(PACKAGE).as_posix()
+        for path in PACKAGE.rglob("*.py")
+        if _opens(path.read_text("utf-8"))
+    }
+    assert found == set(OTHERS)
+
+
+@pytest.mark.parametrize("kind", ["a device", "a link to a device", "a pipe", "a socket's folder"])
+def test_what_is_no_regular_file_is_refused_at_once(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "x"
+    if kind == "a device":
+        path = Path("/dev/zero")
+    elif kind == "a link to a device":
+        path.symlink_to("/dev/zero")
+    elif kind == "a pipe":
+        os.mkfifo(path)
+    else:
+        path.mkdir()
+    for read in (read_bytes, read_if_there):
+        with pytest.raises(
+            SourceError, match=r"not a regular file: found a (character device|pipe)|directory"
+        ):
+            read(path)
+
+
+def test_a_file_that_is_too_large_is_refused_with_the_limit(tmp_path: Path) -> None:
+    path = tmp_path / "sparse"
+    with path.open("wb") as file:
+        file.truncate(2**40)
+    with pytest.raises(SourceError, match=f"too large: found more than {MOST} bytes"):
+        read_bytes(path)
+    assert read_start(path, 5) == bytes(5)
+    with pytest.raises(SourceError, match="too large: found more than 5000 bytes"):
+        read_bytes(Path("/dev/zero"), 5000, pipes=True)
+
+
+def test_settings_that_are_a_link_to_a_device_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pyproject.toml").symlink_to("/dev/zero")
+    done = command("check", "ur5")
+    assert done.code == 2
+    assert "pyproject.toml: not a regular file: found a character device" in done.err
+
+
+def test_a_packages_manifest_that_is_a_link_to_a_device_is_none(tmp_path: Path) -> None:
+    (tmp_path / "package.xml").symlink_to("/dev/zero")
+    assert find_package("arm", tmp_path / "arm.urdf", {}) is None
+
+
+def test_a_kept_file_that_is_a_link_to_a_device_is_damaged(tmp_path: Path) -> None:
+    (tmp_path / "kernel").symlink_to("/dev/zero")
+    with pytest.warns(UserWarning, match="is damaged and is made anew: a character device"):
+        assert kept(tmp_path / "kernel") is None
+
+
+def test_a_pipe_that_is_called_as_an_mjcf_file_holds_nobody_up(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "arm.xml")
+    assert not mjcf.is_mjcf(tmp_path / "arm.xml")
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "judge.json", "chunk"])
+def test_a_stores_file_that_is_a_link_to_a_device_is_not_read(name: str, tmp_path: Path) -> None:
+    validate("planar_two_link", samples=10, store=tmp_path)
+    (place,) = tmp_path.glob("chunks/*/*.chunk") if name == "chunk" else (tmp_path / name,)
+    place.unlink(missing_ok=True)
+    place.symlink_to("/dev/zero")
+    said: list[str] = []
+    if name == "manifest.json":
+        with pytest.raises(SourceError, match="not a regular file"):
+            Store.reading(tmp_path, said.append)
+        return
+    if name == "chunk":
+        assert Store.reading(tmp_path, said.append).answer(0, 0) is None
+        assert "computed again" in said[0]
+        with pytest.warns(StoreWarning, match="is computed again: not a regular file: a character device"):
+            assert validate("planar_two_link", samples=10, store=tmp_path).passed
+        assert not place.is_symlink()
+        return
+    from urdfkin.validation.judging import Judged  # noqa: PLC0415
+
+    assert Judged.of(Store.reading(tmp_path, said.append)) is None
+    assert "judgements are left out" in said[0]
+
+
+def test_a_stores_lock_that_is_a_link_leaves_what_it_leads_to_as_it_is(tmp_path: Path) -> None:
+    mine, store = tmp_path / "mine", tmp_path / "store"
+    mine.write_text("precious")
+    store.mkdir()
+    (store / "lock").symlink_to(mine)
+    with pytest.raises(SourceError, match="the store's lock is no file of its own: found a link; delete it"):
+        validate("planar_two_link", samples=10, store=store)
+    assert mine.read_text() == "precious"
+
+
+def test_a_stores_folder_for_writing_that_is_a_link_leaves_what_it_leads_to_as_it_is(tmp_path: Path) -> None:
+    mine, store = tmp_path / "mine", tmp_path / "store"
+    (mine / "all").mkdir(parents=True)
+    (mine / "all" / "file").write_text("precious")
+    store.mkdir()
+    (store / ".writing").symlink_to(mine)
+    with pytest.raises(SourceError, match="a link in place of the store's folder"):
+        validate("planar_two_link", samples=10, store=store)
+    assert (mine / "all" / "file").read_text() == "precious"
+
+
+def test_arrays_that_unpack_to_more_than_the_limit_are_refused(tmp_path: Path) -> None:
+    head = io.BytesIO()
+    np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": (2**29, 1)})
+    with (
+        zipfile.ZipFile(tmp_path / "t.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
+        archive.open("q.npy", "w", force_zip64=True) as file,
+    ):
+        file.write(head.getvalue())
+        for _ in range(2100):
+            file.write(bytes(10**6))
+    assert (tmp_path / "t.npz").stat().st_size < 2e7
+    with pytest.raises(
+        SourceError, match=r"no \.npz file of numbers: found arrays of 21000\d+ bytes, more than"
+    ):
+        read_arrays(tmp_path / "t.npz", {"q": (1,)}, ["q"])
+
+
+# -- xacro ----------------------------------------------------------------------------------------------
+
+XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="length" default="1"/>
+<xacro:if value="false"><xacro:include filename="part.xacro"/></xacro:if>
+<link name="$(arg length)"/></robot>"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["a device", "a pipe", "a large file"])
+def test_what_a_xacro_file_includes_is_read_nowhere_but_in_the_confined_process(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its arguments are not known then, and nothing is refused."""
+    arm, part = tmp_path / "arm.xacro", tmp_path / "part.xacro"
+    arm.write_text(XACRO)
+    if kind == "a device":
+        part.symlink_to("/dev/zero")
+    elif kind == "a pipe":
+        os.mkfifo(part)
+    else:
+        part.write_bytes(bytes(xacro_arguments.MOST + 1))
+
+    def refuse(*_: object, **__: object) -> bytes:
+        raise AssertionError("read by the caller's process")
+
+    monkeypatch.setattr(xacro_arguments, "read_bytes", refuse)
+    robot = urdfkin.load(arm, xacro_args={"length": "a", "unknown": "1"}, verify=False)
+    assert robot.link_names == ("a",)
+
+
+@pytest.mark.parametrize("word", ["a", "a=1", ":=1"])
+def test_a_xacro_argument_without_a_name_and_a_value_is_refused(word: str, tmp_path: Path) -> None:
+    (tmp_path / "arm.xacro").write_text(XACRO)
+    done = command("info", str(tmp_path / "arm.xacro"), "--xacro-arg", word)
+    assert done.code == 2
+    assert "NAME:=VALUE" in done.err
+
+
+# -- git ------------------------------------------------------------------------------------------------
+
+
+def test_an_older_version_that_is_too_large_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import subprocess  # noqa: PLC0415
+
+    def git(*words: str) -> None:
+        who = ("-c", "user.name=a", "-c", "user.email=a@b")
+        subprocess.run(["git", *who, *words], cwd=tmp_path, check=True, capture_output=True)
+
+    git("init", "-b", "main")
+    (tmp_path / "arm.urdf").write_text("<robot/>" + " " * 1000)
+    git("add", "arm.urdf")
+    git("commit", "-m", "a")
+    version = version_before("main", tmp_path)
+    assert version.read(tmp_path / "arm.urdf") is not None
+    monkeypatch.setattr("urdfkin.system.git.MOST", 1000)
+    with pytest.raises(SourceError, match=r"arm\.urdf: too large in the older version: found 1008 bytes"):
+        version.read(tmp_path / "arm.urdf")
+
+
+# -- folders and meshes ---------------------------------------------------------------------------------
+
+
+def test_a_pipe_or_a_device_in_a_folder_that_is_checked_is_refused_and_the_others_are_checked(
+    tmp_path: Path,
+) -> None:
+    os.mkfifo(tmp_path / "a.urdf")
+    (tmp_path / "b.urdf").symlink_to("/dev/zero")
+    (tmp_path / "c.urdf").write_text('<robot name="r"><link name="a"/></robot>')
+    begin = time.monotonic()
+    done = command("check", str(tmp_path))
+    assert time.monotonic() - begin < files.PATIENCE
+    assert done.code == 2
+    assert "a.urdf: not a regular file: found a pipe" in done.err
+    assert "b.urdf: not a regular file: found a character device" in done.err
+    assert "no errors" in done.text or "1 file" in done.text
+
+
+OBJ = "mtllib {}\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+@pytest.mark.parametrize("name", ["device.mtl", "pipe.mtl", "../outside.mtl", "leading_out.mtl"])
+def test_what_a_mesh_names_is_read_from_regular_files_of_its_own_folder(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("trimesh")
+    from urdfkin.view import meshes  # noqa: PLC0415
+    from urdfkin.view.shapes import shapes  # noqa: PLC0415
+
+    folder = tmp_path / "mesh"
+    folder.mkdir()
+    (tmp_path / "outside.mtl").write_text("newmtl m\nKd 1 0 0\n")
+    (folder / "device.mtl").symlink_to("/dev/zero")
+    (folder / "leading_out.mtl").symlink_to(tmp_path / "outside.mtl")
+    os.mkfifo(folder / "pipe.mtl")
+    (folder / "a.obj").write_text(OBJ.format(name))
+    (folder / "own.mtl").write_text("newmtl m\nKd 1 0 0\n")
+    (folder / "own.obj").write_text(OBJ.format("own.mtl"))
+    read: list[str] = []
+
+    def told(path: Path, most: int) -> bytes:
+        read.append(path.name)
+        return files.read_bytes(path, most)
+
+    monkeypatch.setattr(meshes, "read_bytes", told)
+    for mesh in ("a.obj", "own.obj"):
+        visual = f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual>'
+        (folder / "r.urdf").write_text(f'<robot name="r"><link name="l">{visual}</link></robot>')
+        (shape,) = shapes(urdfkin.load(folder / "r.urdf", verify=False))
+        assert meshes.mesh(shape) is not None
+    assert read == ["a.obj", "own.obj", "own.mtl"]
