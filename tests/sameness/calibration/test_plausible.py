@@ -25,6 +25,12 @@ ARMS = {
 }
 
 
+SLOW = [
+    name if name in ("ur5", "through the trunk") else pytest.param(name, marks=pytest.mark.slow)
+    for name in ARMS
+]
+
+
 @cache
 def arm(name: str) -> Bench:
     """An arm whose every parameter is off by 2 mm or 2 mrad."""
@@ -63,7 +69,7 @@ def reason(name: str, q: FloatArray, *, complete: bool = True, fit: list[str] | 
 
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize("fit", [ALL, ["origins"]], ids=["anywhere", "origins"])
-@pytest.mark.parametrize("name", list(ARMS))
+@pytest.mark.parametrize("name", SLOW)
 def test_joint_angles_in_degrees_are_named(name: str, fit: list[str], complete: bool) -> None:
     true = arm(name)
     slides = [joint == "two" for joint in true.robot.coordinate_names]
@@ -78,7 +84,7 @@ def test_all_values_multiplied_by_57_are_named_where_one_of_them_slides() -> Non
 
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize("by", [1, -1, 2])
-@pytest.mark.parametrize("name", list(ARMS))
+@pytest.mark.parametrize("name", SLOW)
 def test_rows_of_q_that_are_shifted_are_named(name: str, by: int, complete: bool) -> None:
     said = reason(name, np.roll(arm(name).q, by, axis=0), complete=complete)
     rows = "one row" if abs(by) == 1 else "2 rows"
@@ -106,7 +112,7 @@ def test_the_joint_whose_sign_is_wrong_is_named(name: str, fit: list[str]) -> No
 
 
 #: Joints whose reversed sign the free base or tool does as well, together with another one's zero.
-_ABSORBED: dict[str, tuple[str, ...]] = {}
+_ABSORBED = {"branched": ("three", "four")}
 
 
 def test_two_wrong_signs_are_named() -> None:

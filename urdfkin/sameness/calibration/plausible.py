@@ -20,6 +20,7 @@ from urdfkin.sameness.calibration.ends import starting
 from urdfkin.sameness.calibration.fit import Fit, Measured, Noise, best_fit, errors
 from urdfkin.sameness.calibration.identify import Identification, identify
 from urdfkin.sameness.calibration.models import Model
+from urdfkin.sameness.calibration.way import Parameter
 from urdfkin.sameness.result import angle, length
 
 #: Shares of the reach that a fit leaves (rms): more than the first is refused; the others as said below.
@@ -38,6 +39,8 @@ _OUTSIDE, _OF_RANGE = 0.5, 0.25
 _TILTED, _GAINED = 0.5, 0.5
 #: Joint values (rad, m) that differ by less are one configuration.
 _ONE_CONFIGURATION = 1e-6
+#: Standard deviations that are taken off first: a target near an axis hardly shows how that is tilted.
+_UNCERTAIN = 5.0
 #: Of what the fit leaves: a correction that leaves less is the reason; one for a refused fit.
 _BETTER, _NOT_WORSE = 0.25, 1.5
 #: How many corrections are fitted in full, the most promising first; rows that q may be shifted by.
@@ -152,16 +155,12 @@ def _misfits(model: Model, ended: Ended) -> Iterator[str]:
 
 def _strained(model: Model, ended: Ended) -> Iterator[str]:
     """Parameters that went where no built robot is."""
-    moved, parameters = ended.fitted.at - model.way.start, model.way.parameters
     tilted, gained = dict[str, str](), dict[str, str]()
-    for k in ended.identification.kept:
-        parameter = parameters[k]
-        if parameter.end or parameter.where not in model.coupling.joints:
-            continue
-        if parameter.what in ("rx", "ry", "alpha", "beta") and abs(moved[k]) > _TILTED:
-            tilted.setdefault(parameter.where, f"{parameter.where!r} by {angle(abs(moved[k]))}")
-        if parameter.what == "gain" and abs(moved[k]) > _GAINED:
-            gained[parameter.where] = f"{parameter.where!r} {1.0 + moved[k]:.3g} times"
+    for parameter, moved, surely in _moved(model, ended):
+        if parameter.what in ("rx", "ry", "alpha", "beta") and surely > _TILTED:
+            tilted.setdefault(parameter.where, f"{parameter.where!r} by {angle(abs(moved))}")
+        if parameter.what == "gain" and surely > _GAINED:
+            gained[parameter.where] = f"{parameter.where!r} {1.0 + moved:.3g} times"
     if tilted:
         yield f"the fit tilts the axis of joint {_listed(tilted.values())}"
     if gained:
@@ -169,14 +168,31 @@ def _strained(model: Model, ended: Ended) -> Iterator[str]:
 
 
 def _turned_zeros(model: Model, ended: Ended) -> list[str]:
-    """Joints whose zero moved far, which does what a reversed sign of the joint beside it does."""
-    moved = ended.fitted.at - model.way.start
+    """Joints whose zero is half a turn off, which does what a reversed sign of the joint beside it does.
+
+    Of positions alone this is nothing where the tip is near the joint's axis: its direction is not seen.
+    """
+    reach = _reach(model, ended)
+    _, columns = model.way.columns(ended.measured.values)
+    levers = np.linalg.norm(columns[:, :3], axis=1).max(axis=0, initial=0.0)
+    numbers = {parameter: k for k, parameter in enumerate(model.way.parameters)}
     return [
-        f"{p.where!r} by {angle(abs(moved[k]))}"
-        for k, p in enumerate(model.way.parameters)
-        if p.what in ("rz", "theta") and p.where in model.coupling.joints and not p.end
-        if abs(moved[k]) > _TILTED
+        f"{parameter.where!r} by {angle(abs(moved))}"
+        for parameter, moved, surely in _moved(model, ended)
+        if parameter.what in ("rz", "theta") and surely > _TILTED and abs(abs(moved) - math.pi) < _TILTED
+        if ended.measured.complete or levers[numbers[parameter]] > _MISSED * reach
     ]
+
+
+def _moved(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
+    """Each fitted parameter of a joint that moves, by how much it moved, and by how much surely."""
+    kept, fitted = ended.identification.kept, ended.fitted
+    deviations = np.sqrt(np.diag(fitted.covariance))
+    for k, deviation in zip(kept, deviations.tolist(), strict=True):
+        parameter = model.way.parameters[k]
+        if not parameter.end and parameter.where in model.coupling.joints:
+            moved = float(fitted.at[k] - model.way.start[k])
+            yield parameter, moved, abs(moved) - _UNCERTAIN * deviation
 
 
 def _out_of_range(model: Model, q: FloatArray, *, radians: bool, misfit: bool) -> Iterator[str]:
