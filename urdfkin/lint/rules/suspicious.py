@@ -186,7 +186,7 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_neutral(report: Reporter, joint: JointRecord) -> None:
-    """A joint that cannot be at zero, where `neutral` puts it; what a mimic joint does there is its rule's."""
+    """A joint that cannot be at zero, the neutral configuration; a mimic joint is where its rule puts it."""
     limit = joint.limit
     if limit is None or joint.kind not in ("revolute", "prismatic") or joint.mimic is not None:
         return
