@@ -5,6 +5,8 @@
 
 Mutants of the shipped robots are one family; the others are random whole robots, each odd in its own way:
 names that look like ours, prefixes, versions, followers, lengths, angles, axes, limits, roots, or everything.
+The family "calibrations" is measured poses: good ones are calibrated; joint angles in degrees and shifted
+rows of q are refused.
 
 Each goes through `check` and `load`, and every quantity of it is computed in every reference, on bases near
 and far, and held against Pinocchio, in a worker process that is restarted when it dies or takes too long.
@@ -30,7 +32,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
-from scripts.fuzzing import GOOD, Case, robots
+from scripts.fuzzing import GOOD, Case, calibrations, robots
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
@@ -38,7 +40,7 @@ from urdfkin.urdf.catalogue import catalogue
 READY, FIRST_WAIT = "ready", 300.0
 
 MUTANTS = "mutants"
-FAMILIES = (MUTANTS, *robots.FAMILIES)
+FAMILIES = (MUTANTS, *robots.FAMILIES, calibrations.FAMILY)
 
 
 @cache
@@ -50,6 +52,8 @@ def files() -> list[Path]:
 
 def case(seed: int, family: str, number: int) -> Case:
     """One document of a family."""
+    if family == calibrations.FAMILY:
+        return calibrations.calibration(seed, number)
     return mutant(seed, number, files()) if family == MUTANTS else robots.robot(seed, family, number)
 
 
@@ -126,7 +130,8 @@ def work(seed: int) -> None:
     print(READY, file=answers, flush=True)
     for line in sys.stdin:
         family, number = line.split()
-        outcome = judge(case(seed, family, int(number)))
+        ask = calibrations.judge if family == calibrations.FAMILY else judge
+        outcome = ask(case(seed, family, int(number)))
         print(json.dumps([outcome.word, outcome.details]), file=answers, flush=True)
 
 

@@ -168,29 +168,31 @@ def _strained(model: Model, ended: Ended) -> Iterator[str]:
 
 
 def _turned_zeros(model: Model, ended: Ended) -> list[str]:
-    """Joints whose zero is half a turn off, which does what a reversed sign of the joint beside it does.
-
-    Of positions alone this is nothing where the tip is near the joint's axis: its direction is not seen.
-    """
-    reach = _reach(model, ended)
-    _, columns = model.way.columns(ended.measured.values)
-    levers = np.linalg.norm(columns[:, :3], axis=1).max(axis=0, initial=0.0)
-    numbers = {parameter: k for k, parameter in enumerate(model.way.parameters)}
+    """Joints whose zero is half a turn off, which does what a reversed sign of the joint beside it does."""
     return [
         f"{parameter.where!r} by {angle(abs(moved))}"
         for parameter, moved, surely in _moved(model, ended)
         if parameter.what in ("rz", "theta") and surely > _TILTED and abs(abs(moved) - math.pi) < _TILTED
-        if ended.measured.complete or levers[numbers[parameter]] > _MISSED * reach
     ]
 
 
 def _moved(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
-    """Each fitted parameter of a joint that moves, by how much it moved, and by how much surely."""
+    """Each fitted parameter of a joint that moves, by how much it moved, and by how much surely.
+
+    Of positions alone nothing is sure of a joint whose axis passes near the tip of the model as it is.
+    """
     kept, fitted = ended.identification.kept, ended.fitted
+    near = set[str]()
+    if not ended.measured.complete:
+        _, columns = model.way.columns(ended.measured.values)
+        levers = np.linalg.norm(columns[:, :3], axis=1).max(axis=0, initial=0.0)
+        least = _MISSED * _reach(model, ended)
+        parameters = zip(model.way.parameters, levers.tolist(), strict=True)
+        near = {p.where for p, lever in parameters if p.what in ("rz", "theta") and lever < least}
     deviations = np.sqrt(np.diag(fitted.covariance))
     for k, deviation in zip(kept, deviations.tolist(), strict=True):
         parameter = model.way.parameters[k]
-        if not parameter.end and parameter.where in model.coupling.joints:
+        if not parameter.end and parameter.where in model.coupling.joints and parameter.where not in near:
             moved = float(fitted.at[k] - model.way.start[k])
             yield parameter, moved, abs(moved) - _UNCERTAIN * deviation
 
