@@ -37,8 +37,8 @@ def test_every_example_prints_what_the_page_shows(tmp_path: Path, monkeypatch: p
                 done = urdfkin(*shlex.split(command)[1:])
                 is_refused = shown.startswith("urdfkin: error")
                 assert done.code == (3 if is_refused else 0), (command, done.err)
-                text = done.err if is_refused else done.text
-                assert pattern(loose(shown)).search(loose(text)), f"{command}\n{text}"
+                printed = done.err if is_refused else done.text
+                assert pattern(loose(shown)).search(loose(printed)), f"{command}\n{printed}"
                 commands += 1
         elif kind == "python":
             env = {**os.environ, "PYTHONPATH": str(PAGE.parents[1])}
