@@ -7,6 +7,8 @@ Mutants of the shipped robots are one family; the others are random whole robots
 names that look like ours, prefixes, versions, followers, lengths, angles, axes, limits, roots, or everything;
 MJCF files with free bodies, equalities and default classes, which MuJoCo checks on its own; and the family
 "tables", Denavit-Hartenberg tables with damaged headers: each is refused or compared.
+The family "calibrations" has measured poses: good ones are calibrated; joint angles in degrees and shifted
+rows of q are refused.
 
 Each goes through `check` and `load`, and every quantity of it is computed in every reference, on bases near
 and far, and held against Pinocchio, in a worker process that is restarted when it dies or takes too long.
@@ -32,7 +34,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
-from scripts.fuzzing import GOOD, Case, mjcf, robots, tables
+from scripts.fuzzing import GOOD, Case, calibrations, mjcf, robots, tables
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
@@ -40,7 +42,7 @@ from urdfkin.urdf.catalogue import catalogue
 READY, FIRST_WAIT = "ready", 300.0
 
 MUTANTS = "mutants"
-FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES, tables.FAMILY)
+FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES, tables.FAMILY, calibrations.FAMILY)
 
 
 @cache
@@ -56,6 +58,8 @@ def case(seed: int, family: str, number: int) -> Case:
         return mjcf.robot(seed, family, number)
     if family == tables.FAMILY:
         return tables.sheet(seed, number)
+    if family == calibrations.FAMILY:
+        return calibrations.calibration(seed, number)
     return mutant(seed, number, files()) if family == MUTANTS else robots.robot(seed, family, number)
 
 
@@ -128,12 +132,12 @@ def work(seed: int) -> None:
 
     answers = sys.stdout
     sys.stdout = sys.stderr
+    judges = {tables.FAMILY: tables.judge, calibrations.FAMILY: calibrations.judge}
     judge(Case("as it is", files()[0].read_bytes()))
     print(READY, file=answers, flush=True)
     for line in sys.stdin:
         family, number = line.split()
-        made = case(seed, family, int(number))
-        outcome = tables.judge(made) if family == tables.FAMILY else judge(made)
+        outcome = judges.get(family, judge)(case(seed, family, int(number)))
         print(json.dumps([outcome.word, outcome.details]), file=answers, flush=True)
 
 

@@ -13,7 +13,7 @@ import pytest
 
 import urdfkin
 from scripts import fuzz
-from scripts.fuzzing import GOOD, Case, mjcf, robots, tables
+from scripts.fuzzing import GOOD, Case, calibrations, mjcf, robots, tables
 from scripts.fuzzing.judge import Outcome
 from scripts.fuzzing.judge import judge as judge_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
@@ -45,6 +45,14 @@ def test_a_robot_depends_on_seed_family_and_number_alone(family: str) -> None:
     assert made == [fuzz.case(0, family, number) for number in range(20)]
     assert len({each.data for each in made}) > 17
     assert made != [robots.robot(1, family, number) for number in range(20)]
+
+
+def test_wrong_measurements_are_refused_and_good_ones_are_calibrated() -> None:
+    words = Counter[str]()
+    for number in range(16):
+        made = fuzz.case(0, calibrations.FAMILY, number)
+        words[calibrations.judge(made).word] += 1
+    assert set(words) == {"refused", "verified"}
 
 
 def test_robots_are_of_every_oddity() -> None:

@@ -36,6 +36,32 @@ def test_measured_poses_become_a_urdf_and_data(tmp_path: Path) -> None:
     assert "verified by Pinocchio" in shown.text
 
 
+def test_a_calibration_that_is_not_plausible_is_written_by_force_alone(tmp_path: Path) -> None:
+    true = bench(BRANCHED, ("origins",), "hand", "trunk")
+    (tmp_path / "arm.urdf").write_text(BRANCHED)
+    np.savez(tmp_path / "poses.npz", q=np.roll(true.q, 1, axis=0), T=true.T)
+    out = tmp_path / "new.urdf"
+    words = ["calibrate", f"{tmp_path}/arm.urdf", "--tip", "hand", "--poses", f"{tmp_path}/poses.npz"]
+    done = urdfkin(*words, "-o", str(out))
+    assert done.code == 3
+    assert "likeliest reason: q is shifted by one row against the poses" in done.err
+    assert "verified" not in done.text
+    assert not out.exists()
+    data = urdfkin(*words, "--format", "json").data
+    assert data["likeliest_reason"].startswith("q is shifted by one row")
+    assert "of the reach" in data["objections"][0]
+    forced = urdfkin(*words, "--force", "-o", str(out))
+    assert forced.code == 0
+    assert "urdfkin: warning: " in forced.err
+    assert out.exists()
+
+
+def test_radians_all_and_force_do_nothing_without_poses() -> None:
+    for option in ("--radians", "--all", "--force"):
+        done = urdfkin("calibrate", "ur5", option)
+        assert (done.code, f"{option} does nothing without --poses" in done.err) == (2, True)
+
+
 def test_a_tables_file_becomes_a_table(tmp_path: Path) -> None:
     drawn = table(Convention.STANDARD)
     model = table_model(drawn, ("origins",))

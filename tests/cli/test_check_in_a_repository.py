@@ -229,7 +229,7 @@ def test_what_a_baseline_knows_blocks_nobody_and_what_is_new_does(here: Path) ->
     arm = put("robots/arm.urdf")
     put("robots/two.urdf", BAD)
     done = check("--strict", "--write-baseline", "known.json")
-    assert (done.code, done.err) == (0, "wrote known.json\n")
+    assert (done.code, done.text, done.err) == (0, "", "wrote known.json: 2 findings known\n")
     done = check("--strict", "--baseline", "known.json")
     assert (done.code, done.text) == (0, "no findings in 2 files (2 known before)\n")
     arm.write_text("\n\n" + LONG.replace("<axis", '<axis  shade="3"'))  # known again on another line
@@ -439,11 +439,106 @@ def test_diff_shows_a_patch_that_does_what_fix_does(here: Path) -> None:
     done = check("--diff")
     assert (done.code, done.err) == (1, "1 finding to fix in 1 file\n")
     assert arm.read_text() == LONG.replace("    <axis", "\t<axis")
-    subprocess.run(["git", "apply", "-p0"], input=done.out, check=True, capture_output=True)
+    subprocess.run(["git", "apply"], input=done.out, check=True, capture_output=True)
     assert arm.read_text() == GOOD.replace("    <axis", "\t<axis")
     done = check("--diff")
     assert (done.code, done.out) == (0, b"")
     assert "--fix does nothing with --diff" in check("--diff", "--fix").err
+
+
+ODD_LINES = {
+    "line feeds": LONG.encode(),
+    "carriage returns": LONG.replace("\n", "\r\n").encode(),
+    "one carriage return": LONG.replace("\n", "\r\n", 1).encode(),
+    "a lone carriage return": LONG.replace("    <axis", "   \r <axis").encode(),
+    "no final line feed": LONG.removesuffix("\n").encode(),
+    "no final line feed, a fix on the last line": LONG.replace("\n", " ").encode().strip(),
+    "a bidi mark nearby": LONG.replace('"b"', '"b\u202e"').encode(),
+    "an escape for a CI service nearby": LONG.replace(
+        "  </joint>", "  </joint>\n::error::x\n##[group]"
+    ).encode(),
+    "a form feed and a line separator in a comment": LONG.replace(
+        "<axis", "<!--\u2028 \x85--><axis"
+    ).encode(),
+    "a byte order mark": b"\xef\xbb\xbf" + LONG.encode(),
+    "umlauts": LONG.replace('"r"', '"r\xe4"').encode(),
+    "carriage returns and no final one, with a bidi mark": LONG.replace("\n", "\r\n")
+    .replace('"b"', '"b\u202e"')
+    .rstrip()
+    .encode(),
+}
+
+
+@pytest.mark.parametrize("name", ["arm.urdf", "an arm.urdf", "\xe4rm.urdf", 'ar"m.urdf', "below/arm.urdf"])
+@pytest.mark.parametrize("lines", list(ODD_LINES))
+def test_git_applies_what_diff_prints_and_it_does_what_fix_does(here: Path, lines: str, name: str) -> None:
+    arm = put(name)
+    arm.write_bytes(ODD_LINES[lines])
+    done = check("--diff", str(arm) if name != "arm.urdf" else str(arm.resolve()))
+    assert done.code == 1, done.text
+    shown = done.out.decode()
+    assert "\u202e" not in shown
+    assert not re.search(r"^\s*::|##\[", shown, re.MULTILINE)
+    subprocess.run(["git", "init", "-q"], check=True)
+    subprocess.run(["git", "apply", "--whitespace=nowarn"], input=done.out, check=True, capture_output=True)
+    patched = arm.read_bytes()
+    arm.write_bytes(ODD_LINES[lines])
+    check("--fix", str(arm))
+    assert patched == arm.read_bytes() != ODD_LINES[lines]
+
+
+def test_a_patch_that_is_printed_below_the_top_of_a_repository_is_applied_there(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    subprocess.run(["git", "init", "-q"], check=True)
+    for k, lines in enumerate(("line feeds", "a bidi mark nearby")):
+        arm = put(f"robots/arm{k}.urdf")
+        arm.write_bytes(ODD_LINES[lines])
+        monkeypatch.chdir("robots")
+        done = check("--diff", arm.name)
+        subprocess.run(["git", "apply"], input=done.out, check=True, capture_output=True)
+        assert b"0 0 1" in Path(arm.name).read_bytes()
+        monkeypatch.chdir("..")
+
+
+def test_fixes_that_turn_a_joint_wait_for_unsafe_fixes(here: Path) -> None:
+    text = LONG.replace("<axis", '<origin rpy="1.5708 0 0"/><axis')
+    arm = put("arm.urdf", text)
+    assert "--unsafe-fixes mends 1 more, which turns joints by more than rounding" in check().text
+    done = check("--diff")
+    assert done.err == "1 finding to fix in 1 file (1 more with --unsafe-fixes)\n"
+    check("--fix")
+    assert arm.read_text() == text.replace("0 0 2", "0 0 1")
+    assert "--unsafe-fixes does nothing without --fix and --diff" in check("--unsafe-fixes").err
+    assert "1.5707963267948966" in check("--diff", "--unsafe-fixes").text
+    check("--fix", "--unsafe-fixes")
+    assert "1.5707963267948966" in arm.read_text()
+
+
+def test_github_gets_errors_first_and_one_line_for_many_of_a_kind(here: Path) -> None:
+    joints = "".join(
+        f'<link name="l{k}"/><joint name="j{k}" type="continuous"><parent link="a"/><child link="l{k}"/>'
+        f'<axis xyz="0 0 2"/></joint>\n'
+        for k in range(30)
+    )
+    put("arm.urdf", f'<robot name="r"><link name="a"/>\n{joints}<link name="stray"/></robot>')
+    lines = check("--format", "github").text.splitlines()
+    words = [line.split(" ")[0] for line in lines]
+    assert words == sorted(words, key=["::error", "::warning", "::notice"].index)
+    assert sum("URDF503" in line for line in lines) == 1
+    assert sum("URDF503" in line for line in check("--format", "github", "--each").text.splitlines()) == 30
+
+
+@pytest.mark.parametrize("style", ["terminal", "concise", "json", "sarif", "github"])
+def test_findings_go_to_a_file(here: Path, style: str) -> None:
+    put("arm.urdf")
+    printed = check("--format", style)
+    done = check("--format", style, "-o", "found.txt")
+    assert (done.code, done.out) == (printed.code, b"")
+    assert Path("found.txt").read_bytes() == printed.out
+    patch = check("--diff")
+    assert check("--diff", "-o", "fix.patch").out == b""
+    assert Path("fix.patch").read_bytes() == patch.out
 
 
 def test_what_is_no_file_of_the_users_is_not_mended(here: Path) -> None:
@@ -455,7 +550,7 @@ def test_what_is_no_file_of_the_users_is_not_mended(here: Path) -> None:
 def test_a_rounded_pi_says_how_far_it_turns(here: Path) -> None:
     arm = put("arm.urdf", GOOD.replace("<axis", '<origin rpy="1.5708 0 0"/><axis'))
     assert (
-        check("--fix").err
+        check("--fix", "--unsafe-fixes").err
         == "arm.urdf: fixed URDF601 rounded-pi, line 5; joints turned by up to 3.7e-06 rad each\n"
     )
     assert 'rpy="1.5707963267948966 0 0"' in arm.read_text()

@@ -20,7 +20,7 @@ from urdfkin.errors.printable import json_text
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.robot import Robot
-    from urdfkin.sameness.calibration.calibrate import Calibration
+    from urdfkin.sameness.calibration.calibrate import Calibration, ImplausibleError
     from urdfkin.sameness.calibration.rewritten import Rewritten
 
 _FILE = click.Path(path_type=Path)
@@ -56,6 +56,11 @@ _FILE = click.Path(path_type=Path)
     "--unit", type=click.Choice(["m", "mm"]), default="m", show_default=True, help="Of measured positions."
 )
 @click.option("--drop-odd", is_flag=True, help="Leave out poses that do not belong to the others.")
+@click.option("--radians", is_flag=True, help="Joint angles are radians, also where they look like degrees.")
+@click.option(
+    "--all", "every", is_flag=True, help="Write all fitted parameters, not only those beyond 2 sigma."
+)
+@click.option("--force", is_flag=True, help="Write a calibration that is not plausible, too.")
 @forms("table", "json")
 @click.option("--output", "-o", type=_FILE, help="Write the calibrated URDF, or the table as TOML.")
 @click.pass_context
@@ -75,7 +80,10 @@ def command(
     measured configurations. ROBOT may be a table's file: then its cells are fitted. Without --poses, --like
     and --ur it says what general poses would tell.
 
-    Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
+    A calibration that is not plausible is refused with the likeliest reason: joint angles in degrees, rows of
+    q shifted against the poses, the sign of a joint. Nothing is written then without --force.
+
+    Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked, or refused.
     """
     from urdfkin.report.calibration import as_data, print_calibration, print_moved  # noqa: PLC0415
     from urdfkin.report.changes import print_changes  # noqa: PLC0415  keeps --help fast
@@ -97,6 +105,10 @@ def command(
         print_calibration(found, out)
     if written is None or (found is not None and found.fitted is None):
         return
+    if found is not None and found.plausibility.objections:
+        say(f"urdfkin: {'warning' if context.params['force'] else 'error'}: {_refusal(found)}", err=True)
+        if not context.params["force"]:
+            context.exit(3)
     if format_ == "table" and written.origins:
         print_moved(written, out)
     if output is not None:
@@ -113,8 +125,14 @@ def command(
         context.exit(exit_code(certificate))
 
 
+def _refusal(found: Calibration) -> ImplausibleError:
+    from urdfkin.sameness.calibration.calibrate import ImplausibleError  # noqa: PLC0415
+
+    return ImplausibleError(found, "--force writes it all the same")
+
+
 def _refuse_idle(context: click.Context, given: list[str]) -> None:
-    measured = ("noise", "drop_odd", "unit")
+    measured = ("noise", "drop_odd", "unit", "radians", "every", "force")
     if given != ["poses"]:
         refuse_idle(context, measured, "without --poses")
     if given != ["ur"]:
@@ -161,6 +179,9 @@ def _calibrated(context: click.Context, robot: Robot) -> Calibration:
             noise=_noise(asked["noise"]),
             drop_odd=asked["drop_odd"],
             complete=not asked["positions"],
+            radians=asked["radians"],
+            every=asked["every"],
+            force=True,
         )
 
 

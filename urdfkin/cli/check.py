@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
@@ -12,9 +14,9 @@ from typing import Any
 import click
 
 from urdfkin.cli.arguments import how_to_load, mimic_option, root_joint_option, together, xacro_option
-from urdfkin.cli.checked import STYLES, Outcome, print_outcome, say_fixed, show_difference
+from urdfkin.cli.checked import STYLES, Outcome, difference, print_outcome, say_fixed
 from urdfkin.cli.completing import complete_code, complete_file
-from urdfkin.cli.door import say
+from urdfkin.cli.door import say, say_file
 from urdfkin.cli.idle import refuse_idle
 from urdfkin.cli.numbers import Whole
 from urdfkin.errors import SourceError, UnknownNameError
@@ -102,7 +104,11 @@ limit_options = together(
     "--format", "--output-format", "style", type=click.Choice(STYLES), default="terminal", show_default=True,
     help="How to print the findings.",
 )  # fmt: skip
+@click.option("--output", "-o", type=_FILE, help="Write the findings, or the patch of --diff, to a file.")
 @click.option("--fix", is_flag=True, help="Cure what needs no judgement, in the files.")
+@click.option(
+    "--unsafe-fixes", is_flag=True, help="Apply also fixes that turn a joint by more than rounding."
+)
 @click.option("--diff", is_flag=True, help="Print what --fix would change, and change nothing.")
 @click.option("--statistics", is_flag=True, help="Print how many there are of each code.")
 @choice_options
@@ -132,6 +138,10 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
     if options["fix"] and options["diff"]:
         refuse_idle(context, ("fix",), "with --diff")
+    if not (options["fix"] or options["diff"]):
+        refuse_idle(context, ("unsafe_fixes",), "without --fix and --diff")
+    if options["write_baseline"] is not None:
+        refuse_idle(context, ("output", "style", "statistics"), "with --write-baseline")
     if options["statistics"] and options["style"] not in ("terminal", "concise"):
         refuse_idle(context, ("statistics",), f"with --format {options['style']}")
     run = _run(context.meta[_SETTINGS], options)
@@ -144,12 +154,31 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
     if options["diff"]:
         found, among = run.outcome.to_fix, len(run.outcome.files)
         many = "s" * (found != 1), "s" * (among != 1)
-        say(f"{found} finding{many[0]} to fix in {among} file{many[1]}", err=True)
-    else:
-        print_outcome(run.outcome, options["style"], statistics=options["statistics"])
+        _put_patch("".join(run.outcome.patches), options["output"])
+        more = f" ({run.outcome.unsafe} more with --unsafe-fixes)" if run.outcome.unsafe else ""
+        say(f"{found} finding{many[0]} to fix in {among} file{many[1]}{more}", err=True)
+    elif options["write_baseline"] is None:
+        _put_outcome(run.outcome, options["style"], options["output"], statistics=options["statistics"])
     for failure in run.outcome.unreadable:
         say(f"urdfkin: error: {failure}", err=True)
     sys.exit(run.exit_code())
+
+
+def _put_patch(text: str, path: Path | None) -> None:
+    if path is None:
+        say_file(text)
+    else:
+        write_file(path, text.encode())
+
+
+def _put_outcome(outcome: Outcome, style: str, path: Path | None, *, statistics: bool) -> None:
+    if path is None:
+        print_outcome(outcome, style, statistics=statistics)
+        return
+    kept = io.StringIO()
+    with contextlib.redirect_stdout(kept):
+        print_outcome(outcome, style, statistics=statistics)
+    write_file(path, kept.getvalue().encode())
 
 
 def _run(settings: Settings, options: dict[str, Any]) -> Run:
@@ -167,9 +196,10 @@ def _run(settings: Settings, options: dict[str, Any]) -> Run:
         look=look,
         choice=Choice(_chosen(options), options["notes"], settings, known),
         strict=options["strict"],
-        fold=options["style"] in ("terminal", "concise") and not (options["each"] or writing),
+        fold=options["style"] in ("terminal", "concise", "github") and not (options["each"] or writing),
         fix=options["fix"],
         diff=options["diff"],
+        unsafe=options["unsafe_fixes"],
         version=None if since is None else version_before(since, Path()),
         accepting=writing,
     )
@@ -199,6 +229,7 @@ class Run:
     fold: bool
     fix: bool
     diff: bool
+    unsafe: bool
     version: Version | None
     accepting: bool
     outcome: Outcome = field(default_factory=Outcome)
@@ -240,17 +271,26 @@ class Run:
         path = None if text.entry is not None or is_xacro(text.source) else file_of(text)
         if path is None:
             return text
-        mended = mend(text, self.look, choose)
+        mended = mend(text, self.look, lambda: self._safe(choose()))
         for code, objection in mended.kept.items():
             say(f"{file}: {code} was not fixed: {objection}", err=True)
         if self.diff:
             self.outcome.to_fix += len(mended.fixed)
-            show_difference(file, text.data, mended.text.data)
+            self.outcome.patches.append(difference(file, text.data, mended.text.data))
+            chosen = choose()
+            self.outcome.unsafe += sum(
+                chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.unsafe
+                for f in self.look(mended.text).findings
+            )
             return text
         if mended.fixed:
             write_file(path, mended.text.data)
             say_fixed(file, mended.fixed)
         return mended.text
+
+    def _safe(self, chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
+        """Those of the chosen findings whose fix may be applied."""
+        return lambda finding: chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
 
     def _judged(self, finding: Finding) -> Finding:
         # A baseline knows findings by what they are, whatever is made of them.
@@ -269,4 +309,5 @@ def _write_baseline(run: Run, path: Path) -> None:
     if outcome.unreadable:
         return
     write_file(path, baseline_text(outcome.findings, outcome.files, path).encode())
-    say(f"wrote {path}", err=True)
+    many = sum(finding.count for finding in outcome.findings)
+    say(f"wrote {path}: {many} finding{'s' * (many != 1)} known", err=True)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import click
 
-from urdfkin.cli.door import command_lines, say, say_file, say_styled
+from urdfkin.cli.door import command_lines, harmless, say, say_styled
 from urdfkin.errors import UrdfkinError
-from urdfkin.errors.printable import printable
 from urdfkin.lint import Finding, Severity
 from urdfkin.lint.excerpt import Excerpts
 from urdfkin.lint.formats import as_github, as_json, statistics, summary
 from urdfkin.lint.pages import RULES, page
+from urdfkin.lint.patch import patch
 from urdfkin.lint.runner import Examined
 from urdfkin.lint.sarif import as_sarif
 from urdfkin.system.versions import installed_version
@@ -36,6 +35,8 @@ class Outcome:
         unchanged: How many files say what they said before.
         known: How many findings a baseline knows, and how many more it knows that are gone.
         to_fix: How many findings --diff would mend.
+        patches: What --diff prints.
+        unsafe: How many more findings --unsafe-fixes would mend.
     """
 
     files: list[str] = field(default_factory=list)
@@ -46,6 +47,8 @@ class Outcome:
     unchanged: int = 0
     known: tuple[int, int] = (0, 0)
     to_fix: int = 0
+    patches: list[str] = field(default_factory=list)
+    unsafe: int = 0
 
     def add(self, file: str, found: Examined) -> None:
         """One more file."""
@@ -76,15 +79,17 @@ def _print_terminal(outcome: Outcome, *, excerpts: bool) -> None:
     for finding, excerpt in zip(outcome.findings, outcome.excerpts, strict=True):
         place, rest = str(finding).split(f": {finding.code} ", 1)
         colour = {"fg": _COLOURS[finding.severity], "bold": True}
-        mark = " [*] " if finding.fix else " "
+        mark = " [*] " if finding.fix and finding.fix.is_safe else " "
         say_styled((place, {"bold": True}), (": ", {}), (finding.code, colour), (f"{mark}{rest}", {}))
         if excerpts and excerpt is not None:
             line, _, caret = excerpt.partition("\n")
             say_styled((line, {}))
             say_styled((caret, colour))
     _print_summary(outcome)
-    if any(finding.fix for finding in outcome.findings):
+    if any(finding.fix and finding.fix.is_safe for finding in outcome.findings):
         say("[*] --fix mends these, --diff shows how")
+    if unsafe := sum(bool(finding.fix and not finding.fix.is_safe) for finding in outcome.findings):
+        say(f"--unsafe-fixes mends {unsafe} more, which turns joints by more than rounding")
     worst = next((f.code for f in outcome.findings if f.severity is Severity.ERROR), None)
     if worst is not None:
         say(f"'urdfkin explain {worst}' tells more: {page(worst).title}")
@@ -119,9 +124,6 @@ def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
         say(f"{file}: fixed {code} {RULES[code].slug}, {where}{moved}", err=True)
 
 
-def show_difference(file: str, before: bytes, after: bytes) -> None:
+def difference(file: str, before: bytes, after: bytes) -> str:
     """What would be changed, as a patch."""
-    name = printable(file)
-    old, new = (data.decode("utf-8", "replace").splitlines() for data in (before, after))
-    lines = difflib.unified_diff(old, new, name, name, lineterm="")
-    say_file("".join(f"{line}\n" for line in lines))
+    return patch(file, before, after, harmless)

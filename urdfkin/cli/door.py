@@ -51,8 +51,14 @@ class Door:
     def write_file(self, text: str) -> None:
         """A file's text: the same bytes whatever letters the stream knows."""
         self.stream.flush()
-        self.stream.buffer.write(self._tamed(_plain(text)).encode())
+        self.stream.buffer.write(self.tamed_file(text).encode())
         self.stream.buffer.flush()
+
+    def tamed_file(self, text: str) -> str:
+        """A file's text as `write_file` writes it: a carriage return before a line feed acts on nothing."""
+        *lines, last = text.split("\n")
+        plain = [_plain(line.removesuffix("\r")) + "\r" * line.endswith("\r") for line in lines]
+        return self._tamed("\n".join([*plain, _plain(last)]))
 
     def _hand_on(self, text: str) -> None:
         encoding = self.stream.encoding or "utf-8"
@@ -114,6 +120,11 @@ def say_styled(*words: tuple[str, dict[str, Any]]) -> None:
 def say_file(text: str) -> None:
     """What would be a file, were one named."""
     Door(sys.stdout).write_file(text)
+
+
+def harmless(text: str) -> str:
+    """A file's text of whole lines, as `say_file` writes it."""
+    return Door(sys.stdout).tamed_file(text)
 
 
 def command_lines(text: str) -> None:

@@ -11,6 +11,9 @@ from dataclasses import dataclass
 
 from urdfkin.system.edits import Edit, edited
 
+#: Radians: what rounding an angle of a turn to a double moves at most.
+ROUNDING = 2.0**-50
+
 
 @dataclass(frozen=True, slots=True)
 class Fix:
@@ -23,6 +26,11 @@ class Fix:
 
     edits: tuple[Edit, ...]
     turns: float = 0.0
+
+    @property
+    def is_safe(self) -> bool:
+        """Whether it turns no joint by more than the rounding of one number."""
+        return self.turns <= ROUNDING
 
 
 def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:

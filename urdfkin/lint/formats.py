@@ -71,12 +71,12 @@ def _entry(finding: Finding) -> dict[str, Any]:
 
 
 def as_github(findings: Sequence[Finding]) -> str:
-    """One workflow command a finding, which GitHub shows beside the line."""
+    """One workflow command a finding, which GitHub shows beside the line; errors first."""
     words = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
     return "\n".join(
         f"::{words[f.severity]} file={_property(f.file)},line={f.line},col={f.column},"
         f"{_end(f)}title={_property(f.code)}::{_message(f.sentence)}"
-        for f in findings
+        for f in sorted(findings, key=lambda f: f.severity.rank)
     )
 
 

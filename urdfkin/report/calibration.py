@@ -43,18 +43,28 @@ def print_calibration(found: Calibration, out: Console) -> None:
                 str(found.parameters[k]),
                 _amount(found.values[k], found.parameters[k].unit),
                 _amount(found.deviations[k], found.parameters[k].unit),
+                _amount(found.written_values[k], found.parameters[k].unit)
+                if k in found.written_parameters
+                else "",
             )
             for k in sorted(told.kept)
         ]
-        print_named(out, ["parameter", "moved by", "uncertain by"], rows)
+        print_named(out, ["parameter", "moved by", "uncertain by", "written"], rows)
     if found.fitted is None or found.before is None:
         return
     noise = found.fitted.noise
     said = f"{length(noise.metres)}" + (
         f", {angle(noise.radians)}" if found.fitted.errors.shape[1] == 6 else ""
     )
-    out.print(f"before: {_rms(found.before)} (rms); after: {_rms(found.fitted)}")
-    if found.stated:
+    every = sum(p in found.writable for p in told.kept)
+    few = found.written_fit is not None and len(found.written_parameters) < every
+    as_written = f"; as written: {_rms(found.written_fit)}" if few and found.written_fit is not None else ""
+    out.print(f"before: {_rms(found.before)} (rms); after: {_rms(found.fitted)}{as_written}")
+    if few:
+        out.print(f"written: {len(found.written_parameters)} of {every} parameters, those beyond 2 sigma")
+    if not found.stated and not found.fitted.is_judged:
+        out.print("noise: unknown, no number is left to estimate it from")
+    elif found.stated:
         ratio = f"{found.fitted.ratio:.3g} +- {found.fitted.spread:.2g}"
         out.print(f"noise: {said} as stated; {ratio} times that is left")
     elif found.fitted.ratio < _ROUNDING:
@@ -107,6 +117,7 @@ def as_data(found: Calibration) -> dict[str, Any]:
                 "fitted": k in told.kept,
                 "moved": float(found.values[k]) if found.fitted is not None else None,
                 "deviation": _finite(found.deviations[k]) if found.fitted is not None else None,
+                "written": float(found.written_values[k]) if k in found.written_parameters else None,
                 "still_because": told.still.get(k),
             }
             for k, parameter in enumerate(found.parameters)
@@ -119,15 +130,19 @@ def as_data(found: Calibration) -> dict[str, Any]:
     return data | {
         "covariance_of": [str(found.parameters[k]) for k in told.kept],
         "covariance": [[_finite(x) for x in row] for row in fitted.covariance],
-        "noise": {"metres": fitted.noise.metres, "radians": fitted.noise.radians},
+        "noise": {"metres": fitted.noise.metres, "radians": fitted.noise.radians}
+        if found.stated or fitted.is_judged
+        else None,
         "rms": {
             when: dict(zip(("metres", "radians"), fit.rms(), strict=True))
-            for when, fit in (("before", found.before), ("after", fitted))
+            for when, fit in (("before", found.before), ("after", fitted), ("as_written", found.written_fit))
             if fit is not None
         },
         "residuals": fitted.errors.tolist(),
         "odd_poses": list(found.odd),
         "doubts": doubts(found),
+        "objections": list(found.plausibility.objections),
+        "likeliest_reason": found.plausibility.reason,
         "placements": {name: T.tolist() for name, T in names if T is not None},
         "origins": {joint: T.tolist() for joint, T in found.origins.items()},
     }

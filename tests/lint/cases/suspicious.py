@@ -29,6 +29,19 @@ CASES = [
     ),
     Case("huge-but-finite", xyz("1e308 0 0"), WARN, [("URDF603", 6)]),
     Case("overflow-of-the-sum", arm(origin='<origin xyz="1.7e308 1.7e308 0"/>'), REJECT, [("URDF606", 6)]),
+    Case(
+        "neutral-above-the-limits",
+        limit('lower="-2" upper="-0.1" effort="1" velocity="1"'),
+        ACCEPT,
+        [("URDF608", 6)],
+    ),
+    Case(
+        "neutral-below-the-limits",
+        limit('lower="0.1" effort="1" velocity="1" upper="2"'),
+        ACCEPT,
+        [("URDF608", 6)],
+    ),
+    Case("neutral-at-a-limit", limit('lower="0" upper="2" effort="1" velocity="1"'), ACCEPT),
     Case("tiny-robot", xyz("0 0 1e-7"), WARN, [("URDF604", 2)]),
     Case("all-origins-zero", xyz("0 0 0"), ACCEPT),
 ]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import re
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from tests.sameness.calibration.arms import BRANCHED, Bench, bench, pose
 from tests.sameness.calibration.test_way import table
@@ -14,6 +16,7 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import log_rotation
 from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
+from urdfkin.report.calibration import print_calibration
 from urdfkin.sameness.calibration.calibrate import Calibration, calibrate, doubts
 from urdfkin.sameness.calibration.models import table_model
 
@@ -162,8 +165,15 @@ def test_odd_poses_are_told_and_left_out_only_if_that_is_wanted() -> None:
 
 def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
     true = bench("ur5", ("origins",), "tool0", "base", poses=5)
-    found = calibrate(true.robot, true.q, true.noisy(1e-4, 1e-4, 0), tip="tool0", base="base")
+    T = true.noisy(1e-4, 1e-4, 0)
+    with pytest.raises(InputError, match="nothing is left to judge the fit by"):
+        calibrate(true.robot, true.q, T, tip="tool0", base="base")
+    found = calibrate(true.robot, true.q, T, tip="tool0", base="base", force=True)
     assert found.identification.rank == 30
+    assert found.written_parameters == ()
+    out = io.StringIO()
+    print_calibration(found, Console(file=out, width=200))
+    assert "noise: unknown, no number is left to estimate it from" in out.getvalue()
     assert not np.isfinite(found.deviations[list(found.identification.kept)]).any()
     assert any("no number is left to judge by" in line for line in doubts(found))
 

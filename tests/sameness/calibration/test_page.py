@@ -35,8 +35,10 @@ def test_every_example_prints_what_the_page_shows(tmp_path: Path, monkeypatch: p
             for example in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
                 command, _, shown = example.partition("\n")
                 done = urdfkin(*shlex.split(command)[1:])
-                assert done.code == 0, (command, done.err)
-                assert pattern(loose(shown)).search(loose(done.text)), f"{command}\n{done.text}"
+                is_refused = shown.startswith("urdfkin: error")
+                assert done.code == (3 if is_refused else 0), (command, done.err)
+                printed = done.err if is_refused else done.text
+                assert pattern(loose(shown)).search(loose(printed)), f"{command}\n{printed}"
                 commands += 1
         elif kind == "python":
             env = {**os.environ, "PYTHONPATH": str(PAGE.parents[1])}
@@ -49,6 +51,7 @@ def test_every_example_prints_what_the_page_shows(tmp_path: Path, monkeypatch: p
             )
             assert done_here.returncode == 0, done_here.stderr
     assert commands >= 6
+    assert not Path("no.urdf").exists()
 
 
 def test_all_blocks_of_the_page_are_run() -> None:

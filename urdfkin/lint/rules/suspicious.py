@@ -18,6 +18,7 @@ MILLIMETRES = Rule("URDF603", "huge-length", WARNING)
 TINY_ROBOT = Rule("URDF604", "tiny-robot", WARNING)
 SAME_PLACE = Rule("URDF605", "same-place", NOTE)
 OVERFLOW = Rule("URDF606", "overflow", ERROR)
+NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
 
 #: A joint further than this from its parent, in m, is probably given in millimetres.
 FAR = 100.0
@@ -53,6 +54,7 @@ def check_suspicious(report: Reporter, robot: RobotRecord, *, sound: bool) -> No
     for joint in robot.joints:
         _check_angles(report, joint, reach)
         _check_lengths(report, joint)
+        _check_neutral(report, joint)
     _check_places(report, robot)
     if sound:
         _check_sums(report, robot, reach)
@@ -181,6 +183,24 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
                 remedy="write metres",
                 weight=abs(far[0]),
             )
+
+
+def _check_neutral(report: Reporter, joint: JointRecord) -> None:
+    """A joint that cannot be at zero, the neutral configuration; a mimic joint is where its rule puts it."""
+    limit = joint.limit
+    if limit is None or joint.kind not in ("revolute", "prismatic") or joint.mimic is not None:
+        return
+    lower, upper = limit.lower or 0.0, limit.upper or 0.0
+    if lower <= upper and not lower <= 0.0 <= upper:
+        report.add(
+            NEUTRAL,
+            "the neutral configuration, zero, is outside the limits",
+            limit.element,
+            attribute="lower" if lower > 0.0 else "upper",
+            found=f'lower="{lower:g}" upper="{upper:g}"',
+            remedy="give this joint a value within its limits: --q ready",
+            weight=max(lower, -upper),
+        )
 
 
 def _check_places(report: Reporter, robot: RobotRecord) -> None:

@@ -1,10 +1,14 @@
-"""A model fitted to measured poses: what they tell, what the parameters are then, and what to doubt."""
+"""A model fitted to measured poses: what they tell, what the parameters are then, and what to doubt.
+
+A fit that is not plausible (`plausible.py`) is refused. Of a plausible one the parameters are written that
+moved by more than two standard deviations; the others stay as they were, and the rest is fitted anew.
+"""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,9 +22,19 @@ from urdfkin.model.configuration import checked
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.sameness.calibration.ends import demand_plausible, starting
-from urdfkin.sameness.calibration.fit import WRONGLY, Fit, Measured, Noise, best_fit, odd_poses, quantile
+from urdfkin.sameness.calibration.fit import (
+    WRONGLY,
+    Fit,
+    Measured,
+    Noise,
+    best_fit,
+    odd_poses,
+    quantile,
+    significant,
+)
 from urdfkin.sameness.calibration.identify import Identification, identify, stacked
 from urdfkin.sameness.calibration.models import Model, table_model, urdf_model
+from urdfkin.sameness.calibration.plausible import Ended, Plausibility, judge
 from urdfkin.sameness.calibration.poses import checked_poses
 from urdfkin.sameness.calibration.rewritten import Rewritten
 from urdfkin.sameness.calibration.way import Parameter
@@ -44,6 +58,8 @@ _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
 _READ_BACK = 4.0
 #: Parameters or poses that a doubt names.
 _NAMED = 6
+#: Where no correction makes a fit plausible.
+_NO_REASON = "degrees, shifted rows of q and reversed signs of joints do not explain it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +79,9 @@ class Calibration:
             as many general configurations would leave it.
         certificate: What Pinocchio said of what was written.
         stated: Whether the noise was stated.
+        written_fit: The fit of the parameters that are written alone; `fitted` where all are.
+        significant: Numbers of the parameters in that fit.
+        plausibility: Why the fit is refused, if it is.
     """
 
     robot: Robot
@@ -76,6 +95,9 @@ class Calibration:
     weak: dict[int, float] | None = None
     certificate: Certificate | None = None
     stated: bool = False
+    written_fit: Fit | None = None
+    significant: tuple[int, ...] = ()
+    plausibility: Plausibility = field(default_factory=Plausibility)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -90,6 +112,24 @@ class Calibration:
         )
 
     @cached_property
+    def writable(self) -> frozenset[int]:
+        """Numbers of the parameters that a file has a place for: a URDF has none for ends and gains."""
+        is_table = isinstance(self.model.source, DHTable)
+        pairs = enumerate(self.parameters)
+        return frozenset(k for k, p in pairs if p.what != "gain" and (is_table or not p.end))
+
+    @property
+    def written_parameters(self) -> tuple[int, ...]:
+        """Numbers of the parameters that are written."""
+        return tuple(k for k in self.significant if k in self.writable)
+
+    @cached_property
+    def written_values(self) -> FloatArray:
+        """(p,) by how much each parameter moves in the fit that is written."""
+        found = self.written_fit
+        return np.zeros(len(self.parameters)) if found is None else found.at - self.model.way.start
+
+    @cached_property
     def deviations(self) -> FloatArray:
         """(p,) standard deviations; 0 for those that stand still."""
         found = np.zeros(len(self.parameters))
@@ -100,27 +140,46 @@ class Calibration:
     @property
     def origins(self) -> dict[str, FloatArray]:
         """(4, 4) by joint: the new origins of those that moved."""
-        return {} if self.fitted is None else self.model.origins(self.fitted.at)
+        return {} if self.written_fit is None else self.model.origins(self.written_fit.at)
 
     @property
     def base(self) -> FloatArray | None:
         """(4, 4) of the robot's base in the instrument's frame; None where it was not asked for."""
-        return None if self.fitted is None else self.model.end("base", self.fitted.at)
+        return None if self.written_fit is None else self.model.end("base", self.written_fit.at)
 
     @property
     def tool(self) -> FloatArray | None:
         """(4, 4) of the target in the tip's frame; None where it was not asked for."""
-        return None if self.fitted is None else self.model.end("tool", self.fitted.at)
+        return None if self.written_fit is None else self.model.end("tool", self.written_fit.at)
 
     @property
     def table(self) -> DHTable | None:
         """The calibrated table; None where a URDF was calibrated."""
-        return None if self.fitted is None else self.model.table(self.fitted.at)
+        return None if self.written_fit is None else self.model.table(self.written_fit.at)
 
     @cached_property
     def written(self) -> Rewritten:
         """The URDF's own text with the new origins in it, and what that moves."""
         return Rewritten(self.robot, self.origins)
+
+
+class ImplausibleError(InputError):
+    """A fit that is not plausible: the measured data or the model have a gross mistake.
+
+    Attributes:
+        calibration: The refused calibration.
+    """
+
+    def __init__(self, calibration: Calibration, remedy: str) -> None:
+        model, judged = calibration.model, calibration.plausibility
+        reason = f"likeliest reason: {judged.reason}" if judged.reason else _NO_REASON
+        super().__init__(
+            "the calibration is refused",
+            where=f"{calibration.robot.name}, {model.base} to {model.tip}",
+            found="; ".join(judged.objections),
+            remedy=f"{reason}; {remedy}",
+        )
+        self.calibration = calibration
 
 
 def calibrate(
@@ -134,6 +193,9 @@ def calibrate(
     noise: tuple[float, float] | None = None,
     drop_odd: bool = False,
     complete: bool = True,
+    radians: bool = False,
+    force: bool = False,
+    every: bool = False,
 ) -> Calibration:
     """The model with which a robot, or a table, comes closest to measured poses.
 
@@ -151,9 +213,13 @@ def calibrate(
             estimated from what is left.
         drop_odd: Whether poses that do not belong to the others are left out; they are told in any case.
         complete: Without poses: whether poses will be measured, or positions alone.
+        radians: Whether joint angles beyond a turn, which look like degrees, are radians.
+        force: Whether a fit that is not plausible is returned, with the objections in `plausibility`.
+        every: Whether all fitted parameters are written, also those within two standard deviations of 0.
 
     Raises:
         InputError: shapes, fewer poses than tell anything, positions that can be no metres.
+        ImplausibleError: the fit is not plausible; the message names the likeliest reason.
         UnknownNameError: a frame or a set of parameters that does not exist.
         UrdfError, SourceError: as `load`.
         VerificationError: Pinocchio computes something else of what was written.
@@ -164,6 +230,40 @@ def calibrate(
         >>> found.identification.rank, len(found.parameters)
         (30, 54)
     """
+    found = fitted_model(
+        source,
+        q,
+        poses,
+        tip=tip,
+        base=base,
+        fit=fit,
+        noise=noise,
+        drop_odd=drop_odd,
+        complete=complete,
+        radians=switch(radians, "radians"),
+        every=switch(every, "every"),
+    )
+    if found.plausibility.objections and not switch(force, "force"):
+        raise ImplausibleError(found, "force=True returns the fit all the same")
+    return found
+
+
+def fitted_model(
+    source: Robot | Source | DHTable,
+    q: ArrayLike | None,
+    poses: ArrayLike | None,
+    *,
+    tip: str | None,
+    base: str | None,
+    fit: Collection[str] = ("origins",),
+    noise: tuple[float, float] | None = None,
+    drop_odd: bool = False,
+    complete: bool = True,
+    radians: bool = False,
+    every: bool = True,
+    judged: bool = True,
+) -> Calibration:
+    """As `calibrate`, which refuses what is not plausible; `judged` says whether that is asked at all."""
     robot = source if isinstance(source, Robot) else load(source)
     names = tuple(word(name, "each of fit") for name in words(fit, "fit"))
     model = (
@@ -176,17 +276,18 @@ def calibrate(
     drop_odd, complete = switch(drop_odd, "drop_odd"), switch(complete, "complete")
     if (q is None) != (poses is None):
         raise InputError("q and poses are given together", found="one of the two")
-    measured = None if q is None or poses is None else _measured(robot, model, q, poses)
-    if measured is not None:
-        complete = measured.complete
+    given = None if q is None or poses is None else _measured(robot, model, q, poses)
+    if given is not None:
+        complete = given[1].complete
     general = _values(model, robot, robot.sample(_GENERAL))
-    if measured is None:
+    if given is None:
         could = identify(model, general, complete=complete, at=_somewhere(model))
         return Calibration(robot, model, could, could)
-    found = _calibrated(robot, model, measured, noise, drop_odd)
-    at = None if found.fitted is None else found.fitted.at
-    found = replace(found, general=identify(model, general, complete=complete, at=at))
-    found = replace(found, stated=noise is not None)
+    path_q, measured = given
+    ended, found = _calibrated(robot, model, path_q, measured, noise, drop_odd, every=every)
+    found = replace(found, general=identify(model, general, complete=complete, at=ended.fitted.at))
+    if judged:
+        found = replace(found, plausibility=judge(model, ended, radians=radians))
     return replace(found, certificate=_held(found, measured, np.atleast_2d(np.asarray(q, dtype=np.float64))))
 
 
@@ -203,12 +304,14 @@ def _values(model: Model, robot: Robot, q: FloatArray) -> FloatArray:
     return model.coupling.values(model.coupling.select(robot.tree, q))
 
 
-def _measured(robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike) -> Measured:
+def _measured(robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike) -> tuple[FloatArray, Measured]:
+    """(s, c) coordinates of the path, and what was measured there."""
     T = checked_poses(poses)
     if isinstance(model.source, DHTable):
-        values = model.coupling.values(q)
+        path_q = model.coupling.checked(q, "q")
     else:
-        values = _values(model, robot, np.atleast_2d(checked(robot.tree, q, "q")))
+        path_q = model.coupling.select(robot.tree, np.atleast_2d(checked(robot.tree, q, "q")))
+    values = model.coupling.values(path_q)
     if len(values) != len(T) or values.ndim != 2:
         raise InputError(
             "each pose needs its configuration", found=f"{len(T)} poses, q of shape {np.shape(q)}"
@@ -217,12 +320,19 @@ def _measured(robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike) -> Mea
         raise InputError("no poses", remedy="one is needed at least, and more than there are parameters")
     measured = Measured(values, T[:, :3, 3], T[:, :3, :3]) if T.ndim == 3 else Measured(values, T)
     demand_plausible(model, measured)
-    return measured
+    return path_q, measured
 
 
 def _calibrated(
-    robot: Robot, model: Model, measured: Measured, noise: tuple[float, float] | None, drop_odd: bool
-) -> Calibration:
+    robot: Robot,
+    model: Model,
+    q: FloatArray,
+    measured: Measured,
+    noise: tuple[float, float] | None,
+    drop_odd: bool,
+    *,
+    every: bool,
+) -> tuple[Ended, Calibration]:
     stated, start = None if noise is None else _stated(noise), starting(model, measured)
     identification = identify(model, measured.values, complete=measured.complete, at=start)
     ends = [k for k in identification.kept if model.way.parameters[k].end]
@@ -233,9 +343,13 @@ def _calibrated(
     if drop_odd and odd:
         chosen = np.ones(len(measured), dtype=bool)
         chosen[list(odd)] = False
-        measured, found = measured.some(chosen), clean
+        q, measured, found = q[chosen], measured.some(chosen), clean
         before = best_fit(model, measured, ends, stated, before.at)
-    return Calibration(
+    ended = Ended(q, measured, identification, before, found)
+    significant_, written = identification.kept, found
+    if not every:
+        significant_, written = _significant(model, ended, stated)
+    return ended, Calibration(
         robot,
         model,
         identification,
@@ -245,7 +359,28 @@ def _calibrated(
         odd,
         clean if odd else None,
         _weak(robot, model, measured, identification.kept, found.at),
+        stated=noise is not None,
+        written_fit=written,
+        significant=significant_,
     )
+
+
+def _significant(model: Model, ended: Ended, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
+    """The parameters that are written, and their fit; base and tool always are in it."""
+    kept, found = ended.identification.kept, ended.fitted
+    fixed = [model.way.parameters[k].end for k in kept]
+    moved = found.at[list(kept)] - model.way.start[list(kept)]
+    chosen = tuple(
+        k
+        for k, is_written in zip(kept, significant(moved, found.covariance, fixed), strict=True)
+        if is_written
+    )
+    if chosen == kept:
+        return kept, found
+    at = found.at.copy()
+    out = [k for k in kept if k not in chosen]
+    at[out] = model.way.start[out]
+    return chosen, best_fit(model, ended.measured, chosen, stated, at)
 
 
 def _more(
@@ -298,7 +433,7 @@ def _held(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate |
 
     A URDF holds neither the ends nor gains; a table is held by `load`.
     """
-    model, fitted = found.model, found.fitted
+    model, fitted = found.model, found.written_fit
     if fitted is None:
         return None
     at = fitted.at.copy()

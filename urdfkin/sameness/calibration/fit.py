@@ -48,6 +48,8 @@ _FOLLOWED = 1e-9
 _ESTIMATES, _STAYS = 20, 1e-3
 #: In how many campaigns without an odd pose one is called so.
 WRONGLY = 0.01
+#: Standard deviations: a parameter that moved by less is not written.
+SIGMAS = 2.0
 #: Of all poses: more than these are no odd ones.
 _MOST_ODD = 0.25
 
@@ -275,6 +277,36 @@ def odd_poses(
         chosen[out] = False
         clean = best_fit(model, measured.some(chosen), kept, noise, clean.at)
     return tuple(sorted(out)), clean
+
+
+def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]) -> NDArray[np.bool_]:
+    """(k,) which parameters moved by more than `SIGMAS` standard deviations, by backward elimination.
+
+    The least significant is put back to where it was, which moves the others by their covariance with it,
+    until all that are left are significant: of two that are known together only, one stays.
+
+    Args:
+        moved: (k,) by how much each moved.
+        covariance: (k, k) of these; inf where nothing is known of it.
+        fixed: (k,) those that are in any case.
+
+    >>> significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
+    [True, False]
+    """
+    stays, free = np.ones(len(moved), dtype=bool), ~np.array(fixed, dtype=bool)
+    if not np.isfinite(covariance).all():
+        return ~free
+    x, C = moved.copy(), covariance.copy()
+    while (rest := np.flatnonzero(stays & free)).size:
+        sizes = np.abs(x[rest]) / np.sqrt(C[rest, rest])
+        k = rest[int(np.argmin(sizes))]
+        if sizes.min() > SIGMAS:
+            break
+        column, variance = C[:, k].copy(), C[k, k]
+        x -= column * (x[k] / variance)
+        C -= np.outer(column, column) / variance
+        stays[k] = False
+    return stays
 
 
 def quantile(share: float, freedom: int) -> float:

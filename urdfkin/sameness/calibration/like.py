@@ -19,7 +19,7 @@ from urdfkin.loading import load
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.sameness.calibration.calibrate import Calibration, calibrate
+from urdfkin.sameness.calibration.calibrate import Calibration, fitted_model
 from urdfkin.sameness.calibration.rewritten import Rewritten
 from urdfkin.sameness.calibration.universal_robots import LINKS, calibrated_tree, read_calibration
 from urdfkin.urdf.sources import Source
@@ -74,7 +74,7 @@ def _like(robot: Robot, path: FrameChain, tip: str, base: str) -> Calibration:
     values = own.select(robot.tree, q)
     if set(own.names) == set(path.joint_names):
         values = values[:, [own.names.index(name) for name in path.joint_names]]
-    found = calibrate(robot, q, path.placement(values), tip=tip, base=base)
+    found = fitted_model(robot, q, path.placement(values), tip=tip, base=base, judged=False)
     left = np.abs(found.fitted.errors).max() if found.fitted is not None else 0.0
     if left > _LEFT:
         raise InputError(
