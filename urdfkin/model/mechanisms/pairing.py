@@ -99,6 +99,22 @@ class Pairing:
         )
         return next(shapes) == next(shapes)
 
+    def alike(self, bodies: tuple[int, int], e: Edge, f: Edge) -> bool:
+        """Whether as many joints of the same kinds hang on two joints at two bodies."""
+        return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
+
+    def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
+        """Whether each axis at a body of A has one of B's at it, B's home moved by X."""
+        at = np.eye(4)
+        return all(
+            any(
+                family(self.a.joint(e).kind) == family(self.b.joint(f).kind)
+                and self._tolerance.holds(*self.mismatch(e, f, at, X))
+                for f in self.b.edges_of[bodies[1]]
+            )
+            for e in self.a.edges_of[bodies[0]]
+        )
+
     def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
         """Joints at a body of B that no given name tells about, the most like one of A first.
 

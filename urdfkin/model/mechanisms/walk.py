@@ -10,7 +10,7 @@ from typing import TypeVar
 from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Gauge, Step
 from urdfkin.model.mechanisms.congruence import Congruence
 from urdfkin.model.mechanisms.conversion import Conversion, onto_plane, undoing
-from urdfkin.model.mechanisms.guesses import behind, laid, zeros
+from urdfkin.model.mechanisms.guesses import behind, laid, laid_by_siblings, zeros
 from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, Tolerance, size_of
 from urdfkin.model.mechanisms.pairing import Came, Pair, Pairing, family
 from urdfkin.model.mechanisms.rigid import along, apart, between, turn_about
@@ -19,6 +19,8 @@ from urdfkin.model.tree import FloatArray
 
 #: What the next axis leaves open, so many joints ahead decide.
 AHEAD = 6
+#: So many places for B's root are tried in which all axes of one body lie on axes of A's.
+MOST_LAID = 48
 #: What is off by less than this of what something else is fits twice as well: only that is better.
 TWICE_AS_WELL = 0.5
 
@@ -135,6 +137,8 @@ class Walk:
             scored.append((0.0, place, self._score(place)))
         best = _best_of(scored)[2] if scored else (0, 0.0)
         yield from (place.XC for _, place, score in scored if not better(best, score))
+        siblings = laid_by_siblings(self.a, self.b, base, lambda e, f: self.pairing.alike(base, e, f))
+        yield from islice((X for X in siblings if self.pairing.all_lie_alike(base, X)), MOST_LAID)
 
     # -- the walk ------------------------------------------------------------------------------------
 
