@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import islice
 
 from urdfkin.model.mechanisms.alignment import Alignment, Gauge
+from urdfkin.model.mechanisms.free_zeros import zeros_by_rules
 from urdfkin.model.mechanisms.mechanism import Mechanism, Tolerance, tolerance_of
 from urdfkin.model.mechanisms.pairing import Pairing
 from urdfkin.model.mechanisms.walk import TWICE_AS_WELL, Ahead, Walk, better
@@ -44,7 +46,17 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
             found = _laid(a, other, given, None)
             if better((found.matched, found.worst), (best.matched, best.worst)):
                 best = found
-    return _nearly(_exchanged(best, given), given)
+    return _by_rules(_nearly(_exchanged(best, given), given))
+
+
+def _by_rules(best: Alignment) -> Alignment:
+    """The same with zeros that mimic rules give, where all that agreed agrees still."""
+    zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
+    if not zeros:
+        return best
+    gauge = best.gauge
+    found = _laid(best.a, best.b, best.names, replace(gauge, zeros={**gauge.zeros, **zeros}))
+    return found if found.differing <= best.differing and found.worst <= best.worst else best
 
 
 def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
