@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from math import pi, remainder
 from typing import TypeVar
@@ -121,30 +122,31 @@ def laid_by_siblings(
     second, others = rest[0], [i for i in rest[1:] if ours[i].turns][:1]
     theirs = [[(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if alike(edge, f)] for edge in edges]
     for f, axis in theirs[first]:
-        far = list(
-            behind(
-                (a, b),
-                (edges[first], f),
-                (edges[first].beyond(bodies[0]), f.beyond(bodies[1])),
-                (u, axis.screw),
-            )
-        )
+        lines = u, axis.screw
+        pair_of = partial(_seen_from, lines)
+        beyond = edges[first].beyond(bodies[0]), f.beyond(bodies[1])
+        far = list(behind((a, b), (edges[first], f), beyond, lines))
         for start, (g, other) in product((axis.screw, axis.screw.reversed()), theirs[second]):
             if g is f:
                 continue
-            pair = replace(ours[second], seen=u), replace(other, seen=axis.screw)
+            pair = pair_of(ours[second], other)
             more = [
-                (replace(ours[i], seen=u), replace(one, seen=axis.screw))
-                for i in others
-                for h, one in theirs[i]
-                if h is not f and h is not g
+                pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
             ]
+            if not ours[second].turns:  # a slide across the first axis leaves heights along it as they are
+                carried = edges[second].beyond(bodies[0]), g.beyond(bodies[1])
+                led = _led_on((a, b), (edges[second], g), carried)
+                more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
             K = between(start, u, turns=True)[0]
             for turn in zeros(u, pair[0], pair[1].moved(K), turns=True):
                 X = along(u, turn, turns=True) @ K
                 ways = list(zeros(u, pair[0], pair[1].moved(X), turns=False))
                 for way in ways or _guesses(u, [*more, *far], X, turns=False):
                     yield along(u, way, turns=False) @ X
+
+
+def _seen_from(lines: Both[Screw], ours: Axis, theirs: Axis) -> Both[Axis]:
+    return replace(ours, seen=lines[0]), replace(theirs, seen=lines[1])
 
 
 def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:

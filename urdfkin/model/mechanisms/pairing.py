@@ -113,6 +113,7 @@ class Pairing:
                 for f in self.b.edges_of[bodies[1]]
             )
             for e in self.a.edges_of[bodies[0]]
+            if self.a.joint(e).kind.has_axis
         )
 
     def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import chain, islice
 from typing import TypeVar
 
 from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Gauge, Step
@@ -87,25 +87,50 @@ class Walk:
             X = self.gauge.X
             yield base, IDENTITY if self.tolerance.holds(*apart(IDENTITY, X)) else X
             return
-        bases, places = list(self._bases()), dict[tuple[int, int], list[FloatArray]]()
-        for base in bases:
-            if self.pairing.same_shape(base, (None, None)):
-                places[base] = list(self._places(base))
-                exact = (X for X in places[base] if self._exact_pairs(base, (None, None), X) is not None)
-                yield from ((base, X) for X in islice(exact, 1))
+        bases = list(self._bases())
+        if self.exact is not None:
+            exact = self._exact_beginning(bases)
+            if exact is None and self._mimics():
+                self.exact.ignore_rules()
+                exact = self._exact_beginning(bases)
+            if exact is not None:
+                yield exact
         for base in bases:
             tried = list[FloatArray]()
-            for X in places.get(base) or self._places(base):
+            for X in self._places(base):
                 if not any(self.tolerance.holds(*apart(known, X)) for known in tried):
                     tried.append(X)
                     yield base, X
 
+    def _mimics(self) -> bool:
+        return any(joint.mimic is not None for m in (self.a, self.b) for joint in m.tree.joints)
+
+    def _exact_beginning(self, bases: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], FloatArray] | None:
+        """The first pair of bodies and place of B's root with which everything matches."""
+        for base in bases:
+            if self.pairing.same_shape(base, (None, None)):
+                for X in self._exact_places(base):
+                    if self._exact_pairs(base, (None, None), X) is not None:
+                        return base, X
+        return None
+
+    def _exact_places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
+        """Where B's root may stand if everything matches: all axes of the body lie on axes of the other."""
+        yield from self._by_names(base)
+        siblings = laid_by_siblings(self.a, self.b, base, lambda e, f: self.pairing.alike(base, e, f))
+        some = (X for X in chain(siblings, laid(self.a, self.b, base)) if self.pairing.all_lie_alike(base, X))
+        yield from islice(some, MOST_LAID)
+
     def _places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         """Where B's root may stand: where A's does, where links of one name meet, where axes do."""
+        yield from self._by_names(base)
+        yield from self._by_axes(base)
+
+    def _by_names(self, base: tuple[int, int]) -> Iterator[FloatArray]:
+        """Where A's root stands, where links of one name meet."""
         yield IDENTITY
         for link_a, link_b in self.pairing.links(*base):
             yield self.a.homes[link_a] @ inverse(self.b.homes[link_b])
-        yield from self._by_axes(base)
 
     def _bodies_of(self, link_a: str, link_b: str) -> tuple[int, int]:
         a, b = self.a, self.b
@@ -137,8 +162,6 @@ class Walk:
             scored.append((0.0, place, self._score(place)))
         best = _best_of(scored)[2] if scored else (0, 0.0)
         yield from (place.XC for _, place, score in scored if not better(best, score))
-        siblings = laid_by_siblings(self.a, self.b, base, lambda e, f: self.pairing.alike(base, e, f))
-        yield from islice((X for X in siblings if self.pairing.all_lie_alike(base, X)), MOST_LAID)
 
     # -- the walk ------------------------------------------------------------------------------------
 
@@ -184,7 +207,7 @@ class Walk:
             return
         homes = self.a.homes[came[0].joint + 1], self.b.homes[f.joint + 1]
         plane = undoing(inverse(X @ homes[1]) @ homes[0]) if kind == "planar" else None
-        for N in self._behind(there, homes[0], homes[1], plane):
+        for N in self._behind(there, homes[0], homes[1], plane, self._exact_places(beyond)):
             yield homes[0] @ N @ inverse(homes[1])
 
     def _frames(self, place: Place, found: Alignment) -> None:
@@ -287,7 +310,8 @@ class Walk:
         elif exact is not None:
             tried = [inverse(at) @ exact @ homes[1]]
         else:
-            tried = self._behind(there, at, homes[1], undoing(M) if kind == "planar" else None)
+            plane = undoing(M) if kind == "planar" else None
+            tried = self._behind(there, at, homes[1], plane, self._by_axes(there.bodies))
         places = ((N, replace(there, XC=at @ N @ inverse(homes[1]))) for N in tried)
         N, moved, score = self._best(places, depth)
         # Outwards, P_b^(1 or -1) = M P_a^(1 or -1) N.
@@ -298,7 +322,12 @@ class Walk:
         return replace(step, conversion=Conversion(before, behind, back)), moved, score
 
     def _behind(
-        self, there: Place, at: FloatArray, home_b: FloatArray, plane: FloatArray | None
+        self,
+        there: Place,
+        at: FloatArray,
+        home_b: FloatArray,
+        plane: FloatArray | None,
+        laid_behind: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
         """N to try: none, all as it stands at home, those with which a link or an axis behind agrees.
 
@@ -307,14 +336,14 @@ class Walk:
             at: (4, 4) the joint's frame.
             home_b: (4, 4) B's own.
             plane: (4, 4) what a planar joint's N is, but for motions in its plane.
+            laid_behind: (4, 4) where B's axes behind the joint lie on A's.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]
         wanted += [
             there.G @ self.a.homes[i] @ inverse(self.b.homes[j]) for i, j in self.pairing.links(*there.bodies)
         ]
-        wanted += [there.G @ X for X in self._by_axes(there.bodies)]
-        for XC in wanted:
+        for XC in chain(wanted, (there.G @ X for X in laid_behind)):
             N = inverse(at) @ XC @ home_b
             yield N if plane is None else plane @ onto_plane(inverse(plane) @ N)
 
