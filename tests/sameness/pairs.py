@@ -345,6 +345,13 @@ def robot(name: str) -> Robot:
         return urdfkin.load(to_urdf(bounded(tree)), verify=False)
 
 
+def loaded(tree: KinematicTree) -> Robot:
+    """The robot of a tree, unverified."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(to_urdf(tree), verify=False)
+
+
 def changed(name: str, what: str) -> Robot | None:
     """The robot after a change by its name; None where there is nothing to change."""
     change = (ALIKE | UNLIKE)[what]

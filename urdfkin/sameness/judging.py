@@ -36,6 +36,8 @@ from urdfkin.verify.pinocchio_module import version
 CONFIRMED = 8
 #: Frames that are far off at random configurations, one of which is the farthest.
 FARTHEST = 4
+#: Metres: squares of longer ways overflow.
+LONGEST = 1e150
 #: How near to what a search finds a bound is near enough.
 NEAR = 1.05
 
@@ -114,6 +116,14 @@ class Judge:
         parting = _fixed_here(trees[0], trees[1]), _fixed_here(trees[1], trees[0])
         self.mechanisms = Mechanism(trees[0], parting[0]), Mechanism(trees[1], parting[1])
         self.trees = trees
+        for which, mechanism, robot in zip("AB", self.mechanisms, robots, strict=True):
+            if not mechanism.size <= LONGEST:
+                raise InputError(
+                    f"a way from the root to a link is longer than {LONGEST:g} m: its square is no double",
+                    where=f"model {which}, {robot.name}",
+                    found=f"{mechanism.size:.6g} m",
+                    remedy="write origins in metres",
+                )
         self.tolerance: Tolerance = tolerance_of(*self.mechanisms)
 
     def judged(self) -> Sameness:
