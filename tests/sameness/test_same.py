@@ -258,6 +258,14 @@ FORGED: dict[str, Any] = {
     "rounding: the models say otherwise": lambda d: d["rounding"].update(metres=1.0),
     "base_links: the models say otherwise": lambda d: d.update(base_links=["tool"] * 2),
     "base: no rigid motion": lambda d: d["base"][2].__setitem__(2, -1.0),
+    "model A: its name is": lambda d: d["a"].update(name="another"),
+    "otherwise of the size": lambda d: d["differences"][0].update(radians=1e-6),
+    "the size of": lambda d: d["differences"][0].update(metres=0.5),
+    "one is named twice": lambda d: d["differences"].append(d["differences"][0]),
+    "no confirmation": lambda d: d.update(checked="Pinocchio finds nothing"),
+    "checked: Pinocchio finds at most": lambda d: d.update(
+        checked="Pinocchio 4.1.0 finds at most 1e-19 m at 8 configurations, within the bounds"
+    ),
     "orders: axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),
 }
 
@@ -269,6 +277,22 @@ def test_a_forged_certificate_does_not(compared: tuple[Robot, Robot, dict[str, A
     forged = copy.deepcopy(document)
     FORGED[said](forged)
     assert any(said in line for line in recheck(forged, a, b))
+
+
+def test_a_certificate_that_does_not_hold_costs_no_search_in_boxes(
+    compared: tuple[Robot, Robot, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a, b, document = compared
+    asked = list[str]()
+    monkeypatch.setattr("urdfkin.sameness.certificate.tightened", lambda *_: asked.append("boxes"))
+    forged = copy.deepcopy(document)
+    forged["base"][0][3] += 0.25
+    assert recheck(forged, a, b)
+    forged = copy.deepcopy(document)
+    for frame in forged["frames"]:  # less than some configurations attain, and a lower bound to match
+        frame["lower"], frame["upper"] = 0.1 * frame["lower"], 0.5 * frame["upper"]
+    assert any("is not proven" in line for line in recheck(forged, a, b))
+    assert asked == []
 
 
 def test_a_certificate_that_names_what_is_not_there_is_refused(

@@ -276,9 +276,7 @@ class Judge:
         for robot in self.robots:
             if (reason := robot.verifier.cannot()) is not None:
                 return f"not verified by Pinocchio: {reason}"
-        search = self.search(found, variables)
-        q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
-        off = search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0)
+        off = self.asked(found, variables)
         for interval, metres in zip(frames, off, strict=False):
             if metres > interval.upper * (1.0 + EPS):
                 raise UrdfkinError(
@@ -289,6 +287,12 @@ class Judge:
                 )
         seen = f"{off.max(initial=0.0):.2g} m"
         return f"Pinocchio {version()} finds at most {seen} at {CONFIRMED} configurations, within the bounds"
+
+    def asked(self, found: Alignment, variables: Variables) -> FloatArray:
+        """(frames,) how far off (m) Pinocchio finds each frame at most at the configurations that confirm."""
+        search = self.search(found, variables)
+        q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
+        return np.asarray(search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0))
 
 
 def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
