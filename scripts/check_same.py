@@ -4,11 +4,11 @@
     python scripts/check_same.py --keep pairs.jsonl panda    # of some robots alone
     python scripts/check_same.py --keep pairs.jsonl --tell   # the figures of docs/same.md, nothing computed
 
-Twenty changes, ten of which leave a robot the same (`tests/sameness/pairs.py`). Where it stays the same, all
-links are placed at random configurations as `same` says they must be. Where it does not, a global search of
-another kind than the product's looks for the largest distance of the frame that is said to be farthest, and
-computes it at fifty digits from the decimals of both texts: it must lie in the interval. Exit 1 where it does
-not, or a verdict is wrong.
+Twenty-one changes, eleven of which leave a robot the same (`tests/sameness/pairs.py`). Where it stays the
+same, all links are placed at random configurations as `same` says they must be. Where it does not, a global
+search of another kind than the product's looks for the largest distance of the frame that is said to be
+farthest, and computes it at fifty digits from the decimals of both texts: it must lie in the interval. Exit
+1 where it does not, or a verdict is wrong.
 """
 
 from __future__ import annotations

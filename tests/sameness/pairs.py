@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import cache, partial, reduce
 
@@ -74,7 +74,13 @@ def merged(tree: KinematicTree) -> KinematicTree:
 
 def flipped(tree: KinematicTree) -> KinematicTree:
     """Every other axis turned round, so that the coordinate counts the other way."""
-    turned = {joint.name for i, joint in enumerate(tree.joints) if joint.kind.has_axis and i % 2}
+    return with_axes_reversed(
+        tree, {joint.name for i, joint in enumerate(tree.joints) if joint.kind.has_axis and i % 2}
+    )
+
+
+def with_axes_reversed(tree: KinematicTree, turned: Collection[str]) -> KinematicTree:
+    """Some axes turned round."""
 
     def one(joint: Joint) -> Joint:
         if joint.mimic is not None:
@@ -94,11 +100,18 @@ def flipped(tree: KinematicTree) -> KinematicTree:
 
 def shifted(tree: KinematicTree) -> KinematicTree:
     """Every other joint's zero elsewhere: its coordinate reads more by 0.7 rad, or 0.07 m, at one place."""
-    off = {
-        joint.name: 0.7 if joint.kind.turns else 0.07
-        for i, joint in enumerate(tree.joints)
-        if joint.kind.has_axis and not i % 2
-    }
+    return with_zeros_moved(
+        tree,
+        {
+            joint.name: 0.7 if joint.kind.turns else 0.07
+            for i, joint in enumerate(tree.joints)
+            if joint.kind.has_axis and not i % 2
+        },
+    )
+
+
+def with_zeros_moved(tree: KinematicTree, off: Mapping[str, float]) -> KinematicTree:
+    """Some joints' zeros elsewhere, so that their coordinates read more."""
 
     def one(joint: Joint) -> Joint:
         if joint.mimic is not None:  # its own value reads off[name] more, its leader's off[leader] more
@@ -119,7 +132,11 @@ def shifted(tree: KinematicTree) -> KinematicTree:
 def renamed(tree: KinematicTree) -> KinematicTree:
     """Other names for all joints and links, and so another order of siblings and of coordinates."""
     joints = {joint.name: f"j{len(tree.joints) - i:03d}" for i, joint in enumerate(tree.joints)}
-    links = {link: f"part{i}" for i, link in enumerate(tree.links)}
+    return with_names(tree, joints, {link: f"part{i}" for i, link in enumerate(tree.links)})
+
+
+def with_names(tree: KinematicTree, joints: Mapping[str, str], links: Mapping[str, str]) -> KinematicTree:
+    """All joints and links under other names."""
     rows = []
     for joint, parent, child in branches(tree):
         rule = joint.mimic and replace(joint.mimic, leader=joints[joint.mimic.leader])
@@ -278,6 +295,23 @@ def everything(tree: KinematicTree) -> KinematicTree:
     return reduce(lambda changed, change: change(changed), changes, tree)
 
 
+def disguised(tree: KinematicTree, seed: int = 0) -> KinematicTree:
+    """Random senses, zeros and names, on a stand, each moving joint split."""
+    rng = np.random.default_rng(seed)
+    with_axis = [joint for joint in tree.joints if joint.kind.has_axis]
+    tree = with_axes_reversed(tree, {joint.name for joint in with_axis if rng.random() < 0.5})
+    turns = (0.5 * np.pi, np.pi, -0.5 * np.pi)
+    off = {
+        joint.name: float(rng.choice([*turns, rng.uniform(-3.0, 3.0)]) * (1.0 if joint.kind.turns else 0.05))
+        for joint in with_axis
+        if rng.random() < 0.6
+    }
+    tree = on_a_stand(split(with_zeros_moved(tree, off)))
+    joints = {joint.name: f"j{k:03d}" for joint, k in zip(tree.joints, rng.permutation(1000), strict=False)}
+    links = {link: f"part{k}" for link, k in zip(tree.links, rng.permutation(1000), strict=False)}
+    return with_names(tree, joints, links)
+
+
 #: Changes that leave a robot the same.
 ALIKE: dict[str, Change] = {
     "base moved": on_a_stand,
@@ -290,6 +324,7 @@ ALIKE: dict[str, Change] = {
     "counted elsewhere": counted_elsewhere,
     "slides exchanged": exchanged,
     "all of it": everything,
+    "all of it, no name left": disguised,
 }
 #: Changes that do not; a file rounded to four digits may be what it was.
 UNLIKE: dict[str, Change] = {
@@ -308,6 +343,13 @@ def robot(name: str) -> Robot:
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
         tree = urdfkin.load(name, verify=False).tree
         return urdfkin.load(to_urdf(bounded(tree)), verify=False)
+
+
+def loaded(tree: KinematicTree) -> Robot:
+    """The robot of a tree, unverified."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(to_urdf(tree), verify=False)
 
 
 def changed(name: str, what: str) -> Robot | None:

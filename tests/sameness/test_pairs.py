@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,6 +87,30 @@ def test_a_robot_is_found_again_though_no_name_zero_sense_and_base_is_left(name:
     T_b = b.placement(found.to_b(q), [base, *(f"link:{theirs}" for _, theirs in links)])
     home = found.base @ b.placement(b.neutral(), base)
     np.testing.assert_allclose(T_a, home @ np.linalg.inv(T_b[:, :1]) @ T_b[:, 1:], atol=1e-10)
+
+
+ANY_POSE = ["human", "icub", "romeo", "pr2", "tiago_pro", "tiago_dual", "g1_with_hands"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", ANY_POSE)
+def test_a_robot_of_many_joints_whose_names_zeros_and_senses_are_random_is_found_again_in_seconds(
+    name: str, seed: int
+) -> None:
+    b = pairs.loaded(pairs.disguised(robot(name).tree, seed))
+    began = time.process_time()
+    found = urdfkin.same(robot(name), b, bounds=False)
+    assert found.verdict is Verdict.SAME_AFTER, found.differences[:3]
+    assert time.process_time() - began <= 5.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["panda", "pr2", "talos"])
+def test_a_mimic_joint_that_moves_by_a_tenth_more_is_found_out_though_no_name_is_left(name: str) -> None:
+    b = pairs.loaded(pairs.disguised(pairs.with_another_rule(robot(name).tree), 1))
+    found = urdfkin.same(robot(name), b, bounds=False)
+    assert {one.what for one in found.differences} == {"mimic rule"}
 
 
 @pytest.mark.parametrize("seed", range(4))

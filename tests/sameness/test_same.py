@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from tests.cli.running import urdfkin as run
 from tests.sameness import pairs
 from tests.sameness.pairs import changed, robot
 from urdfkin.model.mechanisms.conversion import Conversion
+from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import JointKind
 from urdfkin.report.certificates import read_certificate
 from urdfkin.robot import Robot
@@ -140,6 +142,78 @@ def test_it_is_quick(name: str, seconds: float) -> None:
     assert time.process_time() - began <= seconds
 
 
+FINGERS = (
+    "<robot name='g'><link name='{0[0]}'/><link name='{0[1]}'/><link name='{0[2]}'/>"
+    "<joint name='{1[0]}' type='revolute'><parent link='{0[0]}'/><child link='{0[1]}'/>"
+    "<origin xyz='-0.03 0 0.05' rpy='0 {2} 0'/><axis xyz='0 -1 0'/>"
+    "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint>"
+    "<joint name='{1[1]}' type='revolute'><parent link='{0[0]}'/><child link='{0[2]}'/>"
+    "<origin xyz='0.03 0 0.05'/><axis xyz='0 1 0'/><limit lower='-1' upper='1' effort='1' velocity='1'/>"
+    "<mimic joint='{1[0]}' multiplier='{3}' offset='{4}'/></joint></robot>"
+)
+
+
+def test_a_mimic_rule_gives_the_zero_of_a_joint_on_whose_link_nothing_hangs() -> None:
+    a = urdfkin.load(FINGERS.format(("palm", "a", "b"), ("ja", "jb"), 0, 1, 0), verify=False)
+    shifted = FINGERS.format(("L0", "L1", "L2"), ("k1", "k2"), -0.5, 1, 0.5)
+    found = urdfkin.same(a, urdfkin.load(shifted, verify=False))
+    assert found.verdict is Verdict.SAME_AFTER, found.differences
+    assert found.after == ("q[k1] = q[ja] - 0.5",)
+
+
+@pytest.mark.parametrize(("multiplier", "offset"), [(1.001, 0.0), (1, 0.001)])
+def test_links_of_one_name_fix_the_zero_that_a_mimic_rule_could_give(
+    multiplier: float, offset: float
+) -> None:
+    names = ("palm", "a", "b"), ("ja", "jb")
+    a, b = (
+        urdfkin.load(FINGERS.format(*names, 0, *rule), verify=False)
+        for rule in ((1, 0), (multiplier, offset))
+    )
+    found = urdfkin.same(a, b, bounds=False)
+    assert [one.what for one in found.differences] == ["mimic rule"]
+
+
+def telescope(names: str, x: float) -> Robot:
+    """Four slides along one axis; x: metres that the third one is off."""
+    joints = "".join(
+        f"<link name='l{i + 1}'/><joint name='{name}' type='prismatic'><parent link='l{i}'/>"
+        f"<child link='l{i + 1}'/><origin xyz='{x if i == 2 else 0} 0 0.2'/><axis xyz='0 0 1'/>"
+        f"<limit lower='0' upper='0.3' effort='1' velocity='1'/></joint>"
+        for i, name in enumerate(names)
+    )
+    return urdfkin.load(f"<robot name='t'><link name='l0'/>{joints}</robot>", verify=False)
+
+
+def test_slides_whose_names_agree_are_tried_in_no_other_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = list[tuple[str, ...]]()
+    taken = Mechanism.in_order
+
+    def in_order(mechanism: Mechanism, names: Sequence[str]) -> Mechanism:
+        tried.append(tuple(names))
+        return taken(mechanism, names)
+
+    monkeypatch.setattr(Mechanism, "in_order", in_order)
+    found = urdfkin.same(telescope("abcd", 0.0), telescope("abcd", 0.001), bounds=False)
+    assert found.verdict is Verdict.DIFFERS
+    assert tried == []
+    urdfkin.same(telescope("abcd", 0.0), telescope("badc", 0.001), bounds=False)
+    assert tried == [tuple("abcd"), tuple("dcba")]  # as A has them, from its root or from its tip
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+@pytest.mark.parametrize("compared", [urdfkin.same, urdfkin.diff])
+def test_a_robot_longer_than_a_double_can_square_is_refused(compared: Any) -> None:
+    near, far = (
+        f"<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='fixed'><parent link='a'/>"
+        f"<child link='b'/><origin xyz='0 0 {z}'/></joint></robot>"
+        for z in ("1", "1e308")
+    )
+    robots = [urdfkin.load(text, verify=False) for text in (near, far)]
+    with pytest.raises(urdfkin.InputError, match=r"model B, r: .*found 1e\+308 m"):
+        compared(*robots)
+
+
 # -- certificates ------------------------------------------------------------------------------------
 
 
@@ -184,6 +258,14 @@ FORGED: dict[str, Any] = {
     "rounding: the models say otherwise": lambda d: d["rounding"].update(metres=1.0),
     "base_links: the models say otherwise": lambda d: d.update(base_links=["tool"] * 2),
     "base: no rigid motion": lambda d: d["base"][2].__setitem__(2, -1.0),
+    "model A: its name is": lambda d: d["a"].update(name="another"),
+    "otherwise of the size": lambda d: d["differences"][0].update(radians=1e-6),
+    "the size of": lambda d: d["differences"][0].update(metres=0.5),
+    "one is named twice": lambda d: d["differences"].append(d["differences"][0]),
+    "no confirmation": lambda d: d.update(checked="Pinocchio finds nothing"),
+    "checked: Pinocchio finds at most": lambda d: d.update(
+        checked="Pinocchio 4.1.0 finds at most 1e-19 m at 8 configurations, within the bounds"
+    ),
     "orders: axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),
 }
 
@@ -195,6 +277,22 @@ def test_a_forged_certificate_does_not(compared: tuple[Robot, Robot, dict[str, A
     forged = copy.deepcopy(document)
     FORGED[said](forged)
     assert any(said in line for line in recheck(forged, a, b))
+
+
+def test_a_certificate_that_does_not_hold_costs_no_search_in_boxes(
+    compared: tuple[Robot, Robot, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a, b, document = compared
+    asked = list[str]()
+    monkeypatch.setattr("urdfkin.sameness.certificate.tightened", lambda *_: asked.append("boxes"))
+    forged = copy.deepcopy(document)
+    forged["base"][0][3] += 0.25
+    assert recheck(forged, a, b)
+    forged = copy.deepcopy(document)
+    for frame in forged["frames"]:  # less than some configurations attain, and a lower bound to match
+        frame["lower"], frame["upper"] = 0.1 * frame["lower"], 0.5 * frame["upper"]
+    assert any("is not proven" in line for line in recheck(forged, a, b))
+    assert asked == []
 
 
 def test_a_certificate_that_names_what_is_not_there_is_refused(

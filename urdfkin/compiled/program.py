@@ -7,7 +7,7 @@ on from one link to the next in registers; where the tree branches, the state is
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -146,9 +146,9 @@ class _Writer:
     def _write(self) -> None:
         """Steps and frames in the order in which they are met."""
         events = list(self._events())
-        origins = [origin for origin, _, _ in events]
+        last = {origin: k for k, (origin, _, _) in enumerate(events)}
         now, c = -1, 0
-        self._save(-1, origins, 0)
+        self._save(-1, last, 0)
         for k, (origin, step, frame) in enumerate(events):
             if now != origin:
                 self._put(Op.RESUME, self._slot(origin))
@@ -160,7 +160,7 @@ class _Writer:
                 ):
                     self._put(Op.KEEP, self.kept + KEPT_ROWS * c, int(self.plan.columns[c, Column.AXIS]))
                     c += 1
-                self._save(step, origins, k + 1)
+                self._save(step, last, k + 1)
             elif frame is not None and self._frame(frame):
                 now = -2  # the state is the frame's now
 
@@ -174,10 +174,9 @@ class _Writer:
                 yield i, None, f
                 f += 1
 
-    def _save(self, step: int, origins: Sequence[int], following: int) -> None:
-        """Save the state that was just reached, if something goes on from it later."""
-        later = origins[following:]
-        if step in later[1:] or (later and later[0] != step and step in later):
+    def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
+        """Save the state that was just reached, if something goes on from it after the following event."""
+        if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
 
     def _slot(self, step: int) -> int:

@@ -29,6 +29,8 @@ from urdfkin.sameness.lower import Search, urdfkins
 
 #: How many boxes there may be at a time: a second or two of a processor for a frame.
 MOST = 2**17
+#: So many are computed at a time: Jacobians of more would take gigabytes.
+TOGETHER = 2**16
 
 
 class Boxes:
@@ -124,7 +126,8 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
         c[::2, i] -= h[i]
         c[1::2, i] += h[i]
         if (rest := 0.5 * float(h @ M @ h)) < upper:
-            proven = np.minimum(proven, boxes.bounds(c, h) + rest)
+            bounds = [boxes.bounds(c[k : k + TOGETHER], h) for k in range(0, len(c), TOGETHER)]
+            proven = np.minimum(proven, np.concatenate(bounds) + rest)
             keep = proven > target
             c, proven = c[keep], proven[keep]
     return float(proven.max(initial=target))

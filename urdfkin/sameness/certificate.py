@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -15,11 +16,11 @@ from urdfkin.model.mechanisms.alignment import Alignment, FramePair, Gauge
 from urdfkin.model.mechanisms.conversion import Conversion, is_pose
 from urdfkin.model.mechanisms.rigid import apart
 from urdfkin.model.mechanisms.upper import COARSE, FINE, upper_bounds
-from urdfkin.model.mechanisms.variables import variables_of
+from urdfkin.model.mechanisms.variables import Variables, variables_of
 from urdfkin.model.tree import JointKind
 from urdfkin.robot import Robot
 from urdfkin.sameness.boxes import tightened
-from urdfkin.sameness.judging import Judge, digest
+from urdfkin.sameness.judging import CONFIRMED, Judge, digest
 from urdfkin.sameness.lower import Search, pinocchios, urdfkins
 from urdfkin.sameness.result import Difference, Interval, JointMap, Sameness
 
@@ -29,6 +30,12 @@ MOST_AGAIN = 2**22
 _ALIKE, _ZERO = 1e-9, 1e-15
 #: By how many eps of it a bound that is proven again may be larger: its sums may round otherwise elsewhere.
 _LAST_BITS = 64.0
+#: What is said of Pinocchio, and up to what share its two digits tell a number.
+_CONFIRMATION = (
+    r"Pinocchio \S+ finds at most (?P<metres>\d+(\.\d+)?(e[+-]?\d+)?) m at (?P<count>\d+) configurations, "
+    "within the bounds"
+)
+_TWO_DIGITS = 0.06
 #: The layout of the document, and its version.
 LAYOUT = "urdfkin-same-1"
 #: Parts that follow from how the models are laid on each other.
@@ -123,16 +130,8 @@ def _against(document: Mapping[str, Any], judge: Judge) -> Iterator[str]:
     found = align(*judge.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, gauge)
     variables = variables_of(found, judge.tolerance)
     said = judge.said(found, variables)
-    wrong = [one.words for one in said.differences]
-    claimed = [one["words"] for one in document["differences"]]
-    yield from (f"not named as a difference: {words}" for words in wrong if words not in claimed)
-    yield from (f"no difference: {words}" for words in claimed if words not in wrong)
-    if document["verdict"] != said.verdict.value:
-        yield f"the verdict is {said.verdict.value}, not {document['verdict']}"
-    again = certificate(said)
-    yield from (
-        f"{part}: the models say otherwise" for part in DERIVED if not _alike(document[part], again[part])
-    )
+    wrong = list(_said_against(document, judge, said))
+    yield from wrong
     claims = {(frame["a"], frame["b"]): frame for frame in document["frames"]}
     if len(claims) < len(document["frames"]):
         yield "a frame has two intervals"
@@ -141,10 +140,58 @@ def _against(document: Mapping[str, Any], judge: Judge) -> Iterator[str]:
         if (claim := claims.pop(names, None)) is None:
             yield f"frame {names[0]} has no interval"
         else:
-            yield from _interval_against(search, frame, claim, said.rounding)
+            yield from _interval_against(search, frame, claim, said.rounding, sharply=not wrong)
     yield from (f"frame {names[0]} is not one of both models" for names in claims)
     if document["as_written"] is not None:
-        yield from _as_written_against(document["as_written"], judge, found)
+        yield from _as_written_against(document["as_written"], judge, found, sharply=not wrong)
+    yield from _confirmation_against(document["checked"], judge, found, variables)
+
+
+def _said_against(document: Mapping[str, Any], judge: Judge, said: Sameness) -> Iterator[str]:
+    """What does not hold of names, verdict, differences and all else that costs nothing to compute."""
+    for which, robot in zip("ab", judge.robots, strict=True):
+        if document[which]["name"] != robot.name:
+            yield f"model {which.upper()}: its name is {robot.name}, not {document[which]['name']}"
+    again = certificate(said)
+    wrong = {one["words"]: one for one in again["differences"]}
+    claimed = {one["words"]: one for one in document["differences"]}
+    yield from (f"not named as a difference: {words}" for words in wrong if words not in claimed)
+    yield from (f"no difference: {words}" for words in claimed if words not in wrong)
+    if len(claimed) < len(document["differences"]):
+        yield "differences: one is named twice"
+    for words, one in claimed.items():
+        if words in wrong and not _same_difference(one, wrong[words], said.rounding):
+            yield f"differences: the models say otherwise of the size of: {words}"
+    if document["verdict"] != said.verdict.value:
+        yield f"the verdict is {said.verdict.value}, not {document['verdict']}"
+    yield from (
+        f"{part}: the models say otherwise" for part in DERIVED if not _alike(document[part], again[part])
+    )
+
+
+def _same_difference(
+    claimed: Mapping[str, Any], said: Mapping[str, Any], rounding: tuple[float, float]
+) -> bool:
+    """Whether place, parameter and sizes of a difference are the same, these but for rounding."""
+    sizes = zip(("metres", "radians"), rounding, strict=True)
+    return all(claimed[part] == said[part] for part in ("place", "what")) and all(
+        math.isclose(claimed[part], said[part], rel_tol=_ALIKE, abs_tol=most) for part, most in sizes
+    )
+
+
+def _confirmation_against(
+    claimed: str, judge: Judge, found: Alignment, variables: Variables
+) -> Iterator[str]:
+    """What does not hold of Pinocchio's confirmation; one that says that it was not asked claims nothing."""
+    if claimed.startswith(("not asked of Pinocchio: ", "not verified by Pinocchio: ")):
+        return
+    said = re.fullmatch(_CONFIRMATION, claimed)
+    if said is None or int(said["count"]) != CONFIRMED:
+        yield "checked: no confirmation that urdfkin writes"
+        return
+    off, rounding = float(judge.asked(found, variables).max(initial=0.0)), judge.rounding(found, variables)[0]
+    if not math.isclose(float(said["metres"]), off, rel_tol=_TWO_DIGITS, abs_tol=rounding):
+        yield f"checked: Pinocchio finds at most {off:.2g} m, not {said['metres']} m"
 
 
 def _gauge(document: Mapping[str, Any]) -> Gauge:
@@ -192,7 +239,9 @@ def _alike(claimed: Any, said: Any) -> bool:
     return bool(claimed == said)
 
 
-def _as_written_against(claim: Mapping[str, Any], judge: Judge, found: Alignment) -> Iterator[str]:
+def _as_written_against(
+    claim: Mapping[str, Any], judge: Judge, found: Alignment, *, sharply: bool
+) -> Iterator[str]:
     """What does not hold of how far a frame is off with nothing put right."""
     written = judge.as_written(found)
     variables = variables_of(written, judge.tolerance)
@@ -201,32 +250,53 @@ def _as_written_against(claim: Mapping[str, Any], judge: Judge, found: Alignment
         yield f"as written: frame {claim['a']} is not one of both models"
         return
     frame = written.frames[names.index((claim["a"], claim["b"]))]
-    against = _interval_against(
-        judge.search(written, variables), frame, claim, judge.rounding(written, variables)
-    )
+    search, rounding = judge.search(written, variables), judge.rounding(written, variables)
+    against = _interval_against(search, frame, claim, rounding, sharply=sharply)
     yield from (f"as written: {line}" for line in against)
 
 
 def _interval_against(
-    search: Search, frame: FramePair, claim: Mapping[str, Any], rounding: tuple[float, float]
+    search: Search,
+    frame: FramePair,
+    claim: Mapping[str, Any],
+    rounding: tuple[float, float],
+    *,
+    sharply: bool,
 ) -> Iterator[str]:
-    """What does not hold of an interval: its upper bounds are proven again, its lower one is computed."""
+    """What does not hold of an interval: its lower bound is computed, its upper ones are proven again.
+
+    Args:
+        search: Both robots.
+        frame: The frame.
+        claim: What the document says of it.
+        rounding: (m, rad) that is taken for none.
+        sharply: Whether an upper bound that costs boxes is proven; in vain where another part is wrong.
+    """
+    against = list[str]()
+    if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
+        against += _not_attained(search, frame, claim, rounding)
+    yield from against
     metres = (math.inf if claim["upper"] is None else claim["upper"]) - rounding[0]
     radians = (math.inf if claim["radians"] is None else claim["radians"]) - rounding[1]
     for grid in (COARSE, FINE):
         proven = upper_bounds(search.found, search.variables, frame, grid)
         if holds := _within(proven[0], metres, rounding[0]) and _within(proven[1], radians, rounding[1]):
             break
-    # A claim below what is attained is not searched for: no search could prove it.
-    possible = metres >= claim["lower"] - rounding[0]
-    if not holds and possible and _within(proven[1], radians, rounding[1]):
+    if holds:
+        return
+    place = f"frame {claim['a']}"
+    if _within(proven[1], radians, rounding[1]):
+        if against or not sharply:
+            return
+        # A claim below what is attained is not searched for: no search could prove it.
+        attained = max(claim["lower"], float(search.seen([frame])[0].max()))
+        if metres < attained - 2.0 * rounding[0]:
+            yield f"{place}: its upper bound is not proven, it is {attained:.6g} m off somewhere"
+            return
         proven = tightened(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
-        holds = _within(proven[0], metres, rounding[0])
-    if not holds:
-        are = f"{proven[0]:.6g} m and {proven[1]:.6g} rad are"
-        yield f"frame {claim['a']}: its upper bound is not proven, {are}"
-    if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
-        yield from _not_attained(search, frame, claim, rounding)
+        if _within(proven[0], metres, rounding[0]):
+            return
+    yield f"{place}: its upper bound is not proven, {proven[0]:.6g} m and {proven[1]:.6g} rad are"
 
 
 def _not_attained(

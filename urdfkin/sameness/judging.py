@@ -36,6 +36,8 @@ from urdfkin.verify.pinocchio_module import version
 CONFIRMED = 8
 #: Frames that are far off at random configurations, one of which is the farthest.
 FARTHEST = 4
+#: Metres: squares of longer ways overflow.
+LONGEST = 1e150
 #: How near to what a search finds a bound is near enough.
 NEAR = 1.05
 
@@ -124,6 +126,14 @@ class Judge:
         parting = _fixed_here(trees[0], trees[1]), _fixed_here(trees[1], trees[0])
         self.mechanisms = Mechanism(trees[0], parting[0]), Mechanism(trees[1], parting[1])
         self.trees = trees
+        for which, mechanism, robot in zip("AB", self.mechanisms, robots, strict=True):
+            if not mechanism.size <= LONGEST:
+                raise InputError(
+                    f"a way from the root to a link is longer than {LONGEST:g} m: its square is no double",
+                    where=f"model {which}, {robot.name}",
+                    found=f"{mechanism.size:.6g} m",
+                    remedy="write origins in metres",
+                )
         self.tolerance: Tolerance = tolerance_of(*self.mechanisms)
 
     def judged(self) -> Sameness:
@@ -331,9 +341,7 @@ class Judge:
         for robot in self.robots:
             if (reason := robot.verifier.cannot()) is not None:
                 return f"not verified by Pinocchio: {reason}"
-        search = self.search(found, variables)
-        q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
-        off = search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0)
+        off = self.asked(found, variables)
         for interval, metres in zip(frames, off, strict=False):
             if metres > interval.upper * (1.0 + EPS):
                 raise UrdfkinError(
@@ -344,6 +352,12 @@ class Judge:
                 )
         seen = f"{off.max(initial=0.0):.2g} m"
         return f"Pinocchio {version()} finds at most {seen} at {CONFIRMED} configurations, within the bounds"
+
+    def asked(self, found: Alignment, variables: Variables) -> FloatArray:
+        """(frames,) how far off (m) Pinocchio finds each frame at most at the configurations that confirm."""
+        search = self.search(found, variables)
+        q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
+        return np.asarray(search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0))
 
 
 def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 
 from urdfkin.model.mechanisms.alignment import Alignment, Gauge
+from urdfkin.model.mechanisms.free_zeros import zeros_by_rules
 from urdfkin.model.mechanisms.mechanism import Mechanism, Tolerance, tolerance_of
 from urdfkin.model.mechanisms.pairing import Pairing
 from urdfkin.model.mechanisms.walk import TWICE_AS_WELL, Ahead, Walk, better
@@ -38,13 +40,45 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
         if best.complete:
             break
         as_it_is, run = best.b, next(orders)
-        for names in islice(orders, MOST_ORDERS):
+        for names in _orders_to_try(a, as_it_is, given, run, orders):
             moved = [k for k, name in enumerate(names) if name != run[k]]
             other = as_it_is.in_order(names[moved[0] : moved[-1] + 1])
             found = _laid(a, other, given, None)
             if better((found.matched, found.worst), (best.matched, best.worst)):
                 best = found
-    return _nearly(_exchanged(best, given), given)
+    return _by_rules(_nearly(_exchanged(best, given), given))
+
+
+def _orders_to_try(
+    a: Mechanism, b: Mechanism, given: Mapping[str, str], run: Sequence[str], orders: Iterator[list[str]]
+) -> Iterator[Sequence[str]]:
+    """Other orders of a run of B's joints: the one of A where A has all their names, else any.
+
+    Args:
+        a: One.
+        b: The other.
+        given: Joints of A and their names in B.
+        run: Names of B's joints, from the inner body outwards.
+        orders: All other orders that their axes allow.
+    """
+    called = {given.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
+    if not all(name in called for name in run):
+        yield from islice(orders, MOST_ORDERS)
+        return
+    named = sorted(run, key=called.__getitem__)
+    if list(run) in (named, named[::-1]):
+        return
+    yield from (order for order in (named, named[::-1]) if b.may_be_taken(order, tolerance_of(a, b)))
+
+
+def _by_rules(best: Alignment) -> Alignment:
+    """The same with zeros that mimic rules give, where all that agreed agrees still."""
+    zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
+    if not zeros:
+        return best
+    gauge = best.gauge
+    found = _laid(best.a, best.b, best.names, replace(gauge, zeros={**gauge.zeros, **zeros}))
+    return found if found.differing <= best.differing and found.worst <= best.worst else best
 
 
 def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:

@@ -139,6 +139,13 @@ class Alignment:
         return alike and not (self.worst or self.only_a or self.only_b)
 
     @property
+    def differing(self) -> int:
+        """How many joints and links differ."""
+        return sum(step.differs or bool(step.unlike) for step in self.steps) + sum(
+            frame.differs for frame in self.frames
+        )
+
+    @property
     def size(self) -> float:
         """Metres: what angles are counted with."""
         return size_of(self.a, self.b)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from math import pi, remainder
 from typing import TypeVar
@@ -97,6 +98,64 @@ def laid(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
                 X = along(ours.screw, turn, turns=True) @ K
                 for way in _guesses(ours.screw, seen, X, turns=False):
                     yield along(ours.screw, way, turns=False) @ X
+
+
+def laid_by_siblings(
+    a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
+) -> Iterator[FloatArray]:
+    """Where B's root may stand for three axes of one body to lie on three of A's, whatever is behind them.
+
+    Args:
+        a: One.
+        b: The other.
+        bodies: Of both, with several joints each.
+        alike: Whether a joint of A may be one of B.
+    """
+    edges = _with_axes(a, bodies[0])
+    ours = [_axis(a, edge) for edge in edges]
+    turning = [i for i, axis in enumerate(ours) if axis.turns]
+    if len(edges) < 2 or not turning:
+        return
+    first = turning[0]
+    u = ours[first].screw
+    rest = sorted((i for i in range(len(edges)) if i != first), key=lambda i: -_across(u, ours[i].screw))
+    second, others = rest[0], [i for i in rest[1:] if ours[i].turns][:1]
+    theirs = [[(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if alike(edge, f)] for edge in edges]
+    for f, axis in theirs[first]:
+        lines = u, axis.screw
+        pair_of = partial(_seen_from, lines)
+        beyond = edges[first].beyond(bodies[0]), f.beyond(bodies[1])
+        far = list(behind((a, b), (edges[first], f), beyond, lines))
+        for start, (g, other) in product((axis.screw, axis.screw.reversed()), theirs[second]):
+            if g is f:
+                continue
+            pair = pair_of(ours[second], other)
+            more = [
+                pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
+            ]
+            if not ours[second].turns:  # a slide across the first axis leaves heights along it as they are
+                carried = edges[second].beyond(bodies[0]), g.beyond(bodies[1])
+                led = _led_on((a, b), (edges[second], g), carried)
+                more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
+            K = between(start, u, turns=True)[0]
+            for turn in zeros(u, pair[0], pair[1].moved(K), turns=True):
+                X = along(u, turn, turns=True) @ K
+                ways = list(zeros(u, pair[0], pair[1].moved(X), turns=False))
+                for way in ways or _guesses(u, [*more, *far], X, turns=False):
+                    yield along(u, way, turns=False) @ X
+
+
+def _seen_from(lines: Both[Screw], ours: Axis, theirs: Axis) -> Both[Axis]:
+    return replace(ours, seen=lines[0]), replace(theirs, seen=lines[1])
+
+
+def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
+    return [edge for edge in mechanism.edges_of[body] if mechanism.joint(edge).kind.has_axis]
+
+
+def _across(u: Screw, s: Screw) -> float:
+    """The sine of the angle between two axes."""
+    return float(np.linalg.norm(np.cross(u.direction, s.direction)))
 
 
 def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: bool) -> list[float]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, Tolerance, between_lines
@@ -35,7 +37,9 @@ class Pairing:
         self._signatures: dict[tuple[bool, int, int], str] = {}
         #: What names alone tell is asked again for thousands of places where a root may stand.
         self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
-        self._by_names: dict[tuple[tuple[int, int], Came], tuple[list[Pair], list[Edge], list[Edge]]] = {}
+        self._by_names = dict[
+            tuple[tuple[int, int], Came], tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]
+        ]()
 
     def links(self, body_a: int, body_b: int) -> tuple[tuple[int, int], ...]:
         """Links of one name on two bodies."""
@@ -50,7 +54,7 @@ class Pairing:
 
     def edges(
         self, bodies: tuple[int, int], came: Came, G: FloatArray, XC: FloatArray
-    ) -> tuple[list[Pair], list[Edge], list[Edge]]:
+    ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         """Joints that lead on from two bodies: pairs, and what is left over of each.
 
         Args:
@@ -59,9 +63,8 @@ class Pairing:
             G: (4, 4) what moves a's home to where b's is.
             XC: (4, 4) what moves b's own home there.
         """
-        if (known := self._by_names.get((bodies, came))) is None:
-            known = self._by_names[bodies, came] = self._named_alike(bodies, came)
-        pairs, left_a, left_b = list(known[0]), known[1], known[2]
+        named, left_a, left_b = self.by_names(bodies, came)
+        pairs = list(named)
         rest = sorted(
             (self._unlikeness(one, other), i, j)
             for i, one in self._standing(self.a, bodies[0], left_a, G)
@@ -80,8 +83,54 @@ class Pairing:
             [edge for j, edge in enumerate(left_b) if j not in taken_b],
         )
 
-    def _named_alike(self, bodies: tuple[int, int], came: Came) -> tuple[list[Pair], list[Edge], list[Edge]]:
+    def by_names(
+        self, bodies: tuple[int, int], came: Came
+    ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         """What `edges` says as far as names tell: the pairs, and what is left for how joints lie."""
+        if (known := self._by_names.get((bodies, came))) is None:
+            known = self._by_names[bodies, came] = self._named_alike(bodies, came)
+        return known
+
+    def same_shape(self, bodies: tuple[int, int], came: Came) -> bool:
+        """Whether as many joints of the same kinds are behind two bodies, branch by branch."""
+        shapes = (
+            sorted(self._signature(m, body, edge) for edge in m.edges_of[body] if edge is not by)
+            for m, body, by in zip((self.a, self.b), bodies, came, strict=True)
+        )
+        return next(shapes) == next(shapes)
+
+    def alike(self, bodies: tuple[int, int], e: Edge, f: Edge) -> bool:
+        """Whether as many joints of the same kinds hang on two joints at two bodies."""
+        return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
+
+    def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
+        """Whether each axis at a body of A has one of B's at it, B's home moved by X."""
+        at = np.eye(4)
+        return all(
+            any(
+                family(self.a.joint(e).kind) == family(self.b.joint(f).kind)
+                and self._tolerance.holds(*self.mismatch(e, f, at, X))
+                for f in self.b.edges_of[bodies[1]]
+            )
+            for e in self.a.edges_of[bodies[0]]
+            if self.a.joint(e).kind.has_axis
+        )
+
+    def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
+        """Joints at a body of B that no given name tells about, the most like one of A first.
+
+        Args:
+            bodies: Of A and of B.
+            e: Joint of A.
+            edges: Joints of B.
+            X: (4, 4) what moves B's home to where A's is.
+        """
+        one = self._standing(self.a, bodies[0], [e], np.eye(4))
+        others = self._standing(self.b, bodies[1], edges, X)
+        ranked = sorted((self._unlikeness(one[0][1], other), j) for j, other in others) if one else []
+        return [edges[j] for _, j in ranked]
+
+    def _named_alike(self, bodies: tuple[int, int], came: Came) -> tuple[list[Pair], list[Edge], list[Edge]]:
         left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not came[0]]
         left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not came[1]]
         pairs: list[Pair] = []
@@ -105,7 +154,7 @@ class Pairing:
                     yield e, f
 
     def _standing(
-        self, mechanism: Mechanism, body: int, edges: list[Edge], T: FloatArray
+        self, mechanism: Mechanism, body: int, edges: Sequence[Edge], T: FloatArray
     ) -> list[tuple[int, _Standing]]:
         """The joints that no given name tells about, moved by T."""
         return [

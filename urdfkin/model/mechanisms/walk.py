@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, islice
 from typing import TypeVar
 
 from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Gauge, Step
+from urdfkin.model.mechanisms.congruence import Congruence
 from urdfkin.model.mechanisms.conversion import Conversion, onto_plane, undoing
-from urdfkin.model.mechanisms.guesses import behind, laid, zeros
+from urdfkin.model.mechanisms.guesses import behind, laid, laid_by_siblings, zeros
 from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Screw, Tolerance, size_of
-from urdfkin.model.mechanisms.pairing import Pairing, family
+from urdfkin.model.mechanisms.pairing import Came, Pair, Pairing, family
 from urdfkin.model.mechanisms.rigid import along, apart, between, turn_about
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 
 #: What the next axis leaves open, so many joints ahead decide.
 AHEAD = 6
+#: So many places for B's root are tried in which all axes of one body lie on axes of A's.
+MOST_LAID = 48
 #: What is off by less than this of what something else is fits twice as well: only that is better.
 TWICE_AS_WELL = 0.5
 
@@ -70,6 +74,8 @@ class Walk:
         self.a, self.b, self.pairing, self.gauge, self.ahead = a, b, pairing, gauge, ahead
         self.tolerance, self.base = tolerance, base
         self.size = size_of(a, b)
+        #: Subtrees that match exactly; None where nothing is free.
+        self.exact = Congruence(a, b, pairing, tolerance, self._poses_behind) if gauge is None else None
 
     # -- where to begin ------------------------------------------------------------------------------
 
@@ -81,19 +87,50 @@ class Walk:
             X = self.gauge.X
             yield base, IDENTITY if self.tolerance.holds(*apart(IDENTITY, X)) else X
             return
-        for base in self._bases():
+        bases = list(self._bases())
+        if self.exact is not None:
+            exact = self._exact_beginning(bases)
+            if exact is None and self._mimics():
+                self.exact.ignore_rules()
+                exact = self._exact_beginning(bases)
+            if exact is not None:
+                yield exact
+        for base in bases:
             tried = list[FloatArray]()
             for X in self._places(base):
                 if not any(self.tolerance.holds(*apart(known, X)) for known in tried):
                     tried.append(X)
                     yield base, X
 
+    def _mimics(self) -> bool:
+        return any(joint.mimic is not None for m in (self.a, self.b) for joint in m.tree.joints)
+
+    def _exact_beginning(self, bases: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], FloatArray] | None:
+        """The first pair of bodies and place of B's root with which everything matches."""
+        for base in bases:
+            if self.pairing.same_shape(base, (None, None)):
+                for X in self._exact_places(base):
+                    if self._exact_pairs(base, (None, None), X) is not None:
+                        return base, X
+        return None
+
+    def _exact_places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
+        """Where B's root may stand if everything matches: all axes of the body lie on axes of the other."""
+        yield from self._by_names(base)
+        siblings = laid_by_siblings(self.a, self.b, base, lambda e, f: self.pairing.alike(base, e, f))
+        some = (X for X in chain(siblings, laid(self.a, self.b, base)) if self.pairing.all_lie_alike(base, X))
+        yield from islice(some, MOST_LAID)
+
     def _places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         """Where B's root may stand: where A's does, where links of one name meet, where axes do."""
+        yield from self._by_names(base)
+        yield from self._by_axes(base)
+
+    def _by_names(self, base: tuple[int, int]) -> Iterator[FloatArray]:
+        """Where A's root stands, where links of one name meet."""
         yield IDENTITY
         for link_a, link_b in self.pairing.links(*base):
             yield self.a.homes[link_a] @ inverse(self.b.homes[link_b])
-        yield from self._by_axes(base)
 
     def _bodies_of(self, link_a: str, link_b: str) -> tuple[int, int]:
         a, b = self.a, self.b
@@ -135,7 +172,7 @@ class Walk:
         while stack:
             place = stack.pop()
             self._frames(place, found)
-            pairs, only_a, only_b = self.pairing.edges(place.bodies, place.came, place.G, place.XC)
+            pairs, only_a, only_b = self._edges(place)
             found.only_a += _all_beyond(self.a, place.bodies[0], only_a)
             found.only_b += _all_beyond(self.b, place.bodies[1], only_b)
             for e, f in pairs:
@@ -147,6 +184,31 @@ class Walk:
                 elif not step.unlike:
                     found.matched += 1
         return found
+
+    def _edges(self, place: Place) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
+        """Joints that lead on from a place: pairs, and what is left over of each."""
+        pairs = self._exact_pairs(place.bodies, place.came, inverse(place.G) @ place.XC)
+        if pairs is not None:
+            return pairs, (), ()
+        return self.pairing.edges(place.bodies, place.came, place.G, place.XC)
+
+    def _exact_pairs(self, bodies: tuple[int, int], came: Came, X: FloatArray) -> Sequence[Pair] | None:
+        """The pairs of joints at two bodies if all that they carry matches; None where nothing is free."""
+        return None if self.exact is None else self.exact.at(bodies, came, X)
+
+    def _poses_behind(self, beyond: tuple[int, int], came: Pair, X: FloatArray) -> Iterator[FloatArray]:
+        """Candidates for the pose of B's body behind two joints of a kind, from its pose before them."""
+        there = Place(beyond, came, -1, IDENTITY, X)
+        kind, f = family(self.a.joint(came[0]).kind), came[1]
+        if kind in ("turns", "prismatic"):
+            t, turns = self.b.screw(f), kind == "turns"
+            for offset in self._offsets(there, IDENTITY, t, turns):
+                yield X @ along(t, offset, turns=turns) if offset else X
+            return
+        homes = self.a.homes[came[0].joint + 1], self.b.homes[f.joint + 1]
+        plane = undoing(inverse(X @ homes[1]) @ homes[0]) if kind == "planar" else None
+        for N in self._behind(there, homes[0], homes[1], plane, self._exact_places(beyond)):
+            yield homes[0] @ N @ inverse(homes[1])
 
     def _frames(self, place: Place, found: Alignment) -> None:
         pairs = self._all_links(place)
@@ -242,10 +304,14 @@ class Walk:
         if as_written:
             return replace(step, unlike="kind" if back else ""), there, (0, 0.0)
         M = inverse(seen) @ at
+        exact = self._exactly(place, there)
         if given is not None:
             tried: Iterable[FloatArray] = [inverse(given.before) if backwards[1] else given.behind]
+        elif exact is not None:
+            tried = [inverse(at) @ exact @ homes[1]]
         else:
-            tried = self._behind(there, at, homes[1], undoing(M) if kind == "planar" else None)
+            plane = undoing(M) if kind == "planar" else None
+            tried = self._behind(there, at, homes[1], plane, self._by_axes(there.bodies))
         places = ((N, replace(there, XC=at @ N @ inverse(homes[1]))) for N in tried)
         N, moved, score = self._best(places, depth)
         # Outwards, P_b^(1 or -1) = M P_a^(1 or -1) N.
@@ -256,7 +322,12 @@ class Walk:
         return replace(step, conversion=Conversion(before, behind, back)), moved, score
 
     def _behind(
-        self, there: Place, at: FloatArray, home_b: FloatArray, plane: FloatArray | None
+        self,
+        there: Place,
+        at: FloatArray,
+        home_b: FloatArray,
+        plane: FloatArray | None,
+        laid_behind: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
         """N to try: none, all as it stands at home, those with which a link or an axis behind agrees.
 
@@ -265,14 +336,14 @@ class Walk:
             at: (4, 4) the joint's frame.
             home_b: (4, 4) B's own.
             plane: (4, 4) what a planar joint's N is, but for motions in its plane.
+            laid_behind: (4, 4) where B's axes behind the joint lie on A's.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]
         wanted += [
             there.G @ self.a.homes[i] @ inverse(self.b.homes[j]) for i, j in self.pairing.links(*there.bodies)
         ]
-        wanted += [there.G @ X for X in self._by_axes(there.bodies)]
-        for XC in wanted:
+        for XC in chain(wanted, (there.G @ X for X in laid_behind)):
             N = inverse(at) @ XC @ home_b
             yield N if plane is None else plane @ onto_plane(inverse(plane) @ N)
 
@@ -292,6 +363,10 @@ class Walk:
         back = inverse(place.G)
         kind, (a, b) = "turns" if turns else "prismatic", (e.joint, f.joint)
         if self.tolerance.holds(tilt, shift):
+            exact = self._exactly(place, there)
+            if exact is not None:
+                zero = _value_of(t, inverse(place.XC) @ exact, turns=turns)
+                zero = 0.0 if self.tolerance.holds(*apart(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
             return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there, score
         # What hangs on the joint has moved with its axis, or its axis alone is another.
@@ -304,6 +379,13 @@ class Walk:
                 return step, *alone[1:]
         before = back @ K @ place.G
         return Step(a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift), *with_it[1:]
+
+    def _exactly(self, place: Place, there: Place) -> FloatArray | None:
+        """(4, 4) the XC behind two joints with which all that they carry matches; None where none does."""
+        if self.exact is None:
+            return None
+        X = self.exact.behind(*_both(there.came), place.bodies, inverse(place.G) @ place.XC)
+        return None if X is None else place.G @ X
 
     # -- a joint's zero ------------------------------------------------------------------------------
 
@@ -397,6 +479,13 @@ def better(score: Score, than: Score) -> bool:
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
 
+def _value_of(screw: Screw, T: FloatArray, *, turns: bool) -> float:
+    """The value of a joint that moves as a rigid motion does."""
+    if turns:
+        return turn_about(screw.direction, T[:3, :3])
+    return float(screw.direction @ T[:3, 3])
+
+
 def _outwards(screw: Screw, backwards: bool) -> Screw:
     """A joint's screw as it moves what is behind it on the walk, by the joint's own value."""
     return screw.reversed() if backwards else screw
@@ -409,7 +498,7 @@ def _both(came: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
     return e, f
 
 
-def _all_beyond(mechanism: Mechanism, body: int, edges: list[Edge]) -> list[int]:
+def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
     """Some joints at a body and all behind them."""
     found, stack = [], [(body, edge) for edge in edges]
     while stack:
