@@ -65,7 +65,7 @@ TURNS = _robot(
 )
 FOLLOWS = _robot(
     _joint("a", "revolute", "base", "l1"),
-    _joint("b", "revolute", "l1", "l2", '<mimic joint="a" multiplier="2" offset="0.1"/>'),
+    _joint("b", "revolute", "l1", "l2", '<mimic joint="a" multiplier="0.5" offset="0.1"/>'),
     _joint("c", "revolute", "l2", "l3"),
 )
 #: Two kinds of joint, one behind the other.

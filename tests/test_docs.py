@@ -131,7 +131,7 @@ def test_what_a_validation_compares_is_said_as_the_table_of_quantities_has_it() 
     template = (ROOT / "urdfkin/report/templates/report.html.j2").read_text("utf-8")
     assert "{{ compared }}" in template
     assert "{{ not_compared }}" in template
-    for page in ("README.md", "docs/ci.md"):
+    for page in ("docs/commands.md", "docs/ci.md"):
         assert compared() in plain((ROOT / page).read_text("utf-8")), page
         assert not_compared() in plain((ROOT / page).read_text("utf-8")), page
     assert compared() in plain(validate.help)

@@ -68,11 +68,12 @@ def hold_against_differences(search: Search, frame: FramePair, names: Sequence[s
 def two_joints(elbow: str, multiplier: float | None) -> urdfkin.Robot:
     """An arm whose second joint stands at an origin, and follows the first one if there is a multiplier."""
     follows = "" if multiplier is None else f'<mimic joint="j1" multiplier="{multiplier}"/>'
-    limit = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
+    reach = 3.0 * max(1.0, abs(multiplier or 0.0))
+    limit = f'<limit lower="{-reach}" upper="{reach}" effort="1" velocity="1"/>'
     return urdfkin.load(
         f"""<robot name="r"><link name="base"/><link name="upper"/><link name="fore"/><link name="tool"/>
         <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
-        {limit}</joint>
+        <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
         <joint name="j2" type="revolute"><parent link="upper"/><child link="fore"/><origin {elbow}/>
         <axis xyz="0 1 0"/>{limit}{follows}</joint>
         <joint name="mount" type="fixed"><parent link="fore"/><child link="tool"/><origin xyz="1 0 0"/>

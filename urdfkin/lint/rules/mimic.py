@@ -11,7 +11,6 @@ from urdfkin.lint.fixes import Fix
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
 from urdfkin.lint.rules import joints
-from urdfkin.model.ranges import kept_range, range_words
 from urdfkin.model.tree import Limit, Mimic
 from urdfkin.urdf.records import AXIAL, JointRecord, LimitRecord, MimicRecord, RobotRecord
 
