@@ -121,7 +121,7 @@ class Judge:
         within: float | None = None,
     ) -> None:
         self.robots, self.given, self.bounds, self.boxes = robots, given, bounds, boxes
-        self.asked = within
+        self.within = within
         trees = robots[0].tree, robots[1].tree
         parting = _fixed_here(trees[0], trees[1]), _fixed_here(trees[1], trees[0])
         self.mechanisms = Mechanism(trees[0], parting[0]), Mechanism(trees[1], parting[1])
@@ -268,7 +268,7 @@ class Judge:
         """(m, rad) that any frame is off at most; sharper only if that is needed for what was asked."""
         metres, radians = self.rounding(written, variables)
         uppers = self._uppers(written, variables)
-        target = 0.0 if self.asked is None else self.asked - metres
+        target = 0.0 if self.within is None else self.within - metres
         if farthest is not None and farthest.lower <= target:
             self._sharpen(uppers, written.frames, self.search(written, variables), target)
         most = _largest(uppers)

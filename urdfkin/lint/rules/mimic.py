@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from urdfkin.lint.escape import quoted
 from urdfkin.lint.finding import Severity
@@ -11,8 +12,10 @@ from urdfkin.lint.fixes import Fix
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
 from urdfkin.lint.rules import joints
-from urdfkin.model.tree import Limit, Mimic
 from urdfkin.urdf.records import AXIAL, JointRecord, LimitRecord, MimicRecord, RobotRecord
+
+if TYPE_CHECKING:
+    from urdfkin.model.tree import Mimic
 
 MIMIC_UNKNOWN = Rule("URDF520", "mimic-unknown", ERROR)
 MIMIC_LOOP = Rule("URDF521", "mimic-loop", ERROR)
@@ -144,7 +147,10 @@ class _Judge:
             self.check_range(joint, mimic, joint.limit)
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
-        """The limits of a mimic joint must leave the mimicked joint its range."""
+        """Check that the limits of a mimic joint leave the mimicked joint its range."""
+        from urdfkin.model.ranges import kept_range, range_words  # noqa: PLC0415  most files need no numpy
+        from urdfkin.model.tree import Limit  # noqa: PLC0415
+
         rule, leader = self.resolved(mimic)
         limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
         if leader is None or moving is None or limits is None or joint.kind == "continuous":
@@ -167,6 +173,8 @@ class _Judge:
 
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
         """The rule along a chain of mimic joints, and the joint that moves; None where there is none."""
+        from urdfkin.model.tree import Mimic  # noqa: PLC0415
+
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
         leader = self.joints.get(rule.leader)
         while leader is not None and (next_ := leader.mimic) is not None:
