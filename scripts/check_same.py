@@ -4,7 +4,7 @@
     python scripts/check_same.py --keep pairs.jsonl panda    # of some robots alone
     python scripts/check_same.py --keep pairs.jsonl --tell   # the figures of docs/same.md, nothing computed
 
-Twenty-one changes, eleven of which leave a robot the same (`tests/sameness/pairs.py`). Where it stays the
+Twenty-one changes, eleven of which leave a robot the same (`tests/comparison/pairs.py`). Where it stays the
 same, all links are placed at random configurations as `same` says they must be. Where it does not, a global
 search of another kind than the product's looks for the largest distance of the frame that is said to be
 farthest, and computes it at fifty digits from the decimals of both texts: it must lie in the interval. Exit
@@ -29,10 +29,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
 import urdfkin
-from tests.sameness.pairs import ALIKE, UNLIKE, changed, robot
-from tests.sameness.searching import far, searched
+from tests.comparison.pairs import ALIKE, UNLIKE, changed, robot
+from tests.comparison.searching import far, searched
+from urdfkin.comparison.result import Interval, Sameness, Verdict
 from urdfkin.robot import Robot
-from urdfkin.sameness.result import Interval, Sameness, Verdict
 from urdfkin.urdf.catalogue import catalogue
 
 #: What doubles may be off by, metres and entries of rotations, at configurations of some metres.

@@ -1,8 +1,8 @@
-"""Draw who imports whom: docs/images/architecture.svg and the table of rooms in docs/architecture.md.
+"""Draw the imports between packages: docs/images/architecture.svg, and the table in docs/architecture.md.
 
-The rooms and their order stand in docs/architecture.toml and nowhere else; tests/test_architecture.py holds
-the imports against them with the functions of this file. Every import counts: those for types alone, those
-inside functions, and modules that are named in a string to be imported when they are asked for.
+docs/architecture.toml defines the packages and their order. tests/test_architecture.py checks the imports
+with the functions of this script. Every import counts: imports for types, imports inside functions, and
+modules that are named in a string for a lazy import.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE, PICTURE = ROOT / "docs" / "architecture.md", ROOT / "docs" / "images" / "architecture.svg"
 PLAN = tomllib.loads((ROOT / "docs" / "architecture.toml").read_text(encoding="utf-8"))
 
-#: Who may import a foreign library: one module, or the modules of one room or two.
-DOORS: dict[str, list[str]] = PLAN["doors"]
-#: Whose imports count; of what is run from outside the package, the scripts and the examples.
+#: Foreign library -> the module or the packages that may import it.
+IMPORTERS: dict[str, list[str]] = PLAN["importers"]
+#: Folders whose imports count.
 _TREES = ("urdfkin", "scripts", "examples")
 _NAMED = re.compile(r"(urdfkin(?:\.\w+)+)(?::[\w.]+)?")
 
 
-class Room(NamedTuple):
-    """A folder of modules, or a loose file."""
+class Package(NamedTuple):
+    """A package of `urdfkin`, or a module beside the packages."""
 
     name: str
-    says: str
-    holds: str = ""
+    purpose: str
+    contents: str = ""
 
 
-#: From the ground up: a room imports what stands before it.
-ROOMS = [Room(**room) for room in PLAN["room"]]
+#: In order: a package imports only packages before it.
+PACKAGES = [Package(**package) for package in PLAN["package"]]
 
 
 @cache
 def modules() -> dict[str, Path]:
-    """Every module by its name."""
+    """Return every module's path by its name."""
     files = [path for tree in _TREES for path in sorted((ROOT / tree).rglob("*.py"))]
     return {_module(path): path for path in files}
 
@@ -51,10 +51,10 @@ def _module(path: Path) -> str:
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
-def room_of(module: str) -> str:
-    """`verify` for `urdfkin.verify.bounds`; outside the package, the folder.
+def package_of(module: str) -> str:
+    """Return the package of a module; outside `urdfkin`, its folder.
 
-    >>> room_of("urdfkin.robot"), room_of("urdfkin"), room_of("scripts.mutating.operators")
+    >>> package_of("urdfkin.robot"), package_of("urdfkin"), package_of("scripts.mutating.operators")
     ('robot', 'urdfkin', 'scripts')
     """
     tree, *rest = module.split(".")
@@ -62,7 +62,7 @@ def room_of(module: str) -> str:
 
 
 def named(text: str) -> Iterator[str]:
-    """What a module's text imports, wherever in it and whatever for; what stands in a string ends in `.*`.
+    """Yield the names that a module's text imports; a name from a string ends in `.*`.
 
     >>> list(named("if TYPE_CHECKING: from urdfkin.errors import InputError"))
     ['urdfkin.errors.InputError']
@@ -80,13 +80,13 @@ def named(text: str) -> Iterator[str]:
 
 @cache
 def all_named() -> Mapping[str, frozenset[str]]:
-    """What each module imports, ours and others'."""
+    """Return the imported names of each module, foreign libraries included."""
     return {module: frozenset(named(path.read_text(encoding="utf-8"))) for module, path in modules().items()}
 
 
 @cache
 def imports() -> Mapping[str, frozenset[str]]:
-    """Which modules each module imports."""
+    """Return the modules of this repository that each module imports."""
     known = modules()
     return {module: frozenset(_of_ours(names, known)) - {module} for module, names in all_named().items()}
 
@@ -94,15 +94,15 @@ def imports() -> Mapping[str, frozenset[str]]:
 def _of_ours(names: Iterable[str], known: Mapping[str, Path]) -> Iterator[str]:
     for name in names:
         head, _, last = name.rpartition(".")
-        if name in known and last not in _given_away(head):
+        if name in known and last not in _reexported(head):
             yield name
         elif head in known:
             yield head
 
 
 @cache
-def _given_away(package: str) -> frozenset[str]:
-    """Names that a package takes from its modules: `from package import name` means that, not a module."""
+def _reexported(package: str) -> frozenset[str]:
+    """Return the names that a package's `__init__` imports: they hide submodules of the same name."""
     path = modules().get(package)
     if path is None or path.name != "__init__.py":
         return frozenset()
@@ -115,25 +115,25 @@ def _given_away(package: str) -> frozenset[str]:
 
 
 def upwards() -> list[str]:
-    """Imports of what does not stand before the importing room."""
-    rank = {room.name: number for number, room in enumerate(ROOMS)}
+    """List the imports of a later package by an earlier one."""
+    rank = {package.name: number for number, package in enumerate(PACKAGES)}
     return sorted(
         f"{module} imports {other}"
         for module, others in imports().items()
         for other in others
-        if room_of(module) != room_of(other) and rank[room_of(other)] > rank[room_of(module)]
+        if package_of(module) != package_of(other) and rank[package_of(other)] > rank[package_of(module)]
     )
 
 
-def circles() -> list[list[str]]:
-    """Modules that lead to each other."""
+def cycles() -> list[list[str]]:
+    """List the groups of modules that import each other."""
     reached = {module: _reached(module) for module in imports()}
     groups = {frozenset(o for o in others if module in reached[o]) for module, others in reached.items()}
     return sorted(sorted(group) for group in groups if group)
 
 
 def _reached(module: str) -> set[str]:
-    """Where one gets from a module, import by import."""
+    """Return all modules that a module imports, directly or not."""
     seen: set[str] = set()
     ahead = set(imports()[module])
     while ahead:
@@ -143,56 +143,65 @@ def _reached(module: str) -> set[str]:
 
 
 def arrows() -> set[tuple[str, str]]:
-    """Which room imports which."""
-    pairs = {(room_of(module), room_of(other)) for module, others in imports().items() for other in others}
-    return {(room, other) for room, other in pairs if room != other}
+    """Return the pairs (package, imported package)."""
+    pairs = {
+        (package_of(module), package_of(other)) for module, others in imports().items() for other in others
+    }
+    return {(one, other) for one, other in pairs if one != other}
 
 
 def table() -> str:
-    """The rooms in Markdown, from the ground up."""
-    rows = [f"| `{room.name}` | {room.says} | {room.holds} |" for room in ROOMS]
-    return "\n".join(("| room | what it is | holds |", "|---|---|---|", *rows))
+    """Return the packages as a Markdown table, in order."""
+    rows = [f"| `{one.name}` | {one.purpose} | {one.contents} |" for one in PACKAGES]
+    return "\n".join(("| Package | Purpose | Contents |", "|---|---|---|", *rows))
 
 
 _ROW, _LEFT, _TOP, _CELL = 30, 118, 88, 24
 
 
 def picture() -> str:
-    """The rooms from the ground up, and in each one's row a dot for each room that it imports."""
-    place = {room.name: number for number, room in enumerate(ROOMS)}
-    width, height = _LEFT + _CELL * len(ROOMS) + 470, _TOP + _ROW * len(ROOMS) + 12
+    """Draw the packages in order, with a dot in a package's row for each package that it imports."""
+    place = {package.name: number for number, package in enumerate(PACKAGES)}
+    width, height = _LEFT + _CELL * len(PACKAGES) + 470, _TOP + _ROW * len(PACKAGES) + 12
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}"'
         ' font-family="sans-serif" font-size="13">',
-        "<title>The rooms of urdfkin: each imports only what stands above it</title>",
+        "<title>The packages of urdfkin: each imports only packages above it</title>",
         f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
     ]
-    for number, room in enumerate(ROOMS):
-        y, own, says = _TOP + _ROW * number, _LEFT + _CELL * number, escape(room.says.replace("`", ""))
+    for number, package in enumerate(PACKAGES):
+        y, own, purpose = (
+            _TOP + _ROW * number,
+            _LEFT + _CELL * number,
+            escape(package.purpose.replace("`", "")),
+        )
         lines += [
             f'<rect x="6" y="{y}" width="{own + _CELL - 8}" height="{_ROW - 4}" rx="5" fill="#eef2f7"/>',
             f'<rect x="6" y="{y}" width="{_LEFT - 16}" height="{_ROW - 4}" rx="5" fill="#2f5d8a"/>',
-            f'<text x="14" y="{y + 18}" fill="#ffffff" font-weight="bold">{room.name}</text>',
+            f'<text x="14" y="{y + 18}" fill="#ffffff" font-weight="bold">{package.name}</text>',
             f'<rect x="{own + 4}" y="{y + 5}" width="16" height="16" rx="3" fill="#2f5d8a"/>',
-            f'<text x="{own + _CELL + 8}" y="{y + 18}" fill="#222222">{says}</text>',
-            f'<text transform="translate({own + 16} {_TOP - 8}) rotate(-90)" fill="#666">{room.name}</text>',
+            f'<text x="{own + _CELL + 8}" y="{y + 18}" fill="#222222">{purpose}</text>',
+            f'<text transform="translate({own + 16} {_TOP - 8}) rotate(-90)" fill="#666">'
+            f"{package.name}</text>",
         ]
     for below, above in sorted((place[one], place[other]) for one, other in arrows()):
         x, y = _LEFT + _CELL * above + _CELL // 2, _TOP + _ROW * below + 13
-        said = f"{ROOMS[below].name} imports {ROOMS[above].name}"
+        said = f"{PACKAGES[below].name} imports {PACKAGES[above].name}"
         lines.append(f'<circle cx="{x}" cy="{y}" r="5" fill="#c8553d"><title>{said}</title></circle>')
     return "\n".join((*lines, "</svg>", ""))
 
 
 def page() -> str:
-    """docs/architecture.md with its table of rooms as it is."""
+    """Return docs/architecture.md with a current table."""
     text = PAGE.read_text(encoding="utf-8")
-    return re.sub(r"(?s)(<!-- rooms -->\n).*?(\n<!-- /rooms -->)", lambda m: m[1] + table() + m[2], text)
+    return re.sub(
+        r"(?s)(<!-- packages -->\n).*?(\n<!-- /packages -->)", lambda m: m[1] + table() + m[2], text
+    )
 
 
 if __name__ == "__main__":
-    if wrong := [*upwards(), *map(" <-> ".join, circles())]:
+    if wrong := [*upwards(), *map(" <-> ".join, cycles())]:
         sys.exit("\n".join(wrong))
     PAGE.write_text(page(), encoding="utf-8")
     PICTURE.write_text(picture(), encoding="utf-8")
-    print(f"{len(ROOMS)} rooms, {len(arrows())} arrows")
+    print(f"{len(PACKAGES)} packages, {len(arrows())} imports between them")

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from urdfkin.lint import DEFAULT_LIMITS, Finding, Severity, check
-from urdfkin.lint.escape import shortened
+from urdfkin.lint.finding import shortened
 from urdfkin.lint.pages import RULES
 from urdfkin.lint.pages import page as page_of
 from urdfkin.lint.reporter import WRITTEN_OUT

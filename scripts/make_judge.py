@@ -9,8 +9,8 @@ import numpy as np
 
 import urdfkin
 from urdfkin.report.words import nearer_counts
-from urdfkin.validation.judgement import Judgement, Line, judge
-from urdfkin.verify.exact.vectors import DIGITS
+from urdfkin.validation.accuracy import Judgement, Line, judge
+from urdfkin.verify.exact.numbers import DIGITS
 from urdfkin.verify.pinocchio_module import version
 from urdfkin.verify.sampling import draw_base
 

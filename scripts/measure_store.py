@@ -13,8 +13,8 @@ from statistics import median
 
 from urdfkin.validation.chunk import Cut, run_chunk
 from urdfkin.validation.manifest import Manifest
+from urdfkin.validation.robot_input import subject
 from urdfkin.validation.store import opened
-from urdfkin.validation.subject import subject
 
 
 def main() -> None:

@@ -2,7 +2,7 @@
 
     python scripts/mutate.py --sample 40 --seed 1          forty slips, drawn from the whole package
     python scripts/mutate.py validation dh/snapping        every slip of two parts
-    python scripts/mutate.py --only urdfkin.validation.tally:17
+    python scripts/mutate.py --only urdfkin.validation.error_stats:17
     python scripts/mutate.py --named                       those of tests/attacks/named_slips.toml
 
 The tests that are near the file are asked first, those that are quick; then, with --slow, the slow ones near

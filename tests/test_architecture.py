@@ -1,4 +1,4 @@
-"""The house is as docs/architecture.toml says: imports lead one way, a foreign library has one door."""
+"""Imports follow docs/architecture.toml: one direction, no cycle, one importer per foreign library."""
 
 import subprocess
 import sys
@@ -7,46 +7,46 @@ from pathlib import Path
 import pytest
 
 from scripts.make_architecture import (
-    DOORS,
+    IMPORTERS,
+    PACKAGES,
     PAGE,
     PICTURE,
-    ROOMS,
     all_named,
-    circles,
+    cycles,
     imports,
     modules,
     named,
+    package_of,
     page,
     picture,
-    room_of,
     upwards,
 )
 
-#: More than these nobody keeps in mind: those of the package, what is run from outside aside.
-MOST_ROOMS = 20
+#: The most packages and loose modules of `urdfkin`; a reader must be able to remember them.
+MOST_PACKAGES = 21
 OURS = [module for module in modules() if module.split(".")[0] == "urdfkin"]
 
 
 def foreign(module: str) -> set[str]:
-    """The libraries that a module imports, Python's own aside."""
+    """Return the foreign libraries that a module imports."""
     names = {name.split(".")[0] for name in all_named()[module]}
     return names - {"urdfkin", *sys.stdlib_module_names}
 
 
-def test_every_module_lies_in_a_room_of_the_plan_and_every_room_is_lived_in() -> None:
-    assert {room_of(module) for module in modules()} == {room.name for room in ROOMS}
+def test_every_module_belongs_to_a_planned_package_and_no_package_is_empty() -> None:
+    assert {package_of(module) for module in modules()} == {package.name for package in PACKAGES}
 
 
-def test_the_house_has_no_more_rooms_than_one_can_keep_in_mind() -> None:
-    assert len({room_of(module) for module in OURS}) <= MOST_ROOMS
+def test_the_number_of_packages_stays_small() -> None:
+    assert len({package_of(module) for module in OURS}) <= MOST_PACKAGES
 
 
-def test_no_import_leads_up() -> None:
+def test_no_package_imports_a_later_one() -> None:
     assert upwards() == []
 
 
-def test_no_modules_lead_to_each_other() -> None:
-    assert circles() == []
+def test_no_modules_import_each_other_in_a_cycle() -> None:
+    assert cycles() == []
 
 
 @pytest.mark.parametrize(
@@ -62,32 +62,32 @@ def test_no_modules_lead_to_each_other() -> None:
         "ROW = ('robot', 'urdfkin.robot:Robot.sample')",
     ],
 )
-def test_an_import_counts_wherever_it_stands_and_whatever_for(text: str) -> None:
+def test_every_form_of_import_counts(text: str) -> None:
     assert {"urdfkin.robot", "urdfkin.robot.Robot", "urdfkin.robot.*"} & set(named(text))
 
 
-def test_the_imports_that_are_counted_are_those_of_the_files() -> None:
+def test_the_counted_imports_are_those_of_the_files() -> None:
     assert "urdfkin.errors" in imports()["urdfkin.robot"]
     assert imports()["urdfkin.kinematics.equations"] == frozenset(), "the equations import nothing"
 
 
-@pytest.mark.parametrize("library", DOORS)
-def test_a_foreign_library_has_one_door(library: str) -> None:
+@pytest.mark.parametrize("library", IMPORTERS)
+def test_a_foreign_library_is_imported_only_where_planned(library: str) -> None:
     users = {module for module in OURS if library in foreign(module)}
     assert users
-    assert {module for module in users if not {module, room_of(module)} & set(DOORS[library])} == set()
+    assert {module for module in users if not {module, package_of(module)} & set(IMPORTERS[library])} == set()
 
 
-def test_no_library_comes_in_beside_the_doors() -> None:
-    assert set().union(*map(foreign, OURS)) == {"numpy", *DOORS}
+def test_no_unplanned_library_is_imported() -> None:
+    assert set().union(*map(foreign, OURS)) == {"numpy", *IMPORTERS}
 
 
-def test_the_picture_and_the_table_are_of_today() -> None:
+def test_the_picture_and_the_table_are_current() -> None:
     assert PICTURE.read_text(encoding="utf-8") == picture()
     assert PAGE.read_text(encoding="utf-8") == page()
 
 
-def test_what_the_page_names_is_there() -> None:
+def test_every_path_on_the_page_exists() -> None:
     root = Path(__file__).parents[1]
     words = PAGE.read_text(encoding="utf-8").replace("(", " ").replace(")", " ").split("`")[1::2]
     paths = [word for word in words if word.startswith(("urdfkin/", "tests/", "scripts/", "docs/"))]

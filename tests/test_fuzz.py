@@ -20,9 +20,9 @@ from scripts.fuzzing.mutations import FAMILIES, mutant
 from tests.lint.cases.arm import arm, fixed
 from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.kinematics.inputs import FloatArray
-from urdfkin.system.interpreter import ask_python
+from urdfkin.system.processes import ask_python
 from urdfkin.urdf.records import FURTHER_LIMITS
-from urdfkin.verify import made_of_mjcf
+from urdfkin.verify import mjcf_check
 
 pytestmark = pytest.mark.slow
 
@@ -221,7 +221,7 @@ def test_a_reading_of_mjcf_that_is_not_mujocos_is_noticed(monkeypatch: pytest.Mo
         output, status = ask_python(*arguments)
         return output.splitlines(keepends=True)[0], status
 
-    monkeypatch.setattr(made_of_mjcf, "ask_python", without_shapes)
+    monkeypatch.setattr(mjcf_check, "ask_python", without_shapes)
     assert judge(text).word == "MuJoCo has another robot"
 
 

@@ -94,7 +94,7 @@ def test_what_no_test_looks_at_survives_and_what_one_does_is_noticed(
 GONE = ("verification", "judge", "keeping")
 
 #: Quick to ask about, and to be relied on by everything that is handed out or reported.
-PARTS = ["validation/outcome", "validation/tally", "verify/certificate", "dh/statement"]
+PARTS = ["validation/outcome", "validation/error_stats", "verify/certificate", "dh/table"]
 SEED = int(os.environ.get("URDFKIN_MUTATION_SEED", "1"))
 
 
@@ -135,7 +135,7 @@ def test_a_part_that_does_not_exist_is_an_error_and_named(
 @pytest.mark.parametrize(
     "words",
     [
-        ["--only", "urdfkin.validation.tally:99999"],
+        ["--only", "urdfkin.validation.error_stats:99999"],
         ["cli/__init__", "--named"],
         ["cli/view", "--sample", "0"],
     ],

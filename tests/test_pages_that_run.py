@@ -21,7 +21,7 @@ Q, V, A = np.array([np.pi / 2.0, 0.5]), np.array([2.0, 0.3]), np.zeros(2)
 
 #: Pages whose blocks other tests run, or that need what a test must not have.
 ELSEWHERE = {
-    "calibration.md": "tests/sameness/calibration/test_page.py",
+    "calibration.md": "tests/calibration/test_page.py",
     "check.md": "tests/cli/test_check_in_a_repository.py",
     "tour.md": "tests/test_tour.py",
     "dh-at-work.md": "tests/dh/test_at_work_page.py",

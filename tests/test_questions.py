@@ -13,9 +13,8 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.pages import DOCS
-from urdfkin.cli.questions import answer_to, answers, as_text
-from urdfkin.errors import UrdfkinError
-from urdfkin.errors.questions import Question
+from urdfkin.cli.explain import answer_to, answers, as_text
+from urdfkin.errors import Question, UrdfkinError
 from urdfkin.urdf import xacro
 from urdfkin.verify.pinocchio_module import _impostor
 

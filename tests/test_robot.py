@@ -18,7 +18,7 @@ from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
-from urdfkin.verify import choosing, verifier
+from urdfkin.verify import sampling, verifier
 from urdfkin.verify.certificate import Comparison
 from urdfkin.verify.pinocchio import Oracle
 
@@ -196,7 +196,7 @@ def test_a_disagreement_whose_share_is_no_number_is_raised_too(
     ):
         found = iter(results)
         monkeypatch.setattr(verifier, "compare", lambda *_, found=found: next(found))
-        monkeypatch.setattr(choosing, "_MOST", 1)
+        monkeypatch.setattr(sampling, "_MOST", 1)
         with pytest.raises(urdfkin.VerificationError):
             panda.placement(panda.sample(len(results)), "panda_hand", verify=True)
 

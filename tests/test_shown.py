@@ -17,7 +17,7 @@ import urdfkin
 from tests.attacks.hostile import NAMES, urdf
 from urdfkin.dh.export import export
 from urdfkin.dh.units import units_of
-from urdfkin.errors.showing import Sheet, Table
+from urdfkin.errors.display import Table, TextDocument
 from urdfkin.lint.finding import Findings
 from urdfkin.report.document import Document
 from urdfkin.report.html import as_html
@@ -120,9 +120,9 @@ class _Tags(HTMLParser):
         assert self.open.pop() == tag
 
 
-def sheets() -> Iterator[Callable[[str], Sheet]]:
-    yield lambda name: Sheet(name, ())
-    yield lambda name: Sheet("t", (name, Table((name, "x"), [(name, 1.0)])))
+def sheets() -> Iterator[Callable[[str], TextDocument]]:
+    yield lambda name: TextDocument(name, ())
+    yield lambda name: TextDocument("t", (name, Table((name, "x"), [(name, 1.0)])))
 
 
 @pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)

@@ -12,7 +12,7 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.pages import DOCS, blocks
-from urdfkin.cli.questions import anchor, answers
+from urdfkin.cli.explain import anchor, answers
 
 README = (DOCS.parent / "README.md").read_text("utf-8")
 #: The robot of the page "Start", whose file they have.

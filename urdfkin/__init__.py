@@ -12,10 +12,12 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from urdfkin.system.asking import answer
-from urdfkin.system.later import later
+from urdfkin.system.lazy_import import lazy_import, register_hook
 
 if TYPE_CHECKING:
+    from urdfkin.calibration.calibrate import calibrate
+    from urdfkin.comparison.diff import diff
+    from urdfkin.comparison.verdict import same
     from urdfkin.dh import DHRow, DHTable, read_table, table_from_rows
     from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
     from urdfkin.lint import Finding, UrdfError, UrdfWarning, check
@@ -24,9 +26,6 @@ if TYPE_CHECKING:
     from urdfkin.model.chain import FrameChain
     from urdfkin.model.reference import Reference
     from urdfkin.robot import Robot
-    from urdfkin.sameness.calibration.calibrate import calibrate
-    from urdfkin.sameness.changes import diff
-    from urdfkin.sameness.judging import same
     from urdfkin.urdf.catalogue import robots
     from urdfkin.validation.campaign import validate
     from urdfkin.verify.certificate import Certificate, VerificationError
@@ -52,22 +51,22 @@ _HOMES = {
     "UrdfWarning": "urdfkin.lint",
     "UrdfkinError": "urdfkin.errors",
     "VerificationError": "urdfkin.verify.certificate",
-    "calibrate": "urdfkin.sameness.calibration.calibrate",
+    "calibrate": "urdfkin.calibration.calibrate",
     "check": "urdfkin.lint",
-    "diff": "urdfkin.sameness.changes",
+    "diff": "urdfkin.comparison.diff",
     "load": "urdfkin.loading",
     "read_table": "urdfkin.dh",
     "robots": "urdfkin.urdf.catalogue",
-    "same": "urdfkin.sameness.judging",
+    "same": "urdfkin.comparison.verdict",
     "table_from_rows": "urdfkin.dh",
     "validate": "urdfkin.validation.campaign",
 }
 
 # What an object is asked to show and a higher room draws: no room imports what stands above it.
-answer("a table in a form", later("urdfkin.dh.export:export"))
-answer("a report as a page", later("urdfkin.report.html:as_html"))
-answer("a report as a comment", later("urdfkin.report.markdown:as_markdown"))
-answer("a robot in a cell", later("urdfkin.report.cell:Cell"))
+register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
+register_hook("a report as a page", lazy_import("urdfkin.report.html:as_html"))
+register_hook("a report as a comment", lazy_import("urdfkin.report.markdown:as_markdown"))
+register_hook("a robot in a cell", lazy_import("urdfkin.report.notebook:Cell"))
 
 __all__ = [
     "BaseMotion",

@@ -10,11 +10,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypedDict, Unpack, cast
 
-from urdfkin.dh.doubts import doubts
-from urdfkin.dh.read import is_table_file, read_table_or_screws
-from urdfkin.dh.screws import Screws
+from urdfkin.dh.convert import to_urdf
+from urdfkin.dh.hypotheses import doubts
+from urdfkin.dh.parse_table import is_table_file, read_table_or_screws
+from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.table import DHTable
-from urdfkin.dh.to_tree import to_urdf
 from urdfkin.errors import InputError
 from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
 from urdfkin.lint.reporter import Reporter
@@ -27,20 +27,19 @@ from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home, read_bytes
-from urdfkin.urdf.descriptions import described
 from urdfkin.urdf.mjcf import is_mjcf, is_text, name_of
-from urdfkin.urdf.origin import Origin
+from urdfkin.urdf.packages import described
 from urdfkin.urdf.pinocchio_model import is_model, tree_of_model
 from urdfkin.urdf.reader import read_tree
-from urdfkin.urdf.sources import Source, Text, as_word, read_source
+from urdfkin.urdf.sources import Origin, Source, Text, as_word, read_source
 from urdfkin.urdf.trees import XmlElement, XmlTree, text_of, without_rotation
 from urdfkin.urdf.writer import to_urdf as write_urdf
-from urdfkin.verify.choosing import Verify, checked_choice
-from urdfkin.verify.made_of_mjcf import demand_the_mjcfs, read_mjcf
-from urdfkin.verify.made_of_model import demand_the_models
-from urdfkin.verify.made_of_table import demand_the_tables
-from urdfkin.verify.screws import check_screws
-from urdfkin.verify.witnesses import WitnessName, witness_of
+from urdfkin.verify.chain_checks import check_screws
+from urdfkin.verify.mjcf_check import check_mjcf_source, read_mjcf
+from urdfkin.verify.model_check import check_model_source
+from urdfkin.verify.oracles import WitnessName, witness_of
+from urdfkin.verify.sampling import Verify, checked_choice
+from urdfkin.verify.table_check import check_table_source
 
 #: What concerns those who write a URDF, and nobody whose URDF was made of something else.
 _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
@@ -56,7 +55,7 @@ class How(TypedDict):
 
 
 def load(
-    source: Source | DHTable | Screws | ModuleType | XmlElement | XmlTree,
+    source: Source | DHTable | ProductOfExponentials | ModuleType | XmlElement | XmlTree,
     *,
     verify: Verify = True,
     mimic: bool | None = None,
@@ -105,7 +104,7 @@ def load(
     if (found := described(source)) is not None:
         source = found.path
         xacro_args = {**found.xacro_args, **(xacro_args or {})}
-    if isinstance(source, DHTable | Screws) or is_table_file(source):
+    if isinstance(source, DHTable | ProductOfExponentials) or is_table_file(source):
         return _load_table(source, xacro_args, **how)
     if is_mjcf(source):
         return _load_mjcf(source, xacro_args, None, **how)
@@ -125,18 +124,18 @@ def load(
 
 
 def _load_table(
-    source: DHTable | Screws | str | os.PathLike[str],
+    source: DHTable | ProductOfExponentials | str | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,
     **how: Unpack[How],
 ) -> Robot:
     _refuse_arguments(xacro_args, "a table")
-    table: DHTable | Screws
-    if isinstance(source, DHTable | Screws):
+    table: DHTable | ProductOfExponentials
+    if isinstance(source, DHTable | ProductOfExponentials):
         table, name = source, "<table>"
     else:
         path = at_home(source)
         table, name = read_table_or_screws(path), as_word(path)
-    if isinstance(table, Screws):
+    if isinstance(table, ProductOfExponentials):
         urdf = write_urdf(table.to_tree())
     else:
         urdf = to_urdf(table)
@@ -147,10 +146,10 @@ def _load_table(
     if checked_choice(how["verify"]):
         plain = how["mimic"] is not False and how["root_joint"] is None
         verifier = (robot if plain else robot_of(text)).verifier
-        if isinstance(table, Screws):
+        if isinstance(table, ProductOfExponentials):
             check_screws(verifier, table)
         else:
-            demand_the_tables(verifier, table)
+            check_table_source(verifier, table)
     return robot
 
 
@@ -171,7 +170,7 @@ def _load_mjcf(
     if wanted:
         plain = how["mimic"] is not False and how["root_joint"] is None
         verifier = (robot if plain else robot_of(text, listed=listed, made=True)).verifier
-        robot.verifier.reading = demand_the_mjcfs(verifier, read)
+        robot.verifier.reading = check_mjcf_source(verifier, read)
     return robot
 
 
@@ -196,7 +195,7 @@ def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unp
     if checked_choice(how["verify"]):
         plain = how["root_joint"] is None
         verifier = (robot if plain else robot_of(text, made=True)).verifier
-        robot.verifier.reading = demand_the_models(verifier, read, source)
+        robot.verifier.reading = check_model_source(verifier, read, source)
     return robot
 
 

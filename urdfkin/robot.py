@@ -15,40 +15,47 @@ from numpy.typing import ArrayLike
 
 from urdfkin.compiled.batch import in_parts
 from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_joints
-from urdfkin.compiled.plan import Plan, make_plan
+from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.dh.make import dh_table
-from urdfkin.dh.screws import Screws, screws_of
+from urdfkin.dh.screws import ProductOfExponentials, screws_of
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
-from urdfkin.errors.demands import choice, real_number, shown, switch, whole_number, word, words
-from urdfkin.errors.printable import log_line
-from urdfkin.errors.showing import Sheet, Shown
+from urdfkin.errors.display import Displayable, TextDocument
+from urdfkin.errors.escape import log_line
+from urdfkin.errors.validators import (
+    as_bool,
+    as_choice,
+    as_names,
+    as_str,
+    real_number,
+    safe_repr,
+    whole_number,
+)
 from urdfkin.export import QUANTITIES as EXPORTED
-from urdfkin.kinematics.bodies.frames import seen_from
-from urdfkin.kinematics.bodies.representation import QUATERNION
+from urdfkin.kinematics.bodies import QUATERNION, seen_from
 from urdfkin.kinematics.inputs import scalars, vectors
-from urdfkin.kinematics.rotation.euler_rates import NEAREST
+from urdfkin.kinematics.rotation.euler import NEAREST
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.lint.finding import Finding, Findings
-from urdfkin.model import configuration, steps
+from urdfkin.model import configuration, integration
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.chain import FrameChain, chain
-from urdfkin.model.described import described
+from urdfkin.model.configuration_like import Given, listed
 from urdfkin.model.frame_names import FrameName, LinkFrame
-from urdfkin.model.given import Given, listed
 from urdfkin.model.reference import Reference
+from urdfkin.model.summary import described
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
-from urdfkin.system.asking import ask
+from urdfkin.system.lazy_import import hook
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.joint_order import order_words
-from urdfkin.urdf.origin import Origin
-from urdfkin.verify.bounds import movable, nearest_singularity
+from urdfkin.urdf.sources import Origin
+from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
-from urdfkin.verify.choosing import Verify
-from urdfkin.verify.magnitudes import magnitudes
+from urdfkin.verify.chain_checks import check_screws
+from urdfkin.verify.oracles import WitnessName
 from urdfkin.verify.quantities import (
     ACCELERATION_BREAKDOWN,
     ANALYTICAL_JACOBIAN,
@@ -59,11 +66,9 @@ from urdfkin.verify.quantities import (
     quantity,
     walked,
 )
-from urdfkin.verify.sampling import sample
-from urdfkin.verify.screws import check_screws
+from urdfkin.verify.sampling import Verify, sample
 from urdfkin.verify.singular_values import SingularValues, singular_values
 from urdfkin.verify.verifier import Verifier
-from urdfkin.verify.witnesses import WitnessName
 
 if TYPE_CHECKING:
     from urdfkin.export.compiled_frame import CompiledFrame
@@ -79,7 +84,7 @@ _INSIDE = {"plan", "verifier"}
 _MOST_NUMBERS = (2**63 - 1) // 8
 
 
-class Robot(Shown):
+class Robot(Displayable):
     """A robot that was loaded; make one with `urdfkin.load`.
 
     Configurations `q` are (..., nq), rates `v` and `a` (..., nv), with any leading batch shape; the three
@@ -116,7 +121,7 @@ class Robot(Shown):
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
-        self._plans: dict[tuple[int, ...], Plan] = {}
+        self._plans: dict[tuple[int, ...], CompiledTree] = {}
         self._prepared: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
 
@@ -132,7 +137,7 @@ class Robot(Shown):
         # What the package's own parts ask of a robot is not what people complete names for.
         return [name for name in super().__dir__() if name not in _INSIDE]
 
-    def _sheet(self) -> Sheet:
+    def _sheet(self) -> TextDocument:
         order = order_words(self.urdf, self.joint_names)
         return described(self.tree, self.base_frame, self.tip_frame, order)
 
@@ -152,7 +157,7 @@ class Robot(Shown):
         q_0 = configuration.checked(self.tree, q, "q")
         if q_0.ndim != 1:
             raise InputError("a view begins at one configuration", found=f"shape {q_0.shape}")
-        return ask("a robot in a cell")(self, q_0, whole_number(height, "height", 1, 10_000))
+        return hook("a robot in a cell")(self, q_0, whole_number(height, "height", 1, 10_000))
 
     # -- what it is ----------------------------------------------------------------------------------
 
@@ -347,7 +352,7 @@ class Robot(Shown):
         >>> q[:7].round(4).tolist()
         [0.0, 0.6366, 0.0, 0.0, 0.0, 1.0, 0.0]
         """
-        return steps.integrate(
+        return integration.integrate(
             self.tree, configuration.checked(self.tree, q, "q"), configuration.checked(self.tree, v, "v")
         )
 
@@ -364,12 +369,12 @@ class Robot(Shown):
             InputError: wrong length, a number that is not finite.
         """
         ends = (configuration.checked(self.tree, q, "q") for q in (start, end))
-        return steps.difference(self.tree, *ends)
+        return integration.difference(self.tree, *ends)
 
     def to_pinocchio(self, q: Given, *, mimic: bool = False) -> FloatArray:
         """(..., nq) to the configuration of `pinocchio.buildModelFromUrdf(path, mimic=mimic)`."""
         return configuration.to_pinocchio(
-            self.tree, configuration.checked(self.tree, q, "q"), mimic=switch(mimic, "mimic")
+            self.tree, configuration.checked(self.tree, q, "q"), mimic=as_bool(mimic, "mimic")
         )
 
     def pinocchio_model(self, *, mimic: bool = False) -> Any:
@@ -394,14 +399,14 @@ class Robot(Shown):
         >>> bool(abs(T - robot.placement(q, "tool0")).max() < 1e-14)
         True
         """
-        return self.verifier.model(mimic=switch(mimic, "mimic"))
+        return self.verifier.model(mimic=as_bool(mimic, "mimic"))
 
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """The inverse of `to_pinocchio`; angles of continuous joints come back in [-pi, pi].
 
         Of both ends the double nearest to them comes back as it is.
         """
-        return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=switch(mimic, "mimic"))
+        return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=as_bool(mimic, "mimic"))
 
     # -- what it computes ----------------------------------------------------------------------------
 
@@ -436,11 +441,11 @@ class Robot(Shown):
                 inputs than the quantity takes; one that has a way of its own.
             VerificationError: Pinocchio computes something else.
         """
-        row = quantity(word(name, "name"))
+        row = quantity(as_str(name, "name"))
         if row not in walked():
             raise InputError(f"the {name} has a method of its own", remedy=f"call {row.method}")
         if not isinstance(inputs, tuple | list) or len(inputs) != len(row.inputs):
-            raise InputError(f"the {name} takes ({', '.join(row.inputs)})", found=shown(inputs))
+            raise InputError(f"the {name} takes ({', '.join(row.inputs)})", found=safe_repr(inputs))
         return self._computed(name, inputs, frame, reference, base, out, verify, threads)
 
     def placement(
@@ -514,7 +519,7 @@ class Robot(Shown):
         >>> bool(abs(T - np.eye(4)).max() < 1e-15)
         True
         """
-        name = word(relative_to, "relative_to")
+        name = as_str(relative_to, "relative_to")
         name = name if isinstance(name, FrameName) else str(name)  # a replay line has no words for NumPy's
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
@@ -849,11 +854,11 @@ class Robot(Shown):
         >>> found.values.lower[-1] == 0.0, found.condition.upper  # stretched out: one is, or may be, 0
         (np.True_, np.float64(inf))
         """
-        which = _ROWS.get(word(rows, "rows"))
+        which = _ROWS.get(as_str(rows, "rows"))
         if which is None:
-            raise InputError("rows are all, linear or angular", found=shown(rows))
+            raise InputError("rows are all, linear or angular", found=safe_repr(rows))
         frame = self._default_frame() if frame is None else frame
-        J = self.jacobian(q, word(frame, "frame"), base=base, verify=verify, threads=threads)
+        J = self.jacobian(q, as_str(frame, "frame"), base=base, verify=verify, threads=threads)
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,))
         size = magnitudes(call.plan, call.q, None, None, call.state)
         bound = JACOBIAN.bound(call.plan, size, _ALIGNED)
@@ -876,7 +881,7 @@ class Robot(Shown):
         """The manipulator Jacobian J = C^-1 J_v (7.122): derivatives of position and orientation by q.
 
         It is checked against Pinocchio's rotation and Jacobian, with the rates of the orientation's numbers
-        by a way of their own (`urdfkin.verify.line_of_nodes`). The bound grows as 1 / s^2, s being the
+        by a way of their own (`urdfkin.verify.analytical_reference`). The bound grows as 1 / s^2, s being the
         sine or cosine of the middle angle: near the singularity that many digits are lost.
 
         Args:
@@ -902,7 +907,7 @@ class Robot(Shown):
             InputError: wrong length, a number that is not finite, a batch that does not broadcast.
             VerificationError: Pinocchio computes something else.
         """
-        representation, nearest = word(representation, "representation"), real_number(nearest, "nearest")
+        representation, nearest = as_str(representation, "representation"), real_number(nearest, "nearest")
         options: dict[str, Any] = {"representation": representation, "nearest": nearest}
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,), **options)
@@ -974,7 +979,7 @@ class Robot(Shown):
             VerificationError: Pinocchio computes something else.
         """
         frame = self._default_frame() if frame is None else frame
-        call = Call(self.tree, self.plan, word(frame, "frame"), reference, base, (q, v, a))
+        call = Call(self.tree, self.plan, as_str(frame, "frame"), reference, base, (q, v, a))
         self.verifier.ready(verify)
         to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(KINDS), 6))
         flat = (self.tree, call.links[0], call.q, *call.rates, call.reference, call.state)
@@ -1031,7 +1036,7 @@ class Robot(Shown):
         from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  loads mpmath
 
         frame = self._default_frame() if frame is None else frame
-        inputs, hessian = (q, v, a), switch(hessian, "hessian")
+        inputs, hessian = (q, v, a), as_bool(hessian, "hessian")
         return enclose(self.verifier, self.plan, inputs, frame, reference, base, digits, hessian=hessian)
 
     def prepare(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> PreparedFrame:
@@ -1114,10 +1119,10 @@ class Robot(Shown):
         from urdfkin.export import write  # noqa: PLC0415
         from urdfkin.export.code import code_of  # noqa: PLC0415  loads mpmath
 
-        frame = choice(frame, self.tip_frame, "frame")
-        name = None if name is None else word(name, "name")
+        frame = as_choice(frame, self.tip_frame, "frame")
+        name = None if name is None else as_str(name, "name")
         code = code_of(self.verifier, self.plan, frame, quantities, reference, name=name, verify=verify)
-        return write(code, word(to, "to"))
+        return write(code, as_str(to, "to"))
 
     # -- chains and Denavit-Hartenberg tables ---------------------------------------------------------
 
@@ -1132,7 +1137,9 @@ class Robot(Shown):
             UnknownNameError: no such frame.
             InputError: a planar or floating joint lies on the way.
         """
-        return chain(self.tree, choice(tip, self.tip_frame, "tip"), choice(base, self.base_frame, "base"))
+        return chain(
+            self.tree, as_choice(tip, self.tip_frame, "tip"), as_choice(base, self.base_frame, "base")
+        )
 
     def select(self, path: FrameChain | DHTable, q: Given) -> FloatArray:
         """(..., coordinates) of a path or table out of the robot's `q` (..., nq).
@@ -1191,21 +1198,21 @@ class Robot(Shown):
         """
         if not isinstance(like, DHTable | None):
             raise InputError(
-                "like is a table", found=shown(like), remedy="read_table(FILE) of urdfkin.dh makes one"
+                "like is a table", found=safe_repr(like), remedy="read_table(FILE) of urdfkin.dh makes one"
             )
         table = dh_table(
             self.tree,
-            choice(tip, self.tip_frame, "tip"),
-            choice(base, self.base_frame, "base"),
-            word(convention, "convention"),
-            near_parallel=word(near_parallel, "near_parallel"),
+            as_choice(tip, self.tip_frame, "tip"),
+            as_choice(base, self.base_frame, "base"),
+            as_str(convention, "convention"),
+            near_parallel=as_str(near_parallel, "near_parallel"),
             snap=snap,
-            last=word(last, "last"),
-            parallel_offset=word(parallel_offset, "parallel_offset"),
-            flip=[word(joint, "each of flip") for joint in words(flip, "flip")],
-            first=word(first, "first"),
-            sign=word(sign, "sign"),
-            slide=word(slide, "slide"),
+            last=as_str(last, "last"),
+            parallel_offset=as_str(parallel_offset, "parallel_offset"),
+            flip=[as_str(joint, "each of flip") for joint in as_names(flip, "flip")],
+            first=as_str(first, "first"),
+            sign=as_str(sign, "sign"),
+            slide=as_str(slide, "slide"),
             like=like,
         )
         if self.verifier.wanted(verify):
@@ -1214,7 +1221,7 @@ class Robot(Shown):
 
     def screws(
         self, tip: str | None = None, base: str | None = None, *, verify: bool | None = None
-    ) -> Screws:
+    ) -> ProductOfExponentials:
         """The product of exponentials of the path between two frames, checked against Pinocchio.
 
         Args:
@@ -1260,11 +1267,11 @@ class Robot(Shown):
 
     # -- inside --------------------------------------------------------------------------------------
 
-    def plan(self, links: Sequence[int]) -> Plan:
+    def plan(self, links: Sequence[int]) -> CompiledTree:
         """The walk that meets the given links, made once."""
         key = tuple(links)
         if (plan := self._plans.get(key)) is None:
-            plan = self._plans[key] = make_plan(self.tree, key)
+            plan = self._plans[key] = compile_tree(self.tree, key)
         return plan
 
     def _computed(

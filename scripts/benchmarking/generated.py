@@ -22,7 +22,7 @@ import numpy as np
 from scripts.benchmarking.subject import Subject
 from scripts.benchmarking.timing import Work
 from urdfkin.compiled import sine
-from urdfkin.compiled.plan import Motion, Plan, Step
+from urdfkin.compiled.plan import CompiledTree, Motion, Step
 from urdfkin.kinematics import equations
 from urdfkin.model.tree import FloatArray
 
@@ -35,7 +35,9 @@ _FLAGS = ("-std=gnu11", "-O3", "-march=native", "-shared", "-fPIC")
 # -- the equations along one path ------------------------------------------------------------------------
 
 
-def columns(plan: Plan, x: Any, sines: Any, cosines: Any, eq: Any = equations) -> Iterator[tuple[Any, Any]]:
+def columns(
+    plan: CompiledTree, x: Any, sines: Any, cosines: Any, eq: Any = equations
+) -> Iterator[tuple[Any, Any]]:
     """7.85 in the world's axes: (linear, angular) of each of the path's joints, one number each.
 
     Args:
@@ -62,7 +64,7 @@ def columns(plan: Plan, x: Any, sines: Any, cosines: Any, eq: Any = equations) -
 
 
 def acceleration(
-    plan: Plan, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
+    plan: CompiledTree, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
 ) -> tuple[Any, Any]:
     """7.127 to 7.130 in each link's own axes, as in `compiled.walk`: (linear, angular) in the world's."""
     R, w, alpha, acc = np.eye(3).tolist(), [0.0] * 3, [0.0] * 3, [0.0] * 3
@@ -89,7 +91,7 @@ def acceleration(
 _Z = [0.0, 0.0, 1.0]
 
 
-def _motions(plan: Plan) -> list[Motion]:
+def _motions(plan: CompiledTree) -> list[Motion]:
     found = [Motion(kind) for kind in plan.steps[:, Step.KIND].tolist()]
     if set(found) - {Motion.TURN, Motion.SLIDE}:
         raise ValueError("a joint with more than one coordinate")
@@ -153,7 +155,7 @@ def _listed(numbers: Sequence[float]) -> str:
     return ", ".join(map(repr, numbers))
 
 
-def _straight_line(plan: Plan, quantity: str) -> str:
+def _straight_line(plan: CompiledTree, quantity: str) -> str:
     """CasADi's C for one configuration: a function of (x, sines, cosines, v, a) of the path's joints."""
     import casadi  # noqa: PLC0415  installed or not
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.compiled import axes, outputs, walk
-from urdfkin.compiled.plan import Plan
+from urdfkin.compiled import axes, outputs, recursion
+from urdfkin.compiled.plan import CompiledTree
 from urdfkin.compiled.program import KEPT_ROWS, WIDTH, Head, Op, program_of
-from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.number_kinds import bound
 
 #: Reduction 10, z and 1 - z/2 with what they lose 8, two polynomials 20, last steps 13 (`compiled.sine`).
 _SINE_COSINE = 51
@@ -98,7 +98,7 @@ class _Walk:
             "one": lambda: one,
             "nothing": lambda: nothing,
         }
-        for module in (axes, walk, outputs):
+        for module in (axes, recursion, outputs):
             for name, value in vars(module).items():
                 if hasattr(value, "py_func"):
                     self.names.setdefault(name, FunctionType(value.py_func.__code__, self.names, name))
@@ -108,7 +108,7 @@ class _Walk:
         self.state = (triple, triple, triple), triple, triple, triple, triple, triple
 
 
-def operations(plan: Plan, quantity: str) -> int:
+def operations(plan: CompiledTree, quantity: str) -> int:
     """For one frame in LOCAL_WORLD_ALIGNED: "jacobian", "velocity" or "acceleration"."""
     columns = quantity == "jacobian"
     program, run = program_of(plan, turned=False, columns=columns), _Walk()

@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 import urdfkin
-from urdfkin.compiled.plan import Plan
+from urdfkin.compiled.plan import CompiledTree
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
@@ -67,7 +67,7 @@ class Subject:
         return min(self.n, LOOP)
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> CompiledTree:
         """The walk that meets the frame."""
         return self.robot.plan([self.robot.tree.frame_link(self.frame)])
 

@@ -16,7 +16,7 @@ import numpy as np
 from scripts.benchmarking.calls import Calls
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
 from scripts.benchmarking.timing import Work, times
-from urdfkin.compiled import cores
+from urdfkin.compiled import kernels
 from urdfkin.compiled.evaluate import is_staged, task_of
 from urdfkin.compiled.program import WIDTH, Head, Op, Program, program_of
 from urdfkin.compiled.single import single
@@ -67,7 +67,7 @@ def _core(subject: Subject, quantity: str, program: Program, who: str) -> Work:
     out = np.empty((subject.n, *subject.width(quantity)))
     staged = who == "writing results" and is_staged(out)
     task, memory = task_of(program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, staged=staged)
-    core = getattr(cores, f"{quantity}s")
+    core = getattr(kernels, f"{quantity}s")
     kept = program, memory, out, inputs  # what the task holds addresses of
 
     def compute(_: object = kept) -> None:

@@ -14,9 +14,9 @@ import numpy as np
 import urdfkin
 from scripts.fuzzing import Case
 from scripts.fuzzing.judge import Outcome
+from urdfkin.calibration.calibrate import ImplausibleError, calibrate
+from urdfkin.calibration.parameters import urdf_model
 from urdfkin.kinematics.rotation import exp_rotation
-from urdfkin.sameness.calibration.calibrate import ImplausibleError, calibrate
-from urdfkin.sameness.calibration.models import urdf_model
 
 FAMILY = "calibrations"
 ARMS = ("ur3", "ur5", "ur10", "panda", "z1", "xarm7", "kinova", "so100", "talos_left_arm", "elbow", "polar")

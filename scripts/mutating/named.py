@@ -14,7 +14,7 @@ class Named:
 
     Attributes:
         claim: What must not go unnoticed.
-        module: Where, `urdfkin.validation.tally`.
+        module: Where, `urdfkin.validation.error_stats`.
         before: A piece of the module's text, which stands there once.
         after: What is put in its place.
         test: The test that must fail then, and passes without.

@@ -35,7 +35,7 @@ def files(parts: list[str]) -> list[Path]:
 
 
 def module_of(path: Path) -> str:
-    """`urdfkin.dh.read` for its file."""
+    """`urdfkin.dh.parse_table` for its file."""
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 

@@ -45,7 +45,7 @@ from urdfkin.errors import OracleError
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.urdf.origin import Origin
+from urdfkin.urdf.sources import Origin
 
 #: Where a user's numbers pass on their way to the result, and on their way to Pinocchio.
 MODULES = (

@@ -14,14 +14,14 @@ import pytest
 
 import urdfkin
 from urdfkin.errors import RepresentationSingularityError
-from urdfkin.kinematics.bodies import representation as module
+from urdfkin.kinematics import bodies as module
 from urdfkin.kinematics.rotation.euler import SEQUENCES, rotation_from_euler
 from urdfkin.kinematics.rotation.quaternion import quaternion_of
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.verify.line_of_nodes import euler_jacobian, quaternion_jacobian
+from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 
 REPRESENTATIONS = (*SEQUENCES, "quaternion")
 FREE = '<robot name="free"><link name="body"/></robot>'

@@ -7,12 +7,12 @@ import pytest
 import urdfkin
 from tests.reading import tree_of
 from urdfkin.compiled.evaluate import placements
-from urdfkin.compiled.plan import make_plan
+from urdfkin.compiled.plan import compile_tree
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import freed
 from urdfkin.robot import Robot
-from urdfkin.urdf.origin import Origin
-from urdfkin.verify.followers import rules_of_text
+from urdfkin.urdf.sources import Origin
+from urdfkin.verify.pinocchio_inputs import rules_of_text
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 
@@ -85,7 +85,7 @@ def test_no_kernel_fuses_the_multiplication_and_the_addition() -> None:
         robot = urdfkin.load(text((repr(m), repr(c))), verify=False)
         q = rng.uniform(-1e9, 1e9, (64, 1))
         free = freed(robot.tree)
-        alone = placements(make_plan(free, [2]), np.hstack((q, m * q + c)))[:, 0]
+        alone = placements(compile_tree(free, [2]), np.hstack((q, m * q + c)))[:, 0]
         np.testing.assert_array_equal(robot.placement(q, "l2"), alone)
         np.testing.assert_array_equal(robot.prepare("l2").placement(q[0]), alone[0])
 

@@ -9,7 +9,7 @@ import pytest
 
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.tally import tally
+from urdfkin.validation.error_stats import tally
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.certificate import Comparison
 

@@ -12,7 +12,7 @@ import pytest
 
 from tests.cli.running import process, urdfkin
 from tests.report.documents import arms
-from urdfkin.cli import crash
+from urdfkin.cli import exit
 from urdfkin.errors import InputError
 from urdfkin.report import html, junit
 from urdfkin.validation import campaign
@@ -27,7 +27,7 @@ def _raising(error: BaseException) -> Callable[..., Any]:
 
 
 def _run(error: BaseException) -> int:
-    return crash.run(click.Command("test", callback=_raising(error)), "test")
+    return exit.run(click.Command("test", callback=_raising(error)), "test")
 
 
 @pytest.mark.parametrize("error", [RuntimeError("odd"), MemoryError(), OSError(5, "odd"), RecursionError()])

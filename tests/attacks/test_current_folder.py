@@ -106,11 +106,11 @@ def test_compiling_runs_nothing_there(
 def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from urdfkin.compiled import ahead  # noqa: PLC0415
+    from urdfkin.compiled import preload  # noqa: PLC0415
 
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend("")  # as in `python -c`
-    assert ahead._compile_elsewhere(("placements",)).wait() == 0
+    assert preload._compile_elsewhere(("placements",)).wait() == 0
     assert planted_code_ran(folder) == []
 
 

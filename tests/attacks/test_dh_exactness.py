@@ -13,7 +13,7 @@ from tests.cli.running import urdfkin as command
 from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
 from urdfkin.dh import DHTable, dh_table, export
-from urdfkin.dh.hint import noisy_cells
+from urdfkin.dh.snapping import noisy_cells
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import JointKind, KinematicTree, Mimic

@@ -17,7 +17,7 @@ from urdfkin.dh.printed import printed
 from urdfkin.dh.references import reference_path
 from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import UnknownNameError
-from urdfkin.urdf.xacro_arguments import arguments_of
+from urdfkin.urdf.xacro import arguments_of
 
 CHOICES = (
     ("--snap", "1e-3"),

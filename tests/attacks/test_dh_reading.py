@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 import urdfkin
 from urdfkin.dh import export, read_table, table_from_mapping, table_from_rows
-from urdfkin.dh.digits import last_digits
-from urdfkin.dh.read import read_mapping, table_from_text
+from urdfkin.dh.parse_table import read_mapping, table_from_text
 from urdfkin.dh.references import references
+from urdfkin.dh.rows import last_digits
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 
 UR5 = [

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 import urdfkin
 from urdfkin.errors import RangeError
-from urdfkin.kinematics.lengths import product
+from urdfkin.kinematics.number_kinds import product
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.verify.magnitudes import magnitudes
+from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.quantities import VELOCITY
 
 #: A planar, a floating and a sliding joint between turning ones, and two followers.

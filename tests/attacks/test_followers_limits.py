@@ -19,7 +19,7 @@ from urdfkin.report.document import asset
 from urdfkin.report.html import as_html
 from urdfkin.robot import Robot
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.description import describe
+from urdfkin.validation.robot_summary import describe
 from urdfkin.verify.sampling import draw
 
 

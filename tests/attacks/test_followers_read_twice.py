@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 import urdfkin
 from tests.reading import tree_of
 from urdfkin.robot import Robot
-from urdfkin.urdf.origin import Origin
-from urdfkin.verify.followers import rules_of_text
+from urdfkin.urdf.sources import Origin
+from urdfkin.verify.pinocchio_inputs import rules_of_text
 
 
 def chain_of_followers(rules: list[tuple[int, float, float]]) -> str:

@@ -131,7 +131,7 @@ def test_every_lock_and_pool_of_the_package_is_made_for_forks() -> None:
         if name in path.read_text(encoding="utf-8") and path.parent.name != "validation"
     }
     assert found == {
-        "system/forking.py: threading.RLock",
+        "system/processes.py: threading.RLock",
         "compiled/batch.py: ThreadPoolExecutor",  # forgotten in the child
         "view/viewer.py: threading.RLock",  # a server that does not fork
     }

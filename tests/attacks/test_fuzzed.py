@@ -6,7 +6,7 @@ import pytest
 
 import urdfkin
 from urdfkin.errors import RangeError
-from urdfkin.validation.judgement import judge
+from urdfkin.validation.accuracy import judge
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 

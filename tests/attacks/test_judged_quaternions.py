@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.validation.judgement import judge
-from urdfkin.verify.exact.decimals import read_exact
-from urdfkin.verify.exact.vectors import mp
+from urdfkin.validation.accuracy import judge
+from urdfkin.verify.exact.numbers import mp, read_exact
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 

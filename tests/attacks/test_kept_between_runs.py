@@ -21,14 +21,13 @@ import pytest
 from tests.cli.running import Done, process
 from urdfkin.compiled import compiling
 from urdfkin.compiled.compiling import NUMBERS, Kernel
-from urdfkin.system import keeping
-from urdfkin.system.keeping import CacheWarning, kept_folder
-from urdfkin.system.sealed import keep, kept
+from urdfkin.system import cache
+from urdfkin.system.cache import CacheWarning, get, kept_folder, put
 
 
 @pytest.fixture(autouse=True)
 def _nothing_said_yet(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(keeping, "_said", set())
+    monkeypatch.setattr(cache, "_said", set())
 
 
 @pytest.fixture
@@ -99,7 +98,7 @@ def test_a_damaged_kernel_is_said_compiled_again_and_mended(damage: str, folder:
 def test_a_kernel_that_is_whole_but_of_another_time_is_compiled_again(folder: Path) -> None:
     ask(fresh())
     (file,) = folder.iterdir()
-    keep(file, pickle.dumps(("not", "a", "kernel")))
+    put(file, pickle.dumps(("not", "a", "kernel")))
     with pytest.warns(CacheWarning, match="is damaged and is made anew"):
         assert ask(fresh()) == 7
     assert not was_compiled(fresh())
@@ -109,16 +108,16 @@ def test_a_kept_file_in_another_folder_of_its_name_is_noticed(tmp_path: Path) ->
     first, second = tmp_path / "library-1" / "machine.code", tmp_path / "library-2" / "machine.code"
     for place in (first, second):
         place.parent.mkdir()
-    keep(first, b"of the first")
+    put(first, b"of the first")
     second.write_bytes(first.read_bytes())
     with pytest.warns(CacheWarning, match="its content is not what was written under this name"):
-        assert kept(second) is None
-    assert kept(first) == b"of the first"
+        assert get(second) is None
+    assert get(first) == b"of the first"
     first.parent.rename(tmp_path / "moved")
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "moved").rename(tmp_path / "elsewhere" / "library-1")
     assert (
-        kept(tmp_path / "elsewhere" / "library-1" / "machine.code") == b"of the first"
+        get(tmp_path / "elsewhere" / "library-1" / "machine.code") == b"of the first"
     )  # the cache as a whole
 
 
@@ -133,7 +132,7 @@ def no_room(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     def refuse(*_: object, **__: object) -> None:
         raise OSError(code, os.strerror(code))
 
-    monkeypatch.setattr("urdfkin.system.sealed.tempfile.NamedTemporaryFile", refuse)
+    monkeypatch.setattr("urdfkin.system.cache.tempfile.NamedTemporaryFile", refuse)
     return code
 
 
@@ -166,10 +165,10 @@ def test_a_file_that_ends_in_the_middle_leaves_nothing_behind(
 ) -> None:
     largest_file(1000)
     with pytest.warns(CacheWarning, match=f"nothing can be kept in .*: {os.strerror(errno.EFBIG)}"):
-        keep(tmp_path / "kept", bytes(5000))
+        put(tmp_path / "kept", bytes(5000))
     assert list(tmp_path.iterdir()) == []
-    keep(tmp_path / "kept", bytes(500))
-    assert kept(tmp_path / "kept") == bytes(500)
+    put(tmp_path / "kept", bytes(500))
+    assert get(tmp_path / "kept") == bytes(500)
 
 
 @pytest.mark.slow
@@ -262,9 +261,9 @@ def test_a_folder_of_a_group_is_refused_but_not_that_of_a_users_own_group(
     folder = kept_folder("kernels", [], root=tmp_path)
     assert folder is not None
     folder.chmod(0o770)
-    monkeypatch.setattr(keeping, "_is_private", lambda group: True)
+    monkeypatch.setattr(cache, "_is_private", lambda group: True)
     assert kept_folder("kernels", [], root=tmp_path) == folder
-    monkeypatch.setattr(keeping, "_is_private", lambda group: False)
+    monkeypatch.setattr(cache, "_is_private", lambda group: False)
     refused(tmp_path, "a group may write in")
 
 
@@ -302,7 +301,7 @@ def test_a_planted_kernel_of_another_user_is_not_unpickled(
     ask(fresh())
     (folder,) = tmp_path.iterdir()
     (file,) = (path for path in folder.iterdir() if path.name != ".used")
-    keep(file, pickle.dumps(Planted()))
+    put(file, pickle.dumps(Planted()))
     os.chown(folder, 12345, 12345)
     with pytest.warns(CacheWarning, match="belongs to another user"):
         assert ask(fresh()) == 7

@@ -11,8 +11,8 @@ import pytest
 from urdfkin import compiled as recursion
 from urdfkin import kinematics
 from urdfkin.compiled import compiling
-from urdfkin.system import keeping
-from urdfkin.system.keeping import kept_folder
+from urdfkin.system import cache
+from urdfkin.system.cache import kept_folder
 
 
 @pytest.mark.parametrize("changed", [0, 1, 2])
@@ -57,7 +57,7 @@ def test_even_whom_one_trusts_above_a_folder_may_not_own_the_folder_itself(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     owner = tmp_path.stat().st_uid
-    assert keeping._not_ours(tmp_path) is None
-    monkeypatch.setattr(keeping, "_TRUSTED", (0, owner))
+    assert cache._not_ours(tmp_path) is None
+    monkeypatch.setattr(cache, "_TRUSTED", (0, owner))
     monkeypatch.setattr("os.geteuid", lambda: owner + 1)
-    assert str(keeping._not_ours(tmp_path)).startswith(f"{tmp_path} belongs to another user")
+    assert str(cache._not_ours(tmp_path)).startswith(f"{tmp_path} belongs to another user")

@@ -20,7 +20,7 @@ from urdfkin.errors import InputError, OracleError, UnknownNameError
 from urdfkin.model.frame_names import JointFrame, LinkFrame
 from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
-from urdfkin.validation.judgement import judge
+from urdfkin.validation.accuracy import judge
 
 #: What links and joints are called here.
 ASKED = (*POOL, *(f"{prefix}:{name}" for prefix in ("link", "joint") for name in POOL))

@@ -26,14 +26,12 @@ from markdown_it import MarkdownIt
 import urdfkin
 from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
 from urdfkin.dh import DHTable, export
-from urdfkin.dh.export.tree import write_tree
-from urdfkin.dh.read import read_table
-from urdfkin.dh.tree_parameters import tree_parameters
+from urdfkin.dh.parse_table import read_table
+from urdfkin.dh.tree_parameters import tree_parameters, write_tree
 from urdfkin.dh.units import Units
-from urdfkin.errors.printable import csv_cell, from_csv_cell, markdown_code, markdown_text
-from urdfkin.errors.printable import latex_text as escaped
-from urdfkin.report.compare import compare
-from urdfkin.report.comparison import markdown_of
+from urdfkin.errors.escape import csv_cell, from_csv_cell, markdown_code, markdown_text
+from urdfkin.errors.escape import latex_text as escaped
+from urdfkin.report.compare import compare, markdown_of
 from urdfkin.report.document import Document, asset
 from urdfkin.report.html import as_html
 from urdfkin.report.junit import as_junit

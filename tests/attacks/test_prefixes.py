@@ -11,8 +11,8 @@ import urdfkin
 from tests.lint.cases.arm import arm
 from urdfkin.lint import Finding, Severity
 from urdfkin.robot import Robot
-from urdfkin.validation.judgement import judge
-from urdfkin.view.shapes import shapes
+from urdfkin.validation.accuracy import judge
+from urdfkin.view.scene import shapes
 
 UNDECLARED = "URDF214"
 FOLLOWS = '<mimic joint="j1" multiplier="-2" offset="0.1"/>'

@@ -20,12 +20,12 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as command
 from urdfkin.errors import SourceError
-from urdfkin.motion.archive import read_arrays
+from urdfkin.motion.trajectory import read_arrays
 from urdfkin.system import files
+from urdfkin.system.cache import get
 from urdfkin.system.files import MOST, read_bytes, read_if_there, read_start
 from urdfkin.system.git import version_before
-from urdfkin.system.sealed import kept
-from urdfkin.urdf import mjcf, xacro_arguments
+from urdfkin.urdf import mjcf, xacro
 from urdfkin.urdf.packages import find_package
 from urdfkin.validation.campaign import StoreWarning, validate
 from urdfkin.validation.store import Store
@@ -36,12 +36,12 @@ PACKAGE = Path(urdfkin.__file__).parent
 OTHERS = {
     "cli/streams.py": "/dev/null",
     "export/c.py": "urdfkin's own frames of code",
-    "export/library.py": "/proc, and what the compiler has just made in a folder of its own",
-    "kinematics/registry/entries.py": "urdfkin's own data",
+    "export/compiled_frame.py": "/proc, and what the compiler has just made in a folder of its own",
+    "kinematics/registry/__init__.py": "urdfkin's own data",
     "lint/pages.py": "urdfkin's own pages",
     "report/document.py": "urdfkin's own pages",
     "system/files.py": "the reader",
-    "system/interpreter.py": "the current folder, to return to it",
+    "system/processes.py": "the current folder, to return to it",
     "urdf/catalogue.py": "urdfkin's own catalogue",
     "validation/memory.py": "/proc and /sys",
     "validation/store.py": "a store's lock, refused unless it is a regular file; files that are written",
@@ -130,7 +130,7 @@ def test_a_packages_manifest_that_is_a_link_to_a_device_is_none(tmp_path: Path) 
 def test_a_kept_file_that_is_a_link_to_a_device_is_damaged(tmp_path: Path) -> None:
     (tmp_path / "kernel").symlink_to("/dev/zero")
     with pytest.warns(UserWarning, match="is damaged and is made anew: a character device"):
-        assert kept(tmp_path / "kernel") is None
+        assert get(tmp_path / "kernel") is None
 
 
 def test_a_pipe_that_is_called_as_an_mjcf_file_holds_nobody_up(tmp_path: Path) -> None:
@@ -156,9 +156,9 @@ def test_a_stores_file_that_is_a_link_to_a_device_is_not_read(name: str, tmp_pat
             assert validate("planar_two_link", samples=10, store=tmp_path).passed
         assert not place.is_symlink()
         return
-    from urdfkin.validation.judging import Judged  # noqa: PLC0415
+    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415
 
-    assert Judged.of(Store.reading(tmp_path, said.append)) is None
+    assert AccuracyResult.of(Store.reading(tmp_path, said.append)) is None
     assert "judgements are left out" in said[0]
 
 
@@ -221,12 +221,12 @@ def test_what_a_xacro_file_includes_is_read_nowhere_but_in_the_confined_process(
     elif kind == "a pipe":
         os.mkfifo(part)
     else:
-        part.write_bytes(bytes(xacro_arguments.MOST + 1))
+        part.write_bytes(bytes(xacro.MOST_ARGUMENTS + 1))
 
     def refuse(*_: object, **__: object) -> bytes:
         raise AssertionError("read by the caller's process")
 
-    monkeypatch.setattr(xacro_arguments, "read_bytes", refuse)
+    monkeypatch.setattr(xacro, "read_bytes", refuse)
     robot = urdfkin.load(arm, xacro_args={"length": "a", "unknown": "1"}, verify=False)
     assert robot.link_names == ("a",)
 
@@ -288,8 +288,8 @@ def test_what_a_mesh_names_is_read_from_regular_files_of_its_own_folder(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("trimesh")
-    from urdfkin.view import meshes  # noqa: PLC0415
-    from urdfkin.view.shapes import shapes  # noqa: PLC0415
+    from urdfkin.view import scene  # noqa: PLC0415
+    from urdfkin.view.scene import shapes  # noqa: PLC0415
 
     folder = tmp_path / "mesh"
     folder.mkdir()
@@ -306,10 +306,10 @@ def test_what_a_mesh_names_is_read_from_regular_files_of_its_own_folder(
         read.append(path.name)
         return files.read_bytes(path, most)
 
-    monkeypatch.setattr(meshes, "read_bytes", told)
+    monkeypatch.setattr(scene, "read_bytes", told)
     for mesh in ("a.obj", "own.obj"):
         visual = f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual>'
         (folder / "r.urdf").write_text(f'<robot name="r"><link name="l">{visual}</link></robot>')
         (shape,) = shapes(urdfkin.load(folder / "r.urdf", verify=False))
-        assert meshes.mesh(shape) is not None
+        assert scene.mesh(shape) is not None
     assert read == ["a.obj", "own.obj", "own.mtl"]

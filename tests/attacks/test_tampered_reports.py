@@ -12,7 +12,7 @@ import pytest
 from tests.cli.running import Done, urdfkin
 from tests.report.documents import arms, failing, hostile
 from tests.robots import odd_urdfs
-from urdfkin.report.consistency import contradictions
+from urdfkin.report.reading import contradictions
 from urdfkin.validation.campaign import validate
 
 

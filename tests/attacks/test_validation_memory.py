@@ -14,13 +14,13 @@ import pytest
 
 import urdfkin
 from urdfkin.compiled import evaluate
-from urdfkin.compiled.plan import make_plan
+from urdfkin.compiled.plan import compile_tree
 from urdfkin.validation import chunk as chunk_module
-from urdfkin.validation import comparing, memory
+from urdfkin.validation import comparison, memory
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import chunks, run_chunk
 from urdfkin.validation.outcome import Verdict
-from urdfkin.validation.subject import subject
+from urdfkin.validation.robot_input import subject
 from urdfkin.verify.pinocchio import Oracle, OracleError
 
 GB = 10**9
@@ -40,9 +40,9 @@ def chain(joints: int, kind: str, leaves: int = 0) -> str:
 
 
 def test_blocks_cover_everything_once_and_keep_to_their_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(comparing, "BLOCK_BYTES", 1000)
+    monkeypatch.setattr(comparison, "BLOCK_BYTES", 1000)
     for count, size, most in ((10, 300, 3), (9, 300, 3), (1, 300, 1), (5, 2000, 1), (0, 300, 0)):
-        found = list(comparing.blocks(count, size))
+        found = list(comparison.blocks(count, size))
         assert [i for block in found for i in range(count)[block]] == list(range(count))
         assert max(block.stop - block.start for block in found) == most
 
@@ -55,7 +55,7 @@ def test_comparing_in_blocks_changes_no_number(
 ) -> None:
     (chunk,) = chunks(subject(source, None, root_joint), 5, 3)
     whole = run_chunk(chunk)
-    monkeypatch.setattr(comparing, "BLOCK_BYTES", 2 * comparing.frame_bytes(8, len(whole.joints)))
+    monkeypatch.setattr(comparison, "BLOCK_BYTES", 2 * comparison.frame_bytes(8, len(whole.joints)))
     parts = run_chunk(chunk)
     assert parts.tallies == whole.tallies
     assert list(parts.tallies) == list(whole.tallies)
@@ -79,7 +79,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
         monkeypatch.setattr(Oracle, name, seen(getattr(Oracle, name)))
     for name in ("joint_jacobians", "joint_jacobian_rates"):
         monkeypatch.setattr(Oracle, name, seen(getattr(Oracle, name)))
-    monkeypatch.setattr(comparing, "BLOCK_BYTES", 100_000)
+    monkeypatch.setattr(comparison, "BLOCK_BYTES", 100_000)
     (chunk,) = chunks(subject("talos"), 5, 3)
     run_chunk(chunk)
     assert len(sizes) > 100
@@ -93,7 +93,7 @@ def test_a_plan_of_all_frames_grows_with_the_links_not_with_their_square() -> No
     for links in (500, 2000):
         tree = urdfkin.load(chain(links, "fixed")).tree
         tracemalloc.start()
-        make_plan(tree, range(len(tree.links)))
+        compile_tree(tree, range(len(tree.links)))
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 6 * peaks[0]
@@ -103,7 +103,7 @@ def test_a_plan_of_all_frames_grows_with_the_links_not_with_their_square() -> No
 def test_a_plan_knows_its_frames_as_their_paths_do() -> None:
     robot = urdfkin.load("talos")
     links = [5, 40, 0, 17, 40]
-    plan = make_plan(robot.tree, links)
+    plan = compile_tree(robot.tree, links)
     paths = [robot.tree.path(link) for link in links]
     assert plan.depth.tolist() == [len(path) for path in paths]
     wanted = sorted({i for path in paths for i in path if robot.tree.joints[i].kind.nv})

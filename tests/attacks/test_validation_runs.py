@@ -16,13 +16,13 @@ import pytest
 
 from tests.validation import raising_worker
 from urdfkin.errors import UrdfkinError
-from urdfkin.validation import answer, child, engine
+from urdfkin.validation import answer, engines, worker_processes
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, chunks, run_chunk
-from urdfkin.validation.engine import Here, OnExecutor, Task
+from urdfkin.validation.engines import ExecutorEngine, SerialEngine, Task
 from urdfkin.validation.outcome import Verdict, outcome
 from urdfkin.validation.results import ValidationReport
-from urdfkin.validation.subject import subject
+from urdfkin.validation.robot_input import subject
 
 ROBOTS = ["double_pendulum", "ur5", "planar_two_link"]
 ROOT = Path(__file__).parents[2]
@@ -45,7 +45,7 @@ def test_whatever_a_robot_raises_is_its_result_and_the_others_are_verified(
     way: str, error: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("URDFKIN_TEST_ERROR", error)
-    monkeypatch.setattr(child, "WORKER", "tests.validation.raising_worker")
+    monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.raising_worker")
     monkeypatch.setattr(answer, "run_chunk", raising_worker.raising)
     report = validate(ROBOTS, samples=60, **WAYS[way][0]())
     assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "verified"]
@@ -116,7 +116,7 @@ def test_an_executor_has_a_bounded_number_of_chunks_at_a_time_and_all_of_them_in
             setattr(future, "result", result)  # noqa: B010
             return future
 
-    monkeypatch.setattr(engine, "IN_FLIGHT", 3)
+    monkeypatch.setattr(engines, "IN_FLIGHT", 3)
     report = validate(["planar_two_link", "double_pendulum"], samples=200, executor=Counting())
     assert report.passed
     assert (most, flying) == (3, 0)
@@ -125,7 +125,7 @@ def test_an_executor_has_a_bounded_number_of_chunks_at_a_time_and_all_of_them_in
 
 @pytest.mark.parametrize("how", [{}, {"executor": ThreadPoolExecutor(1)}], ids=["here", "executor"])
 def test_the_chunks_of_a_robot_that_failed_are_not_run(how: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "IN_FLIGHT", 1)
+    monkeypatch.setattr(engines, "IN_FLIGHT", 1)
     ran: list[int] = []
 
     def failing(chunk: Chunk) -> ChunkResult:
@@ -162,13 +162,13 @@ def test_a_disagreement_stays_one_whatever_else_goes_wrong(monkeypatch: pytest.M
 def test_what_the_machinery_itself_raises_is_every_unfinished_robots_result(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    right = Here.run
+    right = SerialEngine.run
 
-    def breaks(self: Here, work: engine.Work, enter: engine.Enter) -> None:
+    def breaks(self: SerialEngine, work: engines.Work, enter: engines.Enter) -> None:
         right(self, list(work)[:1], enter)
         raise OSError("no more of anything")
 
-    monkeypatch.setattr(Here, "run", breaks)
+    monkeypatch.setattr(SerialEngine, "run", breaks)
     report = validate(ROBOTS, samples=1)
     assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "not verified"]
     assert "OSError: no more of anything" in str(report.robots[2].reason)
@@ -228,7 +228,7 @@ def test_an_interrupt_keeps_what_had_finished_and_drops_what_waits(
             future.set_result(fn(*args, **kwargs))
             return future
 
-    monkeypatch.setattr(engine, "IN_FLIGHT", 1)
+    monkeypatch.setattr(engines, "IN_FLIGHT", 1)
     monkeypatch.setattr(answer, "run_chunk", interrupted)
     report = validate(ROBOTS, samples=60, executor=None if way == "here" else Now())
     assert ran[-1] == ("ur5", 1)
@@ -254,7 +254,7 @@ def test_an_executors_waiting_chunks_are_cancelled_on_an_interrupt() -> None:
 
     tasks = [Task(0, chunk) for chunk in chunks(subject("ur5"), 100, 0)]
     with pytest.raises(KeyboardInterrupt):
-        OnExecutor(Never()).run([tasks], lambda *_: None)
+        ExecutorEngine(Never()).run([tasks], lambda *_: None)
     assert [future.cancelled() for future in made] == [True, True, False]
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from urdfkin.cli.stopping import Stop, stoppable
+from urdfkin.cli.exit import Stop, stoppable
 
 pytestmark = pytest.mark.slow
 
@@ -132,7 +132,7 @@ def test_a_worker_ends_at_the_end_of_its_pipe_alone(tmp_path: Path) -> None:
 
 
 def test_a_worker_whose_parent_is_gone_already_does_not_begin() -> None:
-    code = "from urdfkin.validation.worker import _end_with; _end_with(1 << 22); print('began')"
+    code = "from urdfkin.validation.worker_processes import _end_with; _end_with(1 << 22); print('began')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "")
 

@@ -13,14 +13,14 @@ from rich.console import Console
 
 from tests.report.documents import arms, failing
 from tests.report.test_junit import read
-from urdfkin.report.consistency import contradictions
 from urdfkin.report.document import Document, outcome_of
 from urdfkin.report.html import as_html
 from urdfkin.report.markdown import as_markdown
+from urdfkin.report.reading import contradictions
 from urdfkin.report.terminal import print_report
-from urdfkin.validation import chains as chains_module
+from urdfkin.validation import robot_summary as chains_module
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.standing import Standing
+from urdfkin.validation.collector import CampaignProgress
 from urdfkin.verify.tables import TableCheck
 
 
@@ -40,7 +40,7 @@ def _tables(monkeypatch: pytest.MonkeyPatch) -> Document:
 def _tables_without_numbers(monkeypatch: pytest.MonkeyPatch) -> Document:
     right = chains_module.chains_of
     monkeypatch.setattr(
-        "urdfkin.validation.portrait.chains_of",
+        "urdfkin.validation.robot_summary.chains_of",
         lambda *args: tuple(chain | {"share_of_bound": None, "worst": None} for chain in right(*args)),
     )
     return _made("ur5")
@@ -68,7 +68,7 @@ def _crashed(monkeypatch: pytest.MonkeyPatch) -> Document:
 
 
 def _interrupted(_: pytest.MonkeyPatch) -> Document:
-    def stop(standing: Standing) -> None:
+    def stop(standing: CampaignProgress) -> None:
         if standing.chunks_done == 3:
             raise KeyboardInterrupt
 

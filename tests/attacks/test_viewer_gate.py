@@ -16,8 +16,7 @@ import urdfkin
 from urdfkin.cli.view import command
 from urdfkin.errors import InputError
 from urdfkin.view import server as module
-from urdfkin.view.gate import Gate
-from urdfkin.view.server import LOOPBACK, UnguardedError, new_server
+from urdfkin.view.server import LOOPBACK, RequestFilter, UnguardedError, new_server
 from urdfkin.view.viewer import Viewer
 
 viser = pytest.importorskip("viser")
@@ -173,7 +172,7 @@ def test_a_page_with_other_scripts_than_known_is_not_served(monkeypatch: pytest.
 def test_a_gate_that_lets_anybody_in_is_noticed_before_a_robot_is_shown(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(Gate, "refusal", lambda *_, **__: None)
+    monkeypatch.setattr(RequestFilter, "refusal", lambda *_, **__: None)
     with pytest.raises(UnguardedError, match="a page without the key was answered with 200"):
         new_server(port=free_port())
 
@@ -184,11 +183,11 @@ def test_an_address_of_another_machine_is_an_error_and_no_search_without_end() -
 
 
 def test_on_the_whole_network_names_of_others_are_still_refused() -> None:
-    gate = Gate("0.0.0.0", "key")
+    gate = RequestFilter("0.0.0.0", "key")
     own = socket.gethostname()
     for host in ("192.168.1.7:8080", f"{own}:8080", "localhost:8080"):
         assert gate.refusal("/key/", [host], [], connects=False) is None, host
     assert gate.refusal("/key/", ["evil.example:8080"], [], connects=False) is not None
     assert gate.refusal("/", ["192.168.1.7:8080"], [], connects=False) is not None
     assert gate.address(8080) == "http://127.0.0.1:8080/key/"
-    assert Gate("::1", "key").address(80) == "http://[::1]:80/key/"
+    assert RequestFilter("::1", "key").address(80) == "http://[::1]:80/key/"

@@ -16,7 +16,7 @@ from urdfkin.kinematics.rotation.quaternion import rotation_of
 from urdfkin.motion.frame_motion import frame_motion
 from urdfkin.motion.trajectory import Trajectory, read_trajectory
 from urdfkin.robot import Robot
-from urdfkin.view.plot.sheet import foot
+from urdfkin.view.plot import foot
 
 JOINT = (
     '<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'

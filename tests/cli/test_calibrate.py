@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.calibration.arms import BRANCHED, bench
+from tests.calibration.test_way import table
 from tests.cli.running import urdfkin
-from tests.sameness.calibration.arms import BRANCHED, bench
-from tests.sameness.calibration.test_way import table
+from urdfkin.calibration.parameters import table_model
 from urdfkin.dh.export import export
-from urdfkin.dh.read import read_table
-from urdfkin.dh.row import Convention
+from urdfkin.dh.parse_table import read_table
+from urdfkin.dh.table import Convention
 from urdfkin.loading import load
-from urdfkin.sameness.calibration.models import table_model
 
 
 def test_measured_poses_become_a_urdf_and_data(tmp_path: Path) -> None:

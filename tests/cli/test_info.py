@@ -7,7 +7,7 @@ import pytest
 
 import urdfkin as library
 from tests.cli.running import urdfkin
-from urdfkin.model.described import guides
+from urdfkin.model.summary import guides
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, Mimic, build_tree
 from urdfkin.urdf.writer import to_urdf
 

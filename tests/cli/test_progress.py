@@ -11,9 +11,9 @@ import pytest
 from tests.cli.running import urdfkin
 from urdfkin.cli import progress
 from urdfkin.cli.progress import Pace, line
-from urdfkin.validation.standing import Standing
+from urdfkin.validation.collector import CampaignProgress
 
-STANDING = Standing(
+STANDING = CampaignProgress(
     robots_done=2, robots=68, chunks_done=30, chunks=544, chunks_kept=10, failures=0, label="panda"
 )
 

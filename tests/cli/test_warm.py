@@ -9,7 +9,7 @@ import pytest
 
 import urdfkin as library
 from tests.cli.running import process, urdfkin
-from urdfkin.compiled import telling
+from urdfkin.compiled import compiling
 from urdfkin.validation import campaign
 
 
@@ -56,11 +56,11 @@ def test_warm_compiles_everything_and_then_nothing() -> None:
 def test_programs_are_told_by_one_warning_of_a_logger(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(telling, "_logged", [])
+    monkeypatch.setattr(compiling, "_logged", [])
     for name in ("placements", "jacobians"):
-        with telling.told(name) as missed:
+        with compiling.compile_event(name) as missed:
             missed()
-    with telling.told("velocities"):
+    with compiling.compile_event("velocities"):
         pass  # read from disk
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("urdfkin", "WARNING")

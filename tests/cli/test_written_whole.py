@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from urdfkin.cli.output import write_file
-from urdfkin.cli.reports import check_writable
+from urdfkin.cli.report_options import check_writable
 from urdfkin.errors import SourceError
 
 

@@ -6,7 +6,7 @@ import pytest
 from tests.odd_tree import odd_tree, pose, state
 from urdfkin.compiled.breakdown import KINDS, acceleration_breakdown
 from urdfkin.compiled.evaluate import accelerations
-from urdfkin.compiled.plan import make_plan
+from urdfkin.compiled.plan import compile_tree
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import KinematicTree
@@ -29,7 +29,7 @@ def test_the_parts_add_up_to_the_recursions_acceleration(
     generator = np.random.default_rng(2)
     base = BaseMotion(pose(generator), generator.normal(size=6), generator.normal(size=6)).state(())
     parts = acceleration_breakdown(odd, at, q, v, a, reference, base)
-    whole = accelerations(make_plan(odd, [at]), q, v, a, reference, base=base)[:, 0]
+    whole = accelerations(compile_tree(odd, [at]), q, v, a, reference, base=base)[:, 0]
     assert np.abs(parts.total - whole).max() <= ROOM
     assert np.abs(parts.base + parts.by_kind.sum(axis=-2) - whole).max() <= ROOM
 

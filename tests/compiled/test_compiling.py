@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.system.interpreter import own_python
+from urdfkin.system.processes import own_python
 
 _TRIED = """
 import numba.np.linalg, numpy as np, urdfkin

@@ -6,7 +6,7 @@ from scipy.linalg import expm
 
 from tests.odd_tree import odd_tree, pose, state
 from urdfkin.compiled.evaluate import accelerations, jacobian_rates, jacobians, velocities
-from urdfkin.compiled.plan import make_plan
+from urdfkin.compiled.plan import compile_tree
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.rotation import exp_rotation, multiply, quaternion_of, rotation_of, skew
 from urdfkin.model.base_motion import BaseMotion
@@ -60,7 +60,7 @@ def _twist_exponential(twist: FloatArray) -> tuple[FloatArray, FloatArray]:
 def test_it_is_the_derivative_of_the_jacobian_along_the_motion(
     odd: KinematicTree, reference: Reference
 ) -> None:
-    plan = make_plan(odd, range(len(odd.links)))
+    plan = compile_tree(odd, range(len(odd.links)))
     q, v, _ = state(odd, 5, 1)
     step = 1e-3
     weights = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
@@ -77,7 +77,7 @@ def test_it_is_the_derivative_of_the_jacobian_along_the_motion(
 
 
 def test_with_the_jacobian_it_makes_the_acceleration_of_7_126(odd: KinematicTree) -> None:
-    plan = make_plan(odd, range(len(odd.links)))
+    plan = compile_tree(odd, range(len(odd.links)))
     q, v, a = state(odd, 33, 2)
     total = np.einsum("nfij,nj->nfi", jacobians(plan, q), a) + np.einsum(
         "nfij,nj->nfi", jacobian_rates(plan, q, v), v
@@ -86,7 +86,7 @@ def test_with_the_jacobian_it_makes_the_acceleration_of_7_126(odd: KinematicTree
 
 
 def test_in_local_axes_it_makes_the_spatial_acceleration(odd: KinematicTree) -> None:
-    plan = make_plan(odd, range(len(odd.links)))
+    plan = compile_tree(odd, range(len(odd.links)))
     q, v, a = state(odd, 17, 3)
     total = np.einsum("nfij,nj->nfi", jacobians(plan, q, Reference.LOCAL), a) + np.einsum(
         "nfij,nj->nfi", jacobian_rates(plan, q, v, Reference.LOCAL), v
@@ -100,7 +100,7 @@ def test_in_local_axes_it_makes_the_spatial_acceleration(odd: KinematicTree) -> 
 def test_on_a_moving_base_the_rest_is_what_the_base_does(odd: KinematicTree) -> None:
     # The velocity is J v + B, with B that of a robot whose joints stand still. The rate of B is its value at
     # rest and, for the linear rows, w_base x (J v), because the joints move the point that the base carries.
-    plan = make_plan(odd, range(len(odd.links)))
+    plan = compile_tree(odd, range(len(odd.links)))
     q, v, a = state(odd, 9, 4)
     generator = np.random.default_rng(5)
     motion = BaseMotion(pose(generator), generator.normal(size=6), generator.normal(size=6))
@@ -118,16 +118,16 @@ def test_on_a_moving_base_the_rest_is_what_the_base_does(odd: KinematicTree) -> 
 
 def test_a_plan_for_one_frame_and_a_row_of_one_give_the_same(odd: KinematicTree) -> None:
     q, v, _ = state(odd, 35, 6)
-    whole = jacobian_rates(make_plan(odd, range(len(odd.links))), q, v)
+    whole = jacobian_rates(compile_tree(odd, range(len(odd.links))), q, v)
     tyre = odd.link_index("tyre")
-    alone = jacobian_rates(make_plan(odd, [tyre]), q, v)[:, 0]
+    alone = jacobian_rates(compile_tree(odd, [tyre]), q, v)[:, 0]
     assert np.abs(alone - whole[:, tyre]).max() <= 4 * EPS
-    first = jacobian_rates(make_plan(odd, [tyre]), q[:1], v[:1])[0, 0]
+    first = jacobian_rates(compile_tree(odd, [tyre]), q[:1], v[:1])[0, 0]
     assert np.abs(first - alone[0]).max() <= 4 * EPS
 
 
 def test_it_vanishes_when_nothing_moves_and_for_an_empty_batch(odd: KinematicTree) -> None:
-    plan = make_plan(odd, [odd.link_index("wrist")])
+    plan = compile_tree(odd, [odd.link_index("wrist")])
     q, v, _ = state(odd, 3, 8)
     assert not jacobian_rates(plan, q, np.zeros_like(v)).any()
     assert jacobian_rates(plan, q[:0], v[:0]).shape == (0, 1, 6, odd.nv)

@@ -10,9 +10,9 @@ import pytest
 import urdfkin
 from tests.laws.subjects import robot_of, state
 from urdfkin.compiled import evaluate
-from urdfkin.compiled.plan import Plan, make_plan
+from urdfkin.compiled.memory import LANES
+from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.compiled.program import program_of
-from urdfkin.compiled.registers import LANES
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -95,11 +95,11 @@ def test_a_plan_comes_back_from_a_pickle_with_addresses_of_its_own() -> None:
     robot = urdfkin.load("a1", verify=False)
     links = [robot.tree.frame_link(frame) for frame in ("FR_foot", "RL_hip", "trunk")]
     q, v, a = state(robot, 21, 4)
-    plan = make_plan(robot.tree, links)
+    plan = compile_tree(robot.tree, links)
     expected = [evaluate.jacobians(plan, q), evaluate.accelerations(plan, q, v, a)]
     program = program_of(plan, turned=False)
     text = pickle.dumps(plan)
-    again: Plan = pickle.loads(text)
+    again: CompiledTree = pickle.loads(text)
     anew = program_of(again, turned=False)
     assert not set(program.addresses) & set(anew.addresses)
     assert anew.words.tolist() == program.words.tolist()

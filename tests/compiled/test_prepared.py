@@ -21,9 +21,9 @@ import urdfkin
 from tests.laws.everything import differing
 from tests.laws.subjects import robot_of, state
 from urdfkin import Reference
+from urdfkin.compiled.kernel_args import KernelArgs
 from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.compiled.single import arrays_are_known, one_configuration, single
-from urdfkin.compiled.task import Task
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -302,9 +302,9 @@ def test_functions_take_their_own_number_of_arguments_and_no_other(panda: Robot)
     compute, task = single("jacobian", panda.plan([panda.tree.frame_link(FRAME)]), fast.reference)
     for arguments in ((), (q,), (q, None, None), (q, q, None), (None, None), (q, q), (None, q)):
         assert compute(*arguments) is None
-    assert task[Task.COUNT] == 0
+    assert task[KernelArgs.COUNT] == 0
     assert compute(q, None) is not None
-    assert task[Task.COUNT] == 1
+    assert task[KernelArgs.COUNT] == 1
 
 
 def test_arrays_lie_in_memory_as_compiled_code_reads_them() -> None:
@@ -330,12 +330,12 @@ def test_while_one_thread_is_at_work_another_gets_the_same_by_the_robots_way(pan
     q, fast = panda.sample(1, 8)[0], panda.prepare(FRAME)
     expected = fast.jacobian(q)
     task = fast._jacobian.__self__[0]  # type: ignore[attr-defined]
-    task[Task.BUSY] = 1
+    task[KernelArgs.BUSY] = 1
     try:
         assert fast._jacobian(q, None) is None
         assert not differing(fast.jacobian(q), expected)
     finally:
-        task[Task.BUSY] = 0
+        task[KernelArgs.BUSY] = 0
     again = fast._jacobian(q, None)
     assert again is not None
     assert not differing(again, expected)
@@ -384,10 +384,10 @@ def test_threads_that_share_one_without_the_interpreters_lock_get_right_results_
         done, wrong = ask(id(bound), ctypes.addressof(arguments), id(out), out, expected[k])
         return done, wrong
 
-    begun_with = int(bound[0][Task.COUNT])
+    begun_with = int(bound[0][KernelArgs.COUNT])
     ask.compile("UniTuple(int64, 2)(int64, int64, int64, float64[:, ::1], float64[:, ::1])")
     with ThreadPoolExecutor(2) as pool:
         (first, wrong), (second, also_wrong) = pool.map(work, range(2))
     assert (wrong, also_wrong) == (0, 0)
-    assert bound[0][Task.COUNT] - begun_with == first + second
+    assert bound[0][KernelArgs.COUNT] - begun_with == first + second
     assert max(first, second) > 0  # one may find the other at work each time

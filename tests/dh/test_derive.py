@@ -15,8 +15,7 @@ from tests.dh.arms import arm
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.dh.make import dh_table
-from urdfkin.dh.row import Convention
-from urdfkin.dh.table import DHTable
+from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation.euler import rotation_from_rpy
 from urdfkin.model.chain import FrameChain, chain

@@ -11,7 +11,7 @@ import pytest
 
 from tests.cli.test_dh import run_any
 from urdfkin.dh import DHTable, table_from_rows
-from urdfkin.dh.opw import opw_of
+from urdfkin.dh.structure import opw_of
 from urdfkin.errors import InputError
 from urdfkin.loading import load
 

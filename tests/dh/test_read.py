@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.random_chains import trees
 from urdfkin.dh import dh_table, export, read_table, table_from_mapping, table_from_rows
-from urdfkin.dh.read import table_from_text
+from urdfkin.dh.parse_table import table_from_text
 from urdfkin.errors import InputError, SourceError
 from urdfkin.model.tree import KinematicTree
 

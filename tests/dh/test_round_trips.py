@@ -9,11 +9,9 @@ from hypothesis import strategies as st
 
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, trees
-from urdfkin.dh.convert import to_convention
+from urdfkin.dh.convert import to_convention, to_tree
 from urdfkin.dh.make import dh_table
-from urdfkin.dh.row import Convention, DHRow
-from urdfkin.dh.table import DHTable
-from urdfkin.dh.to_tree import to_tree
+from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic

@@ -16,13 +16,13 @@ from scipy.linalg import expm
 from tests.cli.test_dh import run_any
 from tests.random_chains import trees
 from urdfkin.dh.export.screws import write_screws
-from urdfkin.dh.screws import Screws, screws_from, screws_of
+from urdfkin.dh.screws import ProductOfExponentials, screws_from, screws_of
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.loading import load
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.verify.screws import check_screws
+from urdfkin.verify.chain_checks import check_screws
 from urdfkin.verify.tables import TableError
 
 #: Lynch and Park, Modern Robotics, example 4.5: a UR5 with W1 = 109 mm, W2 = 82, L1 = 425, L2 = 392, H1 = 89,
@@ -81,7 +81,7 @@ def test_a_robots_screws_are_checked_and_lead_back(name: str) -> None:
     assert again.tree.links[0] == robot.base_frame
     q = robot.sample(5, seed=1)
     values = screws.coupling.values(screws.coupling.select(robot.tree, q))
-    free = Screws(screws.joints, screws.M, screws.space)
+    free = ProductOfExponentials(screws.joints, screws.M, screws.space)
     free = screws_from(free.space, free.M, joints=[joint.name for joint in screws.joints])
     np.testing.assert_allclose(
         free.placement(values), screws.placement(screws.coupling.select(robot.tree, q)), atol=1e-14
@@ -96,7 +96,9 @@ def test_a_wrong_screw_is_found_by_pinocchio() -> None:
     with pytest.raises(TableError, match="product of exponentials disagrees"):
         check_screws(
             robot.verifier,
-            Screws(screws.joints, screws.M, wrong, *("ur5", screws.base_frame, screws.tip_frame)),
+            ProductOfExponentials(
+                screws.joints, screws.M, wrong, *("ur5", screws.base_frame, screws.tip_frame)
+            ),
         )
 
 

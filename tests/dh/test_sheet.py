@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from tests.cli.test_dh import run
 from tests.random_chains import trees
 from urdfkin.dh import dh_table, export, read_table, table_from_rows, to_convention, units_of
-from urdfkin.dh.digits import last_digits
 from urdfkin.dh.expression import NoCellError, cell_of
-from urdfkin.dh.read import is_table_file, mapping_from_text, table_from_text
+from urdfkin.dh.parse_table import is_table_file, mapping_from_text, table_from_text
 from urdfkin.dh.references import reference_path, references
+from urdfkin.dh.rows import last_digits
 from urdfkin.errors import InputError
 from urdfkin.loading import load
 from urdfkin.model.tree import KinematicTree

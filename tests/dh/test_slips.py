@@ -14,10 +14,9 @@ from tests.cli.test_dh import run
 from tests.dh.test_compare import elbow
 from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows
 from urdfkin.dh.compare import TOLERANCE, diagnose
-from urdfkin.dh.doubts import doubts
-from urdfkin.dh.reading import as_said, other_readings
+from urdfkin.dh.hypotheses import as_said, doubts, other_readings
 from urdfkin.dh.references import reference_path
-from urdfkin.dh.written_row import ORDER
+from urdfkin.dh.rows import ORDER
 from urdfkin.errors import InputError
 from urdfkin.lint.finding import UrdfWarning
 from urdfkin.loading import load

@@ -12,7 +12,7 @@ from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
 from urdfkin.dh import dh_table
 from urdfkin.dh.snapping import _change, _snap_pose, rotation_angle, row_of_constant
-from urdfkin.dh.statement import SnapChange, SnapStatement
+from urdfkin.dh.table import SnapChange, SnapReport
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit, build_tree
 
@@ -82,7 +82,7 @@ def test_the_travel_of_what_slides_lengthens_the_lever(limit: Limit | None, trav
 
 def test_a_statement_adds_up_what_is_said_of_each_change() -> None:
     changes = (SnapChange(1, "x", 1e-3, 2.0, ("s",)), SnapChange(-1, "y", 2e-3, 5.0))
-    said = SnapStatement(1e-2, changes, 0.0, 0.0, {"s": 1e-3})
+    said = SnapReport(1e-2, changes, 0.0, 0.0, {"s": 1e-3})
     assert said.rows == (-1, 1)
     assert said.bound({"s": np.array([0.0, -10.0])}) == pytest.approx([0.012, 0.022])
 

@@ -15,8 +15,7 @@ import pytest
 from tests.dh.test_opw import NAMES, table
 from urdfkin.dh import export
 from urdfkin.dh.export.screws import write_screws
-from urdfkin.dh.opw import opw_of
-from urdfkin.dh.structure import structure
+from urdfkin.dh.structure import opw_of, structure
 from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot

@@ -14,8 +14,7 @@ from tests.dh.arms import arm
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, step, trees
 from urdfkin.dh import dh_table, units_of
-from urdfkin.dh.export.tree import as_mapping, write_tree
-from urdfkin.dh.tree_parameters import tree_parameters
+from urdfkin.dh.tree_parameters import as_mapping, tree_parameters, write_tree
 from urdfkin.errors import InputError
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
 

@@ -15,7 +15,7 @@ from tests.robots.odd_urdfs import urdf_of
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import c, compiled_frame
 from urdfkin.export.code import exported
-from urdfkin.export.library import NoCompilerError, library
+from urdfkin.export.compiled_frame import NoCompilerError, library
 from urdfkin.robot import Robot
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.quantities import quantity

@@ -11,16 +11,15 @@ from hypothesis import strategies as st
 
 from tests.strategies import rotations, trees
 from urdfkin.compiled.evaluate import accelerations, placements, velocities
-from urdfkin.compiled.plan import make_plan
+from urdfkin.compiled.plan import compile_tree
 from urdfkin.kinematics import equations
-from urdfkin.kinematics.arithmetic import VECTORS
-from urdfkin.kinematics.arrays import chapter as on_vectors
-from urdfkin.kinematics.lengths import chapter as on_lengths
-from urdfkin.kinematics.lengths import counted, norm, product
+from urdfkin.kinematics.number_kinds import VECTORS, counted, norm, product
+from urdfkin.kinematics.number_kinds import array_equations as on_vectors
+from urdfkin.kinematics.number_kinds import length_equations as on_lengths
 from urdfkin.kinematics.roundings import EPS, SMALLEST
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.verify.magnitudes import magnitudes
+from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.sampling import draw
 
 #: Every equation of motion; a rotation made of a sine and a cosine has no length.
@@ -99,7 +98,7 @@ def test_a_product_is_no_less_than_the_smallest_normal_number_unless_a_factor_is
 def test_no_motion_of_any_link_of_any_tree_exceeds_its_size(
     tree: KinematicTree, seed: int, speed: float
 ) -> None:
-    plan = make_plan(tree, range(len(tree.links)))
+    plan = compile_tree(tree, range(len(tree.links)))
     samples = draw(tree, 5, np.random.default_rng(seed), with_special=True)
     q, v, a = samples.q, speed * samples.v, speed * samples.a
     size = magnitudes(plan, q, v, a, STILL_STATE)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tests.counted import Counted, Matrix, all_conspiring, deviation, eq, matrix, sine_cosine, unit
-from urdfkin.dh.elements import nearest_twelfth
 from urdfkin.dh.snapping import _round_rotation, rotation_angle
+from urdfkin.dh.table import nearest_twelfth
 from urdfkin.kinematics import roundings
 from urdfkin.kinematics.rotation.euler import rotation_from_rpy
 from urdfkin.kinematics.roundings import EPS

@@ -10,8 +10,7 @@ from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.verify.bounds import Bound
-from urdfkin.verify.magnitudes import magnitudes
+from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, JACOBIAN_RATE
 
 

@@ -18,8 +18,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
 from urdfkin.verify.exact import recursion
-from urdfkin.verify.exact.decimals import read_exact
-from urdfkin.verify.exact.vectors import about, exact, from_quaternion, mp
+from urdfkin.verify.exact.numbers import about, exact, from_quaternion, mp, read_exact
 from urdfkin.verify.quantities import HESSIAN, JACOBIAN
 
 _STEP = mp.mpf(10) ** -18

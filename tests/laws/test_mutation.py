@@ -12,12 +12,12 @@ import pytest
 import urdfkin
 from tests.laws.subjects import robot_of
 from tests.reading import tree_of
-from urdfkin.compiled.plan import make_plan
+from urdfkin.compiled.plan import compile_tree
 from urdfkin.kinematics import equations
-from urdfkin.kinematics.arithmetic import VECTORS
+from urdfkin.kinematics.number_kinds import VECTORS
 from urdfkin.robot import Robot
-from urdfkin.urdf.origin import Origin
-from urdfkin.validation.judgement import judge
+from urdfkin.urdf.sources import Origin
+from urdfkin.validation.accuracy import judge
 from urdfkin.verify.exact import recursion
 from urdfkin.verify.pinocchio import Oracle
 
@@ -140,4 +140,4 @@ def test_pinocchio_reads_the_text_itself() -> None:
     q = robot.neutral()[np.newaxis]
     here, there = (Oracle(text, robot.tree).placements(q, ["panda_link1"]) for text in (robot.urdf, moved))
     assert there[0, 0, 2, 3] - here[0, 0, 2, 3] == pytest.approx(0.1)
-    assert make_plan(robot.tree, [1]).lengths.sum() == pytest.approx(0.333)
+    assert compile_tree(robot.tree, [1]).lengths.sum() == pytest.approx(0.333)

@@ -9,9 +9,8 @@ import pytest
 
 from tests.lint.cases import CASES
 from urdfkin.lint import Finding, Severity, check
-from urdfkin.lint.formats import as_github, as_json, summary
+from urdfkin.lint.formats import as_github, as_json, as_sarif, summary
 from urdfkin.lint.pages import RULES
-from urdfkin.lint.sarif import as_sarif
 
 
 @pytest.fixture(scope="module")

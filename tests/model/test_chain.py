@@ -14,7 +14,7 @@ from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Mimic, build_tree
-from urdfkin.verify.chains import check_chain
+from urdfkin.verify.chain_checks import check_chain
 from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.tables import TableError
 

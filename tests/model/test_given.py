@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 import urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
-from urdfkin.errors.measured import in_radians, measured
+from urdfkin.errors.numbers import in_radians, parse_quantity
 from urdfkin.model.configuration import places
-from urdfkin.model.given import Places
+from urdfkin.model.configuration_like import CoordinateLayout
 from urdfkin.robot import Robot
 
 #: The limits of echo narrow those of elbow, which a test relies on.
@@ -184,7 +184,7 @@ def test_no_moving_joint_takes_no_number() -> None:
 @given(st.floats(-1e6, 1e6), st.sampled_from(["", "rad", " deg", "°", "m", " mm"]))
 @settings(max_examples=200)
 def test_a_printed_number_is_read_back_in_its_unit(value: float, unit: str) -> None:
-    found = measured(f"{value!r}{unit}")
+    found = parse_quantity(f"{value!r}{unit}")
     assert found is not None
     scaled = {"deg": in_radians(value), "°": in_radians(value), "mm": value / 1000.0}.get(unit.strip(), value)
     assert found.value == scaled
@@ -194,7 +194,7 @@ def test_a_printed_number_is_read_back_in_its_unit(value: float, unit: str) -> N
 @given(st.text(max_size=30) | st.from_regex(r"[0-9.eEpi*/+ deg°πms^-]{0,30}", fullmatch=True))
 @settings(max_examples=400)
 def test_any_text_is_finite_numbers_or_an_error_of_our_own(text: str) -> None:
-    found = measured(text)
+    found = parse_quantity(text)
     assert found is None or math.isfinite(found.value)
     robot = urdfkin.load("one_link", verify=False)
     with contextlib.suppress(UrdfkinError):
@@ -328,12 +328,14 @@ def test_a_joint_called_as_the_other_spelling_gets_another_one_still() -> None:
 
 
 def test_names_that_stand_for_two_numbers_never_set_one_of_them_to_zero() -> None:
-    twice = Places("q", ("a", "a"), ("rad", "rad"))
+    twice = CoordinateLayout("q", ("a", "a"), ("rad", "rad"))
     with pytest.raises(InputError, match="no value for a"):
         twice.read({"a": 0.5})
 
 
-def swapped(places: Places, values: Any, where: str, rest: Any, *, right: Any = Places._by_name) -> Any:
+def swapped(
+    places: CoordinateLayout, values: Any, where: str, rest: Any, *, right: Any = CoordinateLayout._by_name
+) -> Any:
     """What a reading by name gives, its first two numbers exchanged."""
     found = right(places, values, where, rest)
     found[..., [0, 1]] = found[..., [1, 0]]
@@ -359,7 +361,7 @@ def test_a_name_that_is_read_as_another_coordinate_is_a_disagreement(
     robot = urdfkin.load(ARM)
     robot.placement(NAMED[given], "e")
     assert robot.certificate().verified
-    monkeypatch.setattr(Places, "_by_name", swapped)
+    monkeypatch.setattr(CoordinateLayout, "_by_name", swapped)
     with pytest.raises(urdfkin.VerificationError):
         robot.placement(NAMED[given], "e")
 
@@ -378,7 +380,7 @@ def test_so_is_one_of_the_numbers_of_a_joint_that_has_several(
     v = "neutral, root_joint.vx=0.1, root_joint.wz=3deg/s"
     robot.velocity("neutral", v, "e")
     assert robot.certificate().verified
-    monkeypatch.setattr(Places, "_by_name", swapped)
+    monkeypatch.setattr(CoordinateLayout, "_by_name", swapped)
     for q in (*texts, {"lift": 0.0, "shoulder": 0.1, "elbow": 1.0, **of_joint}):
         with pytest.raises(urdfkin.VerificationError):
             robot.placement(q, "e")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.random_chains import rotation, shift
-from urdfkin.model.mechanisms.rigid import apart
+from urdfkin.model.mechanisms.mechanism import apart
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])

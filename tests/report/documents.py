@@ -10,7 +10,7 @@ from typing import cast
 
 from urdfkin.report.document import Check, Document
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.tally import HISTOGRAM_EDGES, percentile
+from urdfkin.validation.error_stats import HISTOGRAM_EDGES, percentile
 
 #: What must never become an element, an attribute or a line of code.
 HOSTILE_ROBOT = "<script>window.hacked=1</script>"

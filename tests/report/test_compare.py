@@ -9,9 +9,7 @@ from typing import Any
 import pytest
 
 from tests.report.documents import arms, failing
-from urdfkin.report.compare import compare
-from urdfkin.report.comparison import markdown_of
-from urdfkin.report.model_changes import model_changes
+from urdfkin.report.compare import compare, markdown_of, model_changes
 
 
 def words(old: Any, new: Any, **how: Any) -> list[tuple[bool, str]]:

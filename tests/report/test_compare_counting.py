@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from tests.report.documents import arms
-from urdfkin.report.compare import compare
-from urdfkin.report.comparison import markdown_of
+from urdfkin.report.compare import compare, markdown_of
 
 
 def words(old: Any, new: Any, **how: Any) -> list[str]:

@@ -16,8 +16,8 @@ from urdfkin.errors import InputError, SourceError
 from urdfkin.loading import load
 from urdfkin.report.document import Document, schema
 from urdfkin.report.reading import checked, read_document
+from urdfkin.validation.accuracy import judge
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.judgement import judge
 
 REFUSED = b'<?xml version="1.0"?><robot name="r"><link name="a"/><joint name="j" type="bent"/></robot>'
 

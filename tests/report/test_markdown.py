@@ -8,7 +8,7 @@ import pytest
 from markdown_it import MarkdownIt
 
 from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile
-from urdfkin.errors.printable import markdown_code, markdown_text
+from urdfkin.errors.escape import markdown_code, markdown_text
 from urdfkin.report.markdown import LIMIT, as_markdown, fenced
 
 GITHUB_LIMIT = 65_536

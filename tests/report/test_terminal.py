@@ -9,8 +9,7 @@ import pytest
 from rich.console import Console
 
 from tests.report.documents import arms, failing, hostile
-from urdfkin.report.compare import compare
-from urdfkin.report.comparison import print_comparison
+from urdfkin.report.compare import compare, print_comparison
 from urdfkin.report.document import Document
 from urdfkin.report.terminal import print_report
 

@@ -12,7 +12,7 @@ import pytest
 import urdfkin as library
 from tests.cli.running import urdfkin
 from urdfkin.report.tip_motion import tip_motion
-from urdfkin.validation.description import describe
+from urdfkin.validation.robot_summary import describe
 
 
 def arm(axis: str = "0 0 1", length: float = 1.0, kind: str = "revolute", mimic: bool = False) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from urdfkin.system.keeping import CacheWarning, kept_folder
+from urdfkin.system.cache import CacheWarning, kept_folder
 
 
 def test_a_folder_is_the_same_until_its_sources_or_anything_beside_them_change(tmp_path: Path) -> None:

@@ -10,8 +10,7 @@ import pytest
 
 from tests.mutation import slightly_wrong
 from urdfkin.errors import UrdfkinError
-from urdfkin.kinematics.registry import LOST, equations, explain, misprints, table
-from urdfkin.kinematics.registry.entries import LAST
+from urdfkin.kinematics.registry import LAST, LOST, equations, explain, misprints, table
 
 ROOT = Path(__file__).parents[2]
 

@@ -23,7 +23,7 @@ from urdfkin import InputError, SourceError, UnknownNameError, UrdfError
 from urdfkin.errors import OracleError
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.verify import made_of_model
+from urdfkin.verify import model_check
 
 #: Straight and forked, with axes askew, with followers, with continuous joints, with a frame without a joint.
 ROBOTS = ("panda", "talos", "ur5", "polar", "kinova")
@@ -261,7 +261,7 @@ def test_a_model_with_followers_is_refused_with_the_cure() -> None:
 def test_a_reading_that_is_off_by_little_more_than_rounding_is_refused(
     number: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right = made_of_model._placements
+    right = model_check._placements
 
     def moved(*arguments: Any) -> Any:
         T = right(*arguments)
@@ -269,7 +269,7 @@ def test_a_reading_that_is_off_by_little_more_than_rounding_is_refused(
         T[:, -1, *number] += 3e-13
         return T
 
-    monkeypatch.setattr(made_of_model, "_placements", moved)
+    monkeypatch.setattr(model_check, "_placements", moved)
     with pytest.raises(OracleError, match=r"made of a pinocchio.Model is not the model's"):
         urdfkin.load(pin.buildModelFromUrdf(file("ur5")))
 

@@ -22,11 +22,11 @@ from urdfkin.errors import InputError, OracleError
 from urdfkin.lint.pages import find_rule, page
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.interpreter import ask_python
+from urdfkin.system.processes import ask_python
 from urdfkin.urdf import mjcf
 from urdfkin.urdf.mjcf import Mjcf, is_mjcf
 from urdfkin.urdf.sources import Source
-from urdfkin.verify import made_of_mjcf, mjcf_process
+from urdfkin.verify import mjcf_check, mjcf_process
 
 TWO = """
 <mujoco model="two">
@@ -72,7 +72,7 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     def ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
         return json.loads(json.dumps(list(mjcf_process.answers(request)))), "ended"
 
-    monkeypatch.setattr(made_of_mjcf, "_ask", ask)
+    monkeypatch.setattr(mjcf_check, "_ask", ask)
 
 
 def one_joint(joint: str, body: str = "") -> str:
@@ -550,7 +550,7 @@ def test_a_file_that_replicates_without_end_is_given_up() -> None:
         inside = f'<replicate count="1000" offset="1 0 0">{inside}</replicate>'
     began = time.monotonic()
     with pytest.raises(InputError, match="MuJoCo cannot compile this MJCF: found no end within 3 s"):
-        made_of_mjcf.read_mjcf(f"<mujoco><worldbody>{inside}</worldbody></mujoco>", patience=3.0)
+        mjcf_check.read_mjcf(f"<mujoco><worldbody>{inside}</worldbody></mujoco>", patience=3.0)
     assert time.monotonic() - began < 20.0
 
 
@@ -572,7 +572,7 @@ def test_memory_that_a_file_sets_apart_for_its_dynamics_is_not_taken() -> None:
 
 
 def test_a_process_that_dies_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(made_of_mjcf, "ask_python", lambda *arguments: (b'{"urdf": "half', -11))
+    monkeypatch.setattr(mjcf_check, "ask_python", lambda *arguments: (b'{"urdf": "half', -11))
     with pytest.raises(InputError, match="<text>: MuJoCo cannot compile this MJCF: found its process ended"):
         loaded(free_body())
 
@@ -585,7 +585,7 @@ def test_what_the_file_with_its_shapes_takes_too_long_for_is_read_without_them(
     def first_only(*arguments: Any) -> tuple[bytes, None]:
         return right(*arguments)[0].splitlines(keepends=True)[0], None
 
-    monkeypatch.setattr(made_of_mjcf, "ask_python", first_only)
+    monkeypatch.setattr(mjcf_check, "ask_python", first_only)
     robot = loaded(free_body(joint='align="true"'))
     assert "does not compile: no end within 60 s" in robot.verifier.reading
     assert "MJCF101" in {finding.code for finding in robot.findings}

@@ -6,7 +6,7 @@ import os
 import signal
 from pathlib import Path
 
-from urdfkin.validation import answer, worker
+from urdfkin.validation import answer, worker_processes
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 
 
@@ -21,4 +21,4 @@ def _deadly(chunk: Chunk) -> ChunkResult:
 def serve(pipe: int, parent: int) -> None:
     """As the worker's, with the crash built in."""
     setattr(answer, "run_chunk", _deadly)  # noqa: B010 - mypy does not let a foreign name be replaced
-    worker.serve(pipe, parent)
+    worker_processes.serve(pipe, parent)

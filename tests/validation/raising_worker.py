@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
-from urdfkin.validation import answer, worker
+from urdfkin.validation import answer, worker_processes
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 
 
@@ -57,4 +57,4 @@ def raising(chunk: Chunk) -> ChunkResult:
 def serve(pipe: int, parent: int) -> None:
     """As the worker's, with the error built in."""
     setattr(answer, "run_chunk", raising)  # noqa: B010 - mypy does not let a foreign name be replaced
-    worker.serve(pipe, parent)
+    worker_processes.serve(pipe, parent)

@@ -29,14 +29,14 @@ from distributed.comm.core import CommClosedError
 
 from tests.validation.test_store import numbers
 from urdfkin.errors import InputError
-from urdfkin.system.interpreter import own_python
+from urdfkin.system.processes import own_python
 from urdfkin.validation import cluster
 from urdfkin.validation.campaign import stored, validate
 from urdfkin.validation.cluster import Cluster, ClusterError, connected
+from urdfkin.validation.collector import CampaignProgress
 from urdfkin.validation.outcome import Verdict
-from urdfkin.validation.provenance import provenance
-from urdfkin.validation.standing import Standing
-from urdfkin.validation.subject import Subject, subject
+from urdfkin.validation.results import provenance
+from urdfkin.validation.robot_input import RobotInput, subject
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]  # Dask's own, on its way out
 
@@ -211,13 +211,13 @@ def test_a_cluster_changes_no_number_and_sends_each_robot_once(
     two: Cluster, undisturbed: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     sent: list[str] = []
-    right = Subject.carried
+    right = RobotInput.carried
 
-    def carried(self: Subject) -> Subject:
+    def carried(self: RobotInput) -> RobotInput:
         sent.append(self.label)
         return right(self)
 
-    monkeypatch.setattr(Subject, "carried", carried)
+    monkeypatch.setattr(RobotInput, "carried", carried)
     assert numbers(validate(ROBOTS, samples=SAMPLES, executor=two, store=tmp_path)) == undisturbed
     assert sorted(sent) == sorted(ROBOTS)
     assert numbers(stored(tmp_path)) == undisturbed
@@ -241,7 +241,7 @@ def test_what_is_carried_needs_no_file_and_no_catalogue_path(tmp_path: Path) -> 
 def test_no_more_chunks_are_in_flight_than_workers_can_take(two: Cluster) -> None:
     most = 0
 
-    def look(_: Standing) -> None:
+    def look(_: CampaignProgress) -> None:
         nonlocal most
         most = max(most, len(two._flying))
 
@@ -262,7 +262,7 @@ def test_a_robot_that_kills_its_process_is_blamed_and_none_of_its_neighbours(
     try:
         report = validate(robots, samples=0, executor=two)
     finally:
-        two._client.run(_deadly, str(deaths), "urdfkin.validation.worker")
+        two._client.run(_deadly, str(deaths), "urdfkin.validation.worker_processes")
     assert [i for i, robot in enumerate(report.robots) if robot.verdict != Verdict.VERIFIED] == [25]
     reason = "ur5: the process that checked it died twice, then alone: found signal SIGSEGV"
     assert report.robots[25].reason == reason
@@ -272,10 +272,10 @@ def test_a_robot_that_kills_its_process_is_blamed_and_none_of_its_neighbours(
 
 def _deadly(deaths: str, module: str) -> None:
     """On a worker: the processes that it starts from now on are others."""
-    from urdfkin.validation import child, remote  # noqa: PLC0415
+    from urdfkin.validation import remote, worker_processes  # noqa: PLC0415
 
     os.environ["URDFKIN_TEST_DEATHS"] = deaths
-    child.WORKER = module
+    worker_processes.WORKER = module
     while remote._idle:
         remote._idle.pop().end()
 
@@ -286,7 +286,7 @@ def test_workers_killed_at_random_times_cost_time_and_nothing_else(processes: Cl
     rng, killed = np.random.default_rng(seed), list[int]()
     times = rng.choice(np.arange(1, 12), 2, replace=False)
 
-    def kill(standing: Standing) -> None:
+    def kill(standing: CampaignProgress) -> None:
         if standing.chunks_done in times:
             time.sleep(rng.uniform(0.0, 0.2))
             while not (workers := _workers()):
@@ -320,7 +320,7 @@ def test_workers_may_come_and_go(monkeypatch: pytest.MonkeyPatch) -> None:
     with LocalCluster(n_workers=0, threads_per_worker=1, dashboard_address="127.0.0.1:0") as there:
         scaled = there.adapt(minimum=1, maximum=2, target_duration="200ms")
 
-        def count(standing: Standing) -> None:
+        def count(standing: CampaignProgress) -> None:
             counts.append(len(there.scheduler.workers))
             if standing.chunks_done == 8:
                 scaled.maximum = 1
@@ -385,7 +385,7 @@ def test_a_lost_scheduler_loses_nothing_that_the_store_holds(undisturbed: str, t
         with Client(scheduler_file=str(place), set_as_default=False) as client:
             address = client.scheduler.address if client.scheduler else ""
 
-        def killed(standing: Standing) -> None:
+        def killed(standing: CampaignProgress) -> None:
             if standing.chunks_done >= 3:
                 started[0].kill()
 

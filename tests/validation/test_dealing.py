@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from urdfkin.urdf.origin import Origin
+from urdfkin.urdf.sources import Origin
 from urdfkin.validation.chunk import Cut
-from urdfkin.validation.dealing import Deal, Row
-from urdfkin.validation.engine import Task
-from urdfkin.validation.subject import Subject
+from urdfkin.validation.engines import Row, Task, WorkQueue
+from urdfkin.validation.robot_input import RobotInput
 
-CUT, NOBODY = Cut(100), Subject(b"", Origin(""))
+CUT, NOBODY = Cut(100), RobotInput(b"", Origin(""))
 
 
 def work(robots: int) -> Iterator[Iterator[Task]]:
@@ -18,7 +17,7 @@ def work(robots: int) -> Iterator[Iterator[Task]]:
     return (iter([Task(i, CUT.chunk(NOBODY, 0, k)) for k in range(4)]) for i in range(robots))
 
 
-def step(deal: Deal, row: Row | None) -> tuple[tuple[int, int] | None, Row | None]:
+def step(deal: WorkQueue, row: Row | None) -> tuple[tuple[int, int] | None, Row | None]:
     """What somebody with a row, or without, is given; and the row that they have then."""
     if row is not None and (task := deal.next(row)) is not None:
         return (task.robot, task.chunk.index), row
@@ -29,7 +28,7 @@ def step(deal: Deal, row: Row | None) -> tuple[tuple[int, int] | None, Row | Non
 
 
 def test_two_have_a_robot_each_and_share_the_last() -> None:
-    deal, rows = Deal(work(3)), list[Row | None]([None, None])
+    deal, rows = WorkQueue(work(3)), list[Row | None]([None, None])
     seen = [list[tuple[int, int]](), list[tuple[int, int]]()]
     for turn in (0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1):
         given, rows[turn] = step(deal, rows[turn])
@@ -42,7 +41,7 @@ def test_two_have_a_robot_each_and_share_the_last() -> None:
 
 
 def test_help_goes_to_the_robot_of_which_most_is_left() -> None:
-    deal = Deal(work(2))
+    deal = WorkQueue(work(2))
     (_, first), (_, second) = deal.first() or ((), Row(())), deal.first() or ((), Row(()))
     for _ in range(2):
         deal.next(first)
@@ -53,14 +52,14 @@ def test_help_goes_to_the_robot_of_which_most_is_left() -> None:
 
 
 def test_where_each_is_alone_nobody_helps() -> None:
-    deal = Deal(work(1), shared=False)
+    deal = WorkQueue(work(1), shared=False)
     assert deal.first() is not None
     assert deal.first() is None
 
 
 def test_what_is_put_back_is_dealt_again_and_what_is_withdrawn_is_not() -> None:
     for shared in (True, False):
-        deal = Deal(work(2), shared=shared)
+        deal = WorkQueue(work(2), shared=shared)
         found = deal.first()
         assert found is not None
         task, row = found

@@ -21,12 +21,11 @@ from urdfkin.model import base_motion as recursion_base
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import judged_on, nearer, nearer_counts
-from urdfkin.validation.judgement import Errors, Judgement, Line, exact_quaternion, judge
-from urdfkin.verify.asked import BaseRows
+from urdfkin.validation.accuracy import Errors, Judgement, Line, exact_quaternion, judge
+from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.exact import recursion as exact_recursion
-from urdfkin.verify.exact.decimals import read_exact
-from urdfkin.verify.exact.vectors import exact, mp
-from urdfkin.verify.line_of_nodes import euler_jacobian, quaternion_jacobian
+from urdfkin.verify.exact.numbers import exact, mp, read_exact
+from urdfkin.verify.oracle_query import BaseRows
 from urdfkin.verify.quantities import QUANTITIES
 from urdfkin.verify.sampling import draw_base
 

@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 
 from tests.cli.running import urdfkin
-from urdfkin.cli.judgement import judge_all
+from urdfkin.cli.accuracy import judge_all
 from urdfkin.errors import InputError
 from urdfkin.loading import load
 from urdfkin.robot import Robot
-from urdfkin.validation import judgement
+from urdfkin.validation import accuracy
+from urdfkin.validation.accuracy import Judgement
+from urdfkin.validation.accuracy_store import AccuracyResult, Asked, NotJudged
 from urdfkin.validation.campaign import StoreWarning, stored, validate
-from urdfkin.validation.judgement import Judgement
-from urdfkin.validation.judging import Asked, Judged, NotJudged
 from urdfkin.validation.store import Store, opened
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
@@ -30,7 +30,7 @@ class Judge:
     def __init__(self) -> None:
         self.asked: list[str] = []
         self.ends_at = self.refuses = ""
-        self._right = judgement.judge
+        self._right = accuracy.judge
 
     def __call__(self, robot: Robot, **how: Any) -> Judgement:
         if robot.source == self.ends_at:
@@ -44,7 +44,7 @@ class Judge:
 @pytest.fixture
 def judge(monkeypatch: pytest.MonkeyPatch) -> Judge:
     found = Judge()
-    monkeypatch.setattr(judgement, "judge", found)
+    monkeypatch.setattr(accuracy, "judge", found)
     return found
 
 
@@ -153,8 +153,8 @@ def test_a_text_that_changed_since_it_was_compared_is_not_judged(judge: Judge, t
 def test_a_judgement_is_read_back_to_the_last_bit(tmp_path: Path) -> None:
     validate("planar_two_link", samples=0, store=tmp_path)
     with opened(tmp_path, Store.reading(tmp_path, pytest.fail).manifest, pytest.fail) as store:
-        kept = Judged(store, Asked(1, 0, False))
-        found = judgement.judge(load("planar_two_link"), samples=1)
+        kept = AccuracyResult(store, Asked(1, 0, False))
+        found = accuracy.judge(load("planar_two_link"), samples=1)
         for each in (found, NotJudged("why \ud800")):
             kept.keep(0, each)
             assert json.dumps(asdict(kept.found(0))) == json.dumps(asdict(each))  # type: ignore[arg-type]

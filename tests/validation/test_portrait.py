@@ -10,11 +10,11 @@ import pytest
 
 import urdfkin
 from urdfkin.dh import dh_table
-from urdfkin.validation import chains as chains_module
+from urdfkin.validation import robot_summary as chains_module
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.chains import MOST, chains_of
-from urdfkin.validation.clock import Clock, total
 from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.robot_summary import MOST, chains_of
+from urdfkin.validation.timings import Clock, total
 from urdfkin.verify.pinocchio import Oracle
 
 

@@ -22,17 +22,15 @@ import pytest
 from tests.attacks.test_validation_runs import Refusing
 from tests.cli.running import urdfkin as run
 from urdfkin.errors import InputError, SourceError
-from urdfkin.validation import answer, manifest, provenance
-from urdfkin.validation.answer import Answer, Failure
-from urdfkin.validation.answer_file import DamagedError, read, written
+from urdfkin.validation import answer, manifest, results
+from urdfkin.validation.answer import Answer, DamagedError, Failure, read, written
 from urdfkin.validation.campaign import StoreWarning, shares, stored, validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, chunks, run_chunk
-from urdfkin.validation.engine import Task
-from urdfkin.validation.gathering import Gathering, Progress
+from urdfkin.validation.collector import CampaignProgress, Progress, ResultCollector
+from urdfkin.validation.engines import Task
 from urdfkin.validation.outcome import Verdict
-from urdfkin.validation.standing import Standing
+from urdfkin.validation.robot_input import subject
 from urdfkin.validation.store import Store
-from urdfkin.validation.subject import subject
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
 SAMPLES = 60
@@ -66,7 +64,7 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
 
 
 def interrupted_after(chunks_: int) -> Progress:
-    def stop(standing: Standing) -> None:
+    def stop(standing: CampaignProgress) -> None:
         if standing.chunks_done >= chunks_:
             raise KeyboardInterrupt
 
@@ -118,7 +116,7 @@ def test_a_store_of_other_settings_is_refused_and_both_are_shown(
 def test_changed_code_never_meets_old_results(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     validate(ROBOTS, samples=SAMPLES, store=tmp_path, progress=interrupted_after(1))
     before = Store.reading(tmp_path, pytest.fail).manifest
-    changed = provenance.provenance() | {"code": "0" * 64}
+    changed = results.provenance() | {"code": "0" * 64}
     monkeypatch.setattr(manifest, "provenance", lambda: changed)
     with pytest.raises(InputError, match=r"code \w{12} and 000000000000"):
         validate(ROBOTS, samples=SAMPLES, store=tmp_path)
@@ -132,14 +130,14 @@ def test_the_digest_of_the_code_is_of_what_computes_and_not_of_what_shows(
     for place in ("kinematics/equations.py", "cli/validate.py", "lint/rules/mimic.toml"):
         (tmp_path / place).parent.mkdir(parents=True)
         (tmp_path / place).write_text("1")
-    monkeypatch.setattr(provenance, "_PACKAGE", tmp_path)
-    before = provenance._code()
+    monkeypatch.setattr(results, "_PACKAGE", tmp_path)
+    before = results._code()
     (tmp_path / "cli" / "validate.py").write_text("2")
-    assert provenance._code() == before
+    assert results._code() == before
     for place in ("kinematics/equations.py", "lint/rules/mimic.toml"):
         (tmp_path / place).write_text("2")
-        assert provenance._code() != before
-        before = provenance._code()
+        assert results._code() != before
+        before = results._code()
 
 
 def test_a_file_that_has_changed_is_not_taken_for_what_it_was(tmp_path: Path) -> None:
@@ -348,7 +346,7 @@ def _peak(chunks_: int) -> int:
     found = replace(found, tallies=dict(list(found.tallies.items())[:2]))
     cut = Cut(1000 * chunks_)
     assert len(cut) == chunks_
-    gathering = Gathering([robot], cut, [range(chunks_)])
+    gathering = ResultCollector([robot], cut, [range(chunks_)])
     pairs = ((i + 1, i) for i in range(0, chunks_, 2))
     gc.collect()
     tracemalloc.start()
@@ -372,7 +370,7 @@ def test_neighbours_add_up_in_any_order() -> None:
     results = [run_chunk(chunk) for chunk in all_chunks]
     reports = set()
     for order in itertools.permutations(range(3)):
-        gathering = Gathering([all_chunks[0].subject], Cut(60), [range(len(results))])
+        gathering = ResultCollector([all_chunks[0].subject], Cut(60), [range(len(results))])
         for i in order:
             gathering.enter(Task(0, all_chunks[i]), results[i])
         (report,) = gathering.reports()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.validation.tally import HISTOGRAM_EDGES, Inputs, Tally, histogram_bin, percentile, tally
+from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Inputs, Tally, histogram_bin, percentile, tally
 from urdfkin.verify.bounds import Bound
 
 FRAMES = ("a", "b", "c")

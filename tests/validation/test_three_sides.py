@@ -9,16 +9,14 @@ import pytest
 import urdfkin
 from tests.lint.cases.arm import arm
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.consistency import contradictions
 from urdfkin.report.document import Document
 from urdfkin.report.html import as_html
 from urdfkin.report.junit import as_junit
 from urdfkin.report.markdown import as_markdown
-from urdfkin.report.reading import checked
-from urdfkin.validation import comparing
+from urdfkin.report.reading import checked, contradictions
+from urdfkin.validation import comparison
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.tally import tally
-from urdfkin.validation.three_sides import Pair, ThreeSides, plus, three_sides
+from urdfkin.validation.error_stats import Pair, ThreeSides, plus, tally, three_sides
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.mujoco import MujocoOracle
 from urdfkin.verify.pinocchio import Oracle
@@ -127,8 +125,8 @@ def test_each_pair_is_measured_against_its_own_bound(monkeypatch: pytest.MonkeyP
         own.append(bound)
         return tally(ours, theirs, bound, *others)
 
-    monkeypatch.setattr(comparing, "three_sides", sides)
-    monkeypatch.setattr(comparing, "tally", counted)
+    monkeypatch.setattr(comparison, "three_sides", sides)
+    monkeypatch.setattr(comparison, "tally", counted)
     assert validate(arm(), samples=0, oracle="mujoco").passed
     assert len(bounds) == len(own) - 1 > 10  # Pinocchio's data.J is compared by itself
     for (first, second), bound in zip(bounds, own, strict=False):

@@ -15,12 +15,12 @@ import pytest
 
 from tests.attacks.test_validation_signals import children
 from tests.validation import canned_worker
-from urdfkin.validation import answer, child, engine, memory
+from urdfkin.validation import answer, engines, memory, worker_processes
 from urdfkin.validation.answer import Answer
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Chunk
+from urdfkin.validation.collector import CampaignProgress
 from urdfkin.validation.outcome import Verdict
-from urdfkin.validation.standing import Standing
 
 DEADLY = "ur5"
 ROBOTS = ["double_pendulum", DEADLY, "iris_simple"]
@@ -30,7 +30,7 @@ HOW: list[dict[str, Any]] = [{"jobs": 2}, {"jobs": 2, "isolate": True}, {"isolat
 @pytest.fixture
 def deaths(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Workers that die over a robot: as often as the file says."""
-    monkeypatch.setattr(child, "WORKER", "tests.validation.deadly_worker")
+    monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.deadly_worker")
     path = tmp_path / "deaths"
     monkeypatch.setenv("URDFKIN_TEST_DEATHS", str(path))
     return path
@@ -94,9 +94,9 @@ def test_what_cannot_be_read_is_reported_as_without_processes() -> None:
 @pytest.mark.slow
 def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pytest.MonkeyPatch) -> None:
     """A library's process lives on after an interrupt; what hangs in compiled code must not."""
-    monkeypatch.setattr(child, "WORKER", "tests.validation.sleeping_worker")
+    monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.sleeping_worker")
     started: list[Any] = []
-    right = child._interpreter
+    right = worker_processes._interpreter
 
     def kept(pipe: int) -> Any:
         started.append(right(pipe))
@@ -104,7 +104,7 @@ def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pyte
             raise KeyboardInterrupt
         return started[-1]
 
-    monkeypatch.setattr(child, "_interpreter", kept)
+    monkeypatch.setattr(worker_processes, "_interpreter", kept)
     try:
         report = validate(["ur5", "panda"], samples=0, isolate=True, jobs=2)
         assert report.interrupted
@@ -119,7 +119,7 @@ def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch
     def none(_: int) -> None:
         raise OSError(24, "Too many open files")
 
-    monkeypatch.setattr(child, "_interpreter", none)
+    monkeypatch.setattr(worker_processes, "_interpreter", none)
     for how in HOW:
         report = validate(["ur5", "planar_two_link"], samples=60, **how)
         assert [robot.verdict for robot in report.robots] == [Verdict.NOT_VERIFIED] * 2
@@ -132,7 +132,7 @@ def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch
 def test_what_does_not_start_any_more_is_done_by_those_that_are_there(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    right, asked = child._interpreter, 0
+    right, asked = worker_processes._interpreter, 0
 
     def one(pipe: int) -> Any:
         nonlocal asked
@@ -141,7 +141,7 @@ def test_what_does_not_start_any_more_is_done_by_those_that_are_there(
             raise OSError(24, "Too many open files")
         return right(pipe)
 
-    monkeypatch.setattr(child, "_interpreter", one)
+    monkeypatch.setattr(worker_processes, "_interpreter", one)
     for how in HOW[:2]:
         asked = 0
         assert validate(["double_pendulum", "planar_two_link"], samples=60, **how).passed
@@ -163,7 +163,7 @@ def test_a_worker_runs_nothing_of_the_current_folder(
     monkeypatch.setattr("subprocess.Popen", started)
     monkeypatch.syspath_prepend("")
     with pytest.raises(RecordedError):
-        child._interpreter(3)
+        worker_processes._interpreter(3)
     assert codes[0][1] == "-I"
     path = codes[0][3].partition("sys.path[:] = ")[2].partition("; from")[0]
     assert "''" not in path
@@ -182,16 +182,16 @@ def test_workers_killed_at_random_times_change_no_number(
         (tmp_path / canned_worker.name(bytes(ForkingPickler.dumps(chunk)))).write_bytes(pickle.dumps(found))
         return found
 
-    monkeypatch.setattr(engine, "answer", remembered)
+    monkeypatch.setattr(engines, "answer", remembered)
     monkeypatch.setattr(memory, "share", lambda *_: None)  # it is part of a chunk, and free memory changes
     expected = numbers(validate(robots, samples=100))
-    monkeypatch.setattr(child, "WORKER", "tests.validation.canned_worker")
+    monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.canned_worker")
     monkeypatch.setenv("URDFKIN_TEST_ANSWERS", str(tmp_path))
     killed, others = 0, set(children(os.getpid()))  # of the tests that ran before
     for seed in range(20):
         rng = np.random.default_rng(seed)
 
-        def kill(_: Standing, rng: np.random.Generator = rng) -> None:
+        def kill(_: CampaignProgress, rng: np.random.Generator = rng) -> None:
             nonlocal killed
             # One process is a robot's second, alone with it, whose death is its result.
             if len(crew := sorted({*children(os.getpid())} - others)) == 2 and rng.uniform() < 0.4:

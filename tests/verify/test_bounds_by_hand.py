@@ -4,16 +4,15 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.compiled.plan import Plan
+from urdfkin.compiled.plan import CompiledTree
 from urdfkin.kinematics.roundings import EPS, of_joints
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify import bounds, imu, relative
-from urdfkin.verify.bounds import Bound
+from urdfkin.verify import bounds, derived
+from urdfkin.verify.bounds import Bound, Magnitudes, magnitudes
 from urdfkin.verify.call import Call
-from urdfkin.verify.magnitudes import Magnitudes, magnitudes
+from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.quantities import ACCELERATION, HESSIAN, JACOBIAN, JACOBIAN_RATE, PLACEMENT, VELOCITY
-from urdfkin.verify.witnesses import PINOCCHIO
 
 #: A turning joint, one that slides twice as far as the coordinate before it says.
 ARM = """<robot name="r">
@@ -32,7 +31,7 @@ def sizes(tilt: float = 0.0) -> Magnitudes:
 
 
 @pytest.fixture(scope="module")
-def plan() -> Plan:
+def plan() -> CompiledTree:
     return urdfkin.load(ARM).plan([3])
 
 
@@ -52,7 +51,7 @@ def columns(bound: Bound) -> tuple[FloatArray, FloatArray, float]:
     return scale[0], scale[3], float(bound.k.ravel()[0])
 
 
-def test_a_placement_is_held_to_the_path_and_its_rotation_to_one(plan: Plan) -> None:
+def test_a_placement_is_held_to_the_path_and_its_rotation_to_one(plan: CompiledTree) -> None:
     bound = PLACEMENT.bound(plan, sizes(), None)
     expected = np.array([[1, 1, 1, P], [1, 1, 1, P], [1, 1, 1, P], [0, 0, 0, 0]], dtype=np.float64)
     assert (bound.scale[0, 0] == expected).all()
@@ -62,7 +61,9 @@ def test_a_placement_is_held_to_the_path_and_its_rotation_to_one(plan: Plan) -> 
 @pytest.mark.parametrize(
     ("reference", "linear", "factors"), [(ALIGNED, VEL, 2), (LOCAL, VEL, 3), (WORLD, VEL + W * P, 3)]
 )
-def test_a_velocity_has_two_factors(plan: Plan, reference: Reference, linear: float, factors: int) -> None:
+def test_a_velocity_has_two_factors(
+    plan: CompiledTree, reference: Reference, linear: float, factors: int
+) -> None:
     assert six(VELOCITY.bound(plan, sizes(), reference)) == (linear, W, 24.0 * JOINTS * factors)
 
 
@@ -74,18 +75,20 @@ def test_a_velocity_has_two_factors(plan: Plan, reference: Reference, linear: fl
         (WORLD, ACC + 2 * W * VEL + (ALPHA + W * W) * P, 4),
     ],
 )
-def test_an_acceleration_has_three(plan: Plan, reference: Reference, linear: float, factors: int) -> None:
+def test_an_acceleration_has_three(
+    plan: CompiledTree, reference: Reference, linear: float, factors: int
+) -> None:
     assert six(ACCELERATION.bound(plan, sizes(), reference)) == (linear, ALPHA, 24.0 * JOINTS * factors)
 
 
 @pytest.mark.parametrize(("reference", "factors"), [(ALIGNED, 2), (LOCAL, 3), (WORLD, 3)])
-def test_a_jacobian_has_two(plan: Plan, reference: Reference, factors: int) -> None:
+def test_a_jacobian_has_two(plan: CompiledTree, reference: Reference, factors: int) -> None:
     linear, angular, k = columns(JACOBIAN.bound(plan, sizes(), reference))
     assert (linear.tolist(), angular.tolist(), k) == ([P, 3.0], [1.0, 0.0], 24.0 * JOINTS * factors)
 
 
 @pytest.mark.parametrize(("reference", "again", "factors"), [(ALIGNED, 1, 3), (LOCAL, 2, 4), (WORLD, 1, 4)])
-def test_its_rate_has_three(plan: Plan, reference: Reference, again: int, factors: int) -> None:
+def test_its_rate_has_three(plan: CompiledTree, reference: Reference, again: int, factors: int) -> None:
     linear, angular, k = columns(JACOBIAN_RATE.bound(plan, sizes(), reference))
     assert linear.tolist() == [again * W * P + VEL, 3.0 * again * W]
     assert angular.tolist() == [again * W, 0.0]
@@ -101,7 +104,7 @@ def test_its_rate_has_three(plan: Plan, reference: Reference, again: int, factor
     ],
 )
 def test_a_hessian_has_three_for_each_product_that_a_pair_is_summed_from(
-    plan: Plan, reference: Reference, terms: float, slides: list[list[float]], factors: int
+    plan: CompiledTree, reference: Reference, terms: float, slides: list[list[float]], factors: int
 ) -> None:
     linear, angular, k = columns(HESSIAN.bound(plan, sizes(), reference))
     assert linear.tolist() == [[terms * P, *(3.0 * x for x in slides[0])], [3.0 * slides[1][0], 0.0]]
@@ -109,7 +112,7 @@ def test_a_hessian_has_three_for_each_product_that_a_pair_is_summed_from(
     assert k == 24.0 * JOINTS * factors
 
 
-def test_an_imus_reading_has_gravity_as_one_term_more(plan: Plan) -> None:
+def test_an_imus_reading_has_gravity_as_one_term_more(plan: CompiledTree) -> None:
     scale = bounds.imu_scale(sizes(), np.array([3.0, 0.0, 4.0]))[0, 0]
     assert scale.tolist() == [*[ACC + W * VEL + 5.0] * 3, *[W] * 3]
 
@@ -119,7 +122,7 @@ def test_an_imus_reading_is_held_to_that_scale_and_to_an_accelerations_factors()
     inputs = np.array([[0.3, 0.5], [1.5, -2.0], [0.7, 0.2]])
     call = Call(robot.tree, robot.plan, "l3", LOCAL, None, list(inputs), gravity=[3.0, 0.0, 4.0])
     part = call.part(slice(0, 1))
-    _, bound = imu.held_against(robot.verifier.oracle(), part, np.zeros((1, 1, 6)), PINOCCHIO)
+    _, bound = derived.check_imu(robot.verifier.oracle(), part, np.zeros((1, 1, 6)), PINOCCHIO)
     v, a = part.rates
     size = magnitudes(part.plan, part.q, v, a, part.state)
     linear, angular, k = six(bound)
@@ -132,7 +135,7 @@ def test_a_relative_placement_is_held_to_both_paths() -> None:
     robot = urdfkin.load(ARM)
     call = Call(robot.tree, robot.plan, "l3", ALIGNED, None, ([0.3, 0.5],), also=("l2",), relative_to="l2")
     part = call.part(slice(0, 1))
-    _, bound = relative.held_against(
+    _, bound = derived.check_relative_placement(
         PLACEMENT.bound, robot.verifier.oracle(), part, np.zeros((1, 1, 4, 4)), PINOCCHIO
     )
     size = magnitudes(part.plan, part.q, None, None, part.state)
@@ -164,7 +167,7 @@ def test_which_columns_can_be_anything_but_0_is_the_robots(
     assert (np.abs(J).max(axis=(0, 1))[found[0].any(axis=0)] > 0.0).all()
 
 
-def test_rates_of_angles_grow_as_the_square_of_the_distance_from_the_singularity(plan: Plan) -> None:
+def test_rates_of_angles_grow_as_the_square_of_the_distance_from_the_singularity(plan: CompiledTree) -> None:
     def euler(apart: float) -> Bound:
         jacobian = JACOBIAN.bound(plan, sizes(), ALIGNED)
         return bounds.euler_jacobian_bound(jacobian, sizes(), np.array([[apart]]))
@@ -184,7 +187,7 @@ def test_rates_of_angles_grow_as_the_square_of_the_distance_from_the_singularity
     assert bounds.nearest_singularity(plan) == 4.0 * delta
 
 
-def test_rates_of_a_quaternion_are_held_to_those_of_the_jacobian(plan: Plan) -> None:
+def test_rates_of_a_quaternion_are_held_to_those_of_the_jacobian(plan: CompiledTree) -> None:
     bound, jacobian = (
         bounds.quaternion_jacobian_bound(JACOBIAN.bound(plan, sizes(), ALIGNED)),
         JACOBIAN.bound(plan, sizes(), ALIGNED),
@@ -194,7 +197,7 @@ def test_rates_of_a_quaternion_are_held_to_those_of_the_jacobian(plan: Plan) -> 
     assert (bound.k == jacobian.k).all()
 
 
-def test_a_tilt_adds_twice_itself_to_each_factor(plan: Plan) -> None:
+def test_a_tilt_adds_twice_itself_to_each_factor(plan: CompiledTree) -> None:
     tilt = 1e-13
     k = 24.0 * JOINTS + 2.0 * tilt / EPS
     assert six(VELOCITY.bound(plan, sizes(tilt), LOCAL))[2] == 3.0 * k
@@ -221,7 +224,7 @@ def test_an_imus_reading_has_an_accelerations_factors_in_its_own_axes(
         found.append((scale, factors, size, reference))
         return bounds.bound_of(scale, factors, size, reference)
 
-    monkeypatch.setattr(imu, "bound_of", asked)
+    monkeypatch.setattr(derived, "bound_of", asked)
     urdfkin.load(ARM).imu([0.1, 0.2], [1.0, 2.0], [3.0, 4.0], "l3")
     ((scale, factors, size, reference),) = found
     assert (factors, reference) == (ACCELERATION.factors, LOCAL)

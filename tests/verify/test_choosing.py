@@ -13,12 +13,12 @@ from urdfkin.errors import InputError
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.verify import choosing, verifier
-from urdfkin.verify.asked import Rows
+from urdfkin.verify import sampling, verifier
 from urdfkin.verify.certificate import Certificate
-from urdfkin.verify.choosing import SAMPLE, Verify, parts
+from urdfkin.verify.oracle_query import QueryBatch
 from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.quantities import PLACEMENT, Quantity
+from urdfkin.verify.sampling import SAMPLE, Verify, parts
 
 #: Numbers of a part: one configuration at a time, a few, and all.
 SIZES = (1, 200, 10**9)
@@ -73,7 +73,7 @@ def lies(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pinocchio is off by a millionth where the finger stands at the mark, and by more where it is beyond."""
     right = verifier.theirs_of
 
-    def wrong(quantity: Quantity, oracle: Oracle, asked: Rows) -> FloatArray:
+    def wrong(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
         theirs, finger = right(quantity, oracle, asked), asked.inputs[0][:, 7]
         size = np.where(np.abs(finger - MARK) < 1e-3, 1e-6 + np.abs(finger - MARK), 0.0)
         # Numbers that must agree exactly stay as they are: wherever they do not, there is nothing worse.
@@ -111,7 +111,7 @@ def test_the_worst_sample_is_named_in_whatever_part_it_stands(
         q[(*other, 7)] = MARK
         q[(*worst, 7)] = MARK + 1e-4
         for size in SIZES:
-            monkeypatch.setattr(choosing, "_AT_A_TIME", size)
+            monkeypatch.setattr(sampling, "_AT_A_TIME", size)
             for quantity, compute in calls(fresh, q, v, a, motion, True).items():
                 with pytest.raises(urdfkin.VerificationError) as caught:
                     compute()
@@ -133,7 +133,7 @@ def test_the_certificate_does_not_depend_on_the_parts(
     found = list[Certificate]()
     q, v, a = batch(fresh, shape)
     for size in SIZES:
-        monkeypatch.setattr(choosing, "_AT_A_TIME", size)
+        monkeypatch.setattr(sampling, "_AT_A_TIME", size)
         fresh.verifier.ledger = type(fresh.verifier.ledger)()
         for compute in calls(fresh, q, v, a, motion, True).values():
             compute()
@@ -153,7 +153,7 @@ def test_the_certificate_does_not_depend_on_the_parts(
 def test_of_a_large_batch_a_sample_is_checked_and_the_rest_stated(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, size: int, base: tuple[int, ...] | None
 ) -> None:
-    monkeypatch.setattr(choosing, "_AT_A_TIME", size)
+    monkeypatch.setattr(sampling, "_AT_A_TIME", size)
     motion = None if base is None else moving(base)
     q, v, a = batch(fresh, (250,))
     for compute in calls(fresh, q, v, a, motion, "sample").values():

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urdfkin.verify.coupling import coupled
+from urdfkin.verify.mimic_columns import coupled
 
 
 @given(st.data())

@@ -9,7 +9,7 @@ from urdfkin.compiled.evaluate import accelerations, placements, velocities
 from urdfkin.kinematics.roundings import EPS, ROUNDINGS
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.magnitudes import Magnitudes, magnitudes
+from urdfkin.verify.bounds import Magnitudes, magnitudes
 
 ARM = """<robot name="r">
 <link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/><link name="tip"/>

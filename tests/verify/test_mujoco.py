@@ -12,7 +12,7 @@ from tests.lint.cases.arm import arm, fixed
 from urdfkin.errors import UnknownNameError
 from urdfkin.model.reference import Reference
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.verify import witnesses
+from urdfkin.verify import oracles
 from urdfkin.verify.mujoco import MujocoOracle
 from urdfkin.verify.verifier import NotVerifiedWarning
 
@@ -64,7 +64,7 @@ def test_mujoco_agrees_in_every_quantity_and_reference(name: str, far: float | N
     ask_everything(robot, 5, None if far is None else base_motion(np.random.default_rng(0), far))
     certificate = robot.certificate()
     assert certificate.verified, certificate
-    assert certificate.oracle == f"MuJoCo {witnesses.MUJOCO.version()}"
+    assert certificate.oracle == f"MuJoCo {oracles.MUJOCO.version()}"
     assert "checked by MuJoCo" in str(certificate)
     assert all(line.worst < 40.0 for line in certificate.lines), certificate
 

@@ -15,7 +15,7 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as command
 from urdfkin.compiled import evaluate
-from urdfkin.compiled.plan import Plan
+from urdfkin.compiled.plan import CompiledTree
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.registry import equations
 from urdfkin.model.reference import Reference
@@ -25,7 +25,7 @@ from urdfkin.report.html import as_html
 from urdfkin.report.markdown import as_markdown
 from urdfkin.robot import Robot
 from urdfkin.verify import bounds
-from urdfkin.verify.magnitudes import Magnitudes
+from urdfkin.verify.bounds import Magnitudes
 from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.quantities import QUANTITIES, VELOCITY, Quantity, by_command, walked
 
@@ -33,7 +33,7 @@ from urdfkin.verify.quantities import QUANTITIES, VELOCITY, Quantity, by_command
 
 
 def turning(
-    plan: Plan,
+    plan: CompiledTree,
     q: FloatArray,
     v: FloatArray,
     reference: Reference,
@@ -54,7 +54,7 @@ def pinocchios(
     return oracle.velocities(q, v, frames, reference, *base)[..., 3:]
 
 
-def size(plan: Plan, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
+def size(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     return bounds.velocity_scale(plan, magnitudes, reference)[..., 3:]
 
 

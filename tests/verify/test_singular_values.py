@@ -15,9 +15,8 @@ from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.verify.exact.decimals import read_exact
+from urdfkin.verify.exact.numbers import exact, mp, read_exact
 from urdfkin.verify.exact.recursion import move
-from urdfkin.verify.exact.vectors import exact, mp
 from urdfkin.verify.quantities import JACOBIAN
 from urdfkin.verify.singular_values import Between, SingularValues, _skew, singular_values
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from urdfkin.kinematics.roundings import EPS, SMALLEST
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, disagreement
-from urdfkin.verify.worst import worst_of_each
+from urdfkin.verify.comparison import worst_of_each
 
 ODD = (0.0, -0.0, 5e-324, 1e-310, SMALLEST, 1.0, 1.0 + EPS, -1.0, 1e300, 1.7e308, -1.7e308)
 NEVER = (np.inf, -np.inf, np.nan)

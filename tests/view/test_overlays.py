@@ -8,8 +8,8 @@ import pytest
 import urdfkin
 from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.motion.frame_motion import FrameMotion, frame_motion
-from urdfkin.view.overlays import acceleration_arrows, jacobian_arrows, velocity_ellipsoid
-from urdfkin.view.readings import numbers
+from urdfkin.view.stage import acceleration_arrows, jacobian_arrows, velocity_ellipsoid
+from urdfkin.view.viewer import numbers
 
 
 @pytest.fixture(scope="module")

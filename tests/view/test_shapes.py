@@ -9,8 +9,7 @@ import pytest
 
 import urdfkin
 from urdfkin.kinematics.rotation import rotation_from_rpy
-from urdfkin.view.meshes import mesh
-from urdfkin.view.shapes import mesh_file, shapes
+from urdfkin.view.scene import mesh, mesh_file, shapes
 
 URDF = """<robot name="r">
   <material name="blue"><color rgba="0 0 1 0.5"/></material>

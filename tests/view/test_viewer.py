@@ -19,10 +19,8 @@ import urdfkin
 from tests.report.browser import Browser, opened, require_chromium
 from urdfkin.errors import InputError
 from urdfkin.model.configuration import checked
-from urdfkin.view.opening import opened_page
-from urdfkin.view.server import new_server
-from urdfkin.view.sliders import coordinate_rows, within_limits
-from urdfkin.view.viewer import Viewer
+from urdfkin.view.server import new_server, opened_page
+from urdfkin.view.viewer import Viewer, coordinate_rows, within_limits
 
 viser = pytest.importorskip("viser")
 

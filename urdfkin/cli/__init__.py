@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, cast
 import click
 
 from urdfkin.cli import streams
-from urdfkin.cli.crash import run
-from urdfkin.cli.door import guard
+from urdfkin.cli.exit import run
+from urdfkin.cli.streams import guard
 from urdfkin.errors import UnknownNameError
 from urdfkin.verify.quantities import by_command
 
@@ -138,7 +138,7 @@ class LazyGroup(click.Group):
 def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
     if not wanted:
         return
-    from urdfkin.system.versions import own_version  # noqa: PLC0415
+    from urdfkin.system.lazy_import import own_version  # noqa: PLC0415
     from urdfkin.verify.pinocchio_module import pinocchio, version  # noqa: PLC0415
 
     click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")

@@ -7,9 +7,9 @@ from typing import Any
 
 import click
 
-from urdfkin.cli.computing import Computing, computing_options
-from urdfkin.cli.numbers import NumberFrom
+from urdfkin.cli.options import NumberFrom
 from urdfkin.cli.output import compiling
+from urdfkin.cli.quantity import Computing, computing_options
 from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN
 
 #: They repeat `urdfkin.kinematics.rotation.SEQUENCES`, whose import --help does not need.
@@ -42,7 +42,7 @@ def command(context: click.Context, representation: str, nearest: float | None, 
     A row of the table for each rate: how fast it alone changes the frame's position and the numbers of its
     orientation, Euler angles or a quaternion. `urdfkin jacobian` has angular velocities in their place.
     """
-    from urdfkin.kinematics.rotation.euler_rates import NEAREST  # noqa: PLC0415  keeps --help fast
+    from urdfkin.kinematics.rotation.euler import NEAREST  # noqa: PLC0415  keeps --help fast
 
     run = Computing(context)
     x, nearest = run.inputs(), NEAREST if nearest is None else nearest

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.arguments import forms, load_robot, path_options, robot_argument, together, verify_option
-from urdfkin.cli.door import say, say_file
-from urdfkin.cli.endings import form_of
+from urdfkin.cli.options import format_from_suffix
 from urdfkin.cli.output import end_of_path, hand_out, output_option
+from urdfkin.cli.streams import say, say_file
 
 if TYPE_CHECKING:
     pass
@@ -47,7 +47,7 @@ def path_command(
         def command(
             context: click.Context, robot: str, format_: str, verify: bool, output: Any, **asked: Any
         ) -> None:
-            form = format_ if endings is None else form_of(context, output, endings, "csv")
+            form = format_ if endings is None else format_from_suffix(context, output, endings, "csv")
             found = function(load_robot(robot, verify=verify), verify=verify, **asked)
             line, code = end_of_path(found.said)
             if form == names[0] and output is None:

@@ -10,20 +10,18 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from urdfkin.cli.completing import complete_frame, complete_robot
-from urdfkin.cli.door import say
-from urdfkin.cli.idle import refuse_idle
-from urdfkin.cli.numbers import Whole
-from urdfkin.errors import InputError, SourceError
-from urdfkin.errors.numerals import whole
-from urdfkin.errors.questions import Question
+from urdfkin.cli.completion_items import complete_frame, complete_robot
+from urdfkin.cli.options import Whole, reject_unused_options
+from urdfkin.cli.streams import say
+from urdfkin.errors import InputError, Question, SourceError
+from urdfkin.errors.numbers import parse_int
 from urdfkin.system.files import MOST_DATA, read_standard_input, read_text
 
 if TYPE_CHECKING:
     from urdfkin.model.base_motion import BaseMotion
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
-    from urdfkin.verify.witnesses import WitnessName
+    from urdfkin.verify.oracles import WitnessName
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -223,7 +221,7 @@ def read_inputs(
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
     if not any(text.startswith("random") for text in (q, v, a)):
-        refuse_idle(click.get_current_context(), ("seed",), "without a random --q, --v or --a")
+        reject_unused_options(click.get_current_context(), ("seed",), "without a random --q, --v or --a")
     rng = np.random.default_rng(seed)
     given = (("q", q, option), ("v", v, "--v"), ("a", a, "--a"))
     rows = [_values(robot, letter, text, where, rng) for letter, text, where in given]
@@ -256,7 +254,7 @@ def _values(robot: Robot, letter: str, text: str, where: str, rng: Any) -> Float
 
 
 def _count(where: str, text: str) -> int:
-    count = whole(text)
+    count = parse_int(text)
     if count is None or count < 1:
         raise InputError("random:N wants a whole number from 1 on", where=where, found=repr(text))
     return count

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from urdfkin.cli.arguments import Inputs
-from urdfkin.cli.door import say
 from urdfkin.cli.output import check_line, console, hand_out, npy
-from urdfkin.errors.printable import csv_cell, csv_text, json_text
-from urdfkin.errors.showing import NOISE, six_digits
-from urdfkin.report.listing import print_named
+from urdfkin.cli.streams import say
+from urdfkin.errors.display import NOISE, six_digits
+from urdfkin.errors.escape import csv_cell, csv_text, json_text
+from urdfkin.report.pages import print_named
 from urdfkin.verify.quantities import SIX
 
 if TYPE_CHECKING:

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.arguments import forms, load_robot, robot_argument
-from urdfkin.cli.door import say, say_file
-from urdfkin.cli.idle import refuse_idle
+from urdfkin.cli.options import reject_unused_options
 from urdfkin.cli.output import check_line, compiling, console, exit_code, write_file
-from urdfkin.cli.reports import check_writable
+from urdfkin.cli.report_options import check_writable
+from urdfkin.cli.streams import say, say_file
 from urdfkin.errors import InputError
-from urdfkin.errors.printable import json_text
+from urdfkin.errors.escape import json_text
 
 if TYPE_CHECKING:
+    from urdfkin.calibration.calibrate import Calibration, ImplausibleError
+    from urdfkin.calibration.write_back import Rewritten
     from urdfkin.dh.table import DHTable
     from urdfkin.robot import Robot
-    from urdfkin.sameness.calibration.calibrate import Calibration, ImplausibleError
-    from urdfkin.sameness.calibration.rewritten import Rewritten
 
 _FILE = click.Path(path_type=Path)
 
@@ -86,7 +86,7 @@ def command(
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked, or refused.
     """
     from urdfkin.report.calibration import as_data, print_calibration, print_moved  # noqa: PLC0415
-    from urdfkin.report.changes import print_changes  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.diff import print_changes  # noqa: PLC0415  keeps --help fast
 
     check_writable(output)
     given = [name for name in ("poses", "like", "ur") if context.params[name] is not None]
@@ -126,7 +126,7 @@ def command(
 
 
 def _refusal(found: Calibration) -> ImplausibleError:
-    from urdfkin.sameness.calibration.calibrate import ImplausibleError  # noqa: PLC0415
+    from urdfkin.calibration.calibrate import ImplausibleError  # noqa: PLC0415
 
     return ImplausibleError(found, "--force writes it all the same")
 
@@ -134,26 +134,26 @@ def _refusal(found: Calibration) -> ImplausibleError:
 def _refuse_idle(context: click.Context, given: list[str]) -> None:
     measured = ("noise", "drop_odd", "unit", "radians", "every", "force")
     if given != ["poses"]:
-        refuse_idle(context, measured, "without --poses")
+        reject_unused_options(context, measured, "without --poses")
     if given != ["ur"]:
-        refuse_idle(context, ("order",), "without --ur")
+        reject_unused_options(context, ("order",), "without --ur")
     if given:
-        refuse_idle(context, ("positions",), f"with --{given[0]}")
+        reject_unused_options(context, ("positions",), f"with --{given[0]}")
     else:
-        refuse_idle(context, ("output",), "without --poses, --like and --ur")
+        reject_unused_options(context, ("output",), "without --poses, --like and --ur")
     if given in (["ur"], ["like"]):
-        refuse_idle(context, ("fit",), f"with --{given[0]}")
+        reject_unused_options(context, ("fit",), f"with --{given[0]}")
     if given == ["ur"]:
-        refuse_idle(context, ("tip", "base"), "with --ur")
+        reject_unused_options(context, ("tip", "base"), "with --ur")
 
 
 def _calibrated(context: click.Context, robot: Robot) -> Calibration:
     """What the running command asks of measured poses, of another model, or of poses in general."""
-    from urdfkin.dh.read import is_table_file, read_table_or_screws  # noqa: PLC0415
+    from urdfkin.calibration.calibrate import calibrate  # noqa: PLC0415
+    from urdfkin.calibration.like import calibrate_like  # noqa: PLC0415
+    from urdfkin.calibration.poses import read_poses  # noqa: PLC0415
+    from urdfkin.dh.parse_table import is_table_file, read_table_or_screws  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
-    from urdfkin.sameness.calibration.calibrate import calibrate  # noqa: PLC0415
-    from urdfkin.sameness.calibration.like import calibrate_like  # noqa: PLC0415
-    from urdfkin.sameness.calibration.poses import read_poses  # noqa: PLC0415
 
     asked = context.params
     tip, base = asked["tip"], asked["base"]
@@ -196,9 +196,9 @@ def _noise(text: str | None) -> tuple[float, float] | None:
 
 def _of_the_factory(robot: Robot, path: Path, order: str) -> Rewritten:
     """A Universal Robots arm with its calibration; and what the order of its angles comes to."""
-    from urdfkin.sameness.calibration.like import distance, universal_robots  # noqa: PLC0415
-    from urdfkin.sameness.calibration.universal_robots import ORDERS, read_calibration  # noqa: PLC0415
-    from urdfkin.sameness.result import angle, length  # noqa: PLC0415
+    from urdfkin.calibration.like import distance, universal_robots  # noqa: PLC0415
+    from urdfkin.calibration.universal_robots import ORDERS, read_calibration  # noqa: PLC0415
+    from urdfkin.comparison.result import angle, length  # noqa: PLC0415
 
     metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))
     say(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from urdfkin.cli.door import say
+from urdfkin.cli.streams import say
 
 if TYPE_CHECKING:
     from urdfkin.validation.store import Store
@@ -72,9 +72,9 @@ def _say_judged(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
         return
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
     from urdfkin.report.words import counted  # noqa: PLC0415  keeps --help fast
-    from urdfkin.validation.judging import Judged  # noqa: PLC0415
+    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415
 
-    if (judged := Judged.of(store)) is not None:
+    if (judged := AccuracyResult.of(store)) is not None:
         say(f"judged: {sum(map(judged.has, robots)):,} of {counted(len(robots), 'robot')}")
 
 
@@ -109,7 +109,7 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
 
     Each file is read and checked; what is damaged is said and left out. DIR is made if it is not there.
     """
-    from urdfkin.validation.judging import Judged  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415  keeps --help fast
     from urdfkin.validation.store import Store, opened  # noqa: PLC0415
 
     others = [Store.reading(store, _warn) for store in stores]
@@ -119,7 +119,7 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
         for other in others:
             say(f"{other.folder}: {whole.take(other):,} chunks taken")
         if any(other.has_judge for other in others):
-            Judged.merge(whole, others)
+            AccuracyResult.merge(whole, others)
         counts = whole.counts()
         size = len(whole.manifest.cut)
         missing = sum(size - done for done, failed in counts.values() if not failed)

@@ -8,8 +8,8 @@ from urdfkin.cli.answer import Answer, path_command
 from urdfkin.cli.arguments import q_option, read_inputs, seed_option
 from urdfkin.cli.output import console
 from urdfkin.errors import InputError
-from urdfkin.errors.printable import csv_cell, csv_text, json_text
-from urdfkin.errors.showing import six_digits
+from urdfkin.errors.display import six_digits
+from urdfkin.errors.escape import csv_cell, csv_text, json_text
 
 if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
@@ -30,7 +30,7 @@ def command(robot: Robot, base: str | None, tip: str | None, q: str, seed: int, 
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.verify.chains import check_chain  # noqa: PLC0415  keeps --help fast
+    from urdfkin.verify.chain_checks import check_chain  # noqa: PLC0415  keeps --help fast
 
     path = robot.chain(tip, base)
     at = read_inputs(robot, path.tip, seed, q).q
@@ -41,7 +41,7 @@ def command(robot: Robot, base: str | None, tip: str | None, q: str, seed: int, 
     joints = list(zip(path.joints, axes, origins, ways, strict=False))
 
     def show() -> None:
-        from urdfkin.report.listing import print_named  # noqa: PLC0415
+        from urdfkin.report.pages import print_named  # noqa: PLC0415
 
         out = console()
         names = ", ".join(path.joint_names) or "none: nothing moves"

@@ -1,4 +1,7 @@
-"""`urdfkin check`: findings about URDFs, as a linter prints them."""
+"""What `urdfkin check` prints: findings in every form, what was mended, what would be.
+
+`urdfkin check`: findings about URDFs, as a linter prints them.
+"""
 
 from __future__ import annotations
 
@@ -14,24 +17,136 @@ from typing import Any
 import click
 
 from urdfkin.cli.arguments import how_to_load, mimic_option, root_joint_option, together, xacro_option
-from urdfkin.cli.checked import STYLES, Outcome, difference, print_outcome, say_fixed
-from urdfkin.cli.completing import complete_code, complete_file
-from urdfkin.cli.door import say, say_file
-from urdfkin.cli.idle import refuse_idle
-from urdfkin.cli.numbers import Whole
-from urdfkin.errors import SourceError, UnknownNameError
+from urdfkin.cli.completion_items import complete_code, complete_file
+from urdfkin.cli.options import Whole, reject_unused_options
+from urdfkin.cli.streams import command_lines, harmless, say, say_file, say_styled
+from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.lint import Finding, Limits, Severity
+from urdfkin.lint.autofix import mend
 from urdfkin.lint.baseline import baseline_text, read_baseline
-from urdfkin.lint.choosing import Choice, known_before
-from urdfkin.lint.collecting import collected
-from urdfkin.lint.mending import mend
-from urdfkin.lint.pages import RULES
+from urdfkin.lint.discovery import collected
+from urdfkin.lint.finding import Excerpts
+from urdfkin.lint.formats import as_github, as_json, as_sarif, statistics, summary
+from urdfkin.lint.pages import RULES, page
+from urdfkin.lint.patch import patch
 from urdfkin.lint.runner import Examined, examine, file_of
-from urdfkin.lint.settings import INCLUDE, Settings, codes, find_settings, read_settings
+from urdfkin.lint.settings import INCLUDE, Choice, Settings, codes, find_settings, known_before, read_settings
 from urdfkin.system.files import demand_regular, write_file
 from urdfkin.system.git import Version, version_before
+from urdfkin.system.lazy_import import installed_version
 from urdfkin.urdf.sources import Text, is_xacro, read_source
 from urdfkin.urdf.xacro import XacroError
+
+STYLES = ("terminal", "concise", "json", "sarif", "github")
+_COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What was found in all files.
+
+    Attributes:
+        files: Those that were read, as they were named.
+        findings: What is told.
+        silenced: What comments silence, each with its reason.
+        excerpts: Of each finding, the file's line with a caret.
+        unreadable: Why files could not be read.
+        unchanged: How many files say what they said before.
+        known: How many findings a baseline knows, and how many more it knows that are gone.
+        to_fix: How many findings --diff would mend.
+        patches: What --diff prints.
+        unsafe: How many more findings --unsafe-fixes would mend.
+    """
+
+    files: list[str] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
+    silenced: list[tuple[Finding, str]] = field(default_factory=list)
+    excerpts: list[str | None] = field(default_factory=list)
+    unreadable: list[UrdfkinError] = field(default_factory=list)
+    unchanged: int = 0
+    known: tuple[int, int] = (0, 0)
+    to_fix: int = 0
+    patches: list[str] = field(default_factory=list)
+    unsafe: int = 0
+
+    def add(self, file: str, found: Examined) -> None:
+        """One more file."""
+        excerpts = Excerpts(found.data)
+        self.files.append(file)
+        self.findings += found.findings
+        self.silenced += found.silenced
+        self.excerpts += [excerpts.of(finding) for finding in found.findings]
+
+
+def print_outcome(outcome: Outcome, style: str, *, statistics: bool) -> None:
+    """All that was found, in one form."""
+    findings, version = outcome.findings, installed_version("urdfkin") or "0+unknown"
+    if style == "json":
+        click.echo(as_json(findings, outcome.files, version, outcome.silenced))
+    elif style == "sarif":
+        click.echo(as_sarif(findings, version, outcome.silenced))
+    elif style == "github":
+        if findings:
+            command_lines(as_github(findings))
+    elif statistics:
+        _print_statistics(outcome)
+    elif outcome.files or outcome.unchanged:
+        _print_terminal(outcome, excerpts=style == "terminal")
+
+
+def _print_terminal(outcome: Outcome, *, excerpts: bool) -> None:
+    for finding, excerpt in zip(outcome.findings, outcome.excerpts, strict=True):
+        place, rest = str(finding).split(f": {finding.code} ", 1)
+        colour = {"fg": _COLOURS[finding.severity], "bold": True}
+        mark = " [*] " if finding.fix and finding.fix.is_safe else " "
+        say_styled((place, {"bold": True}), (": ", {}), (finding.code, colour), (f"{mark}{rest}", {}))
+        if excerpts and excerpt is not None:
+            line, _, caret = excerpt.partition("\n")
+            say_styled((line, {}))
+            say_styled((caret, colour))
+    _print_summary(outcome)
+    if any(finding.fix and finding.fix.is_safe for finding in outcome.findings):
+        say("[*] --fix mends these, --diff shows how")
+    if unsafe := sum(bool(finding.fix and not finding.fix.is_safe) for finding in outcome.findings):
+        say(f"--unsafe-fixes mends {unsafe} more, which turns joints by more than rounding")
+    worst = next((f.code for f in outcome.findings if f.severity is Severity.ERROR), None)
+    if worst is not None:
+        say(f"'urdfkin explain {worst}' tells more: {page(worst).title}")
+
+
+def _print_summary(outcome: Outcome) -> None:
+    asides = [
+        f"{len(outcome.silenced)} silenced by comments" if outcome.silenced else "",
+        f"{outcome.unchanged} files unchanged" if outcome.unchanged else "",
+        f"{outcome.known[0]} known before" if outcome.known[0] else "",
+        f"{outcome.known[1]} of the baseline are gone: write it again" if outcome.known[1] else "",
+    ]
+    aside = ", ".join(filter(None, asides))
+    say(summary(outcome.findings, len(outcome.files)) + (f" ({aside})" if aside else ""))
+
+
+def _print_statistics(outcome: Outcome) -> None:
+    for line in statistics(outcome.findings):
+        say(line)
+    _print_summary(outcome)
+
+
+def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
+    """One line for each code that was mended in a file."""
+    for code in sorted({finding.code for finding in fixed}):
+        these = [finding for finding in fixed if finding.code == code]
+        turns = max(finding.fix.turns for finding in these if finding.fix)
+        lines = sorted({finding.line for finding in these})
+        more = f" and {len(lines) - 4} more" if len(lines) > 4 else ""
+        where = f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:4]))}{more}"
+        moved = f"; joints turned by up to {turns:.1e} rad each" if turns else "; the robot is the same"
+        say(f"{file}: fixed {code} {RULES[code].slug}, {where}{moved}", err=True)
+
+
+def difference(file: str, before: bytes, after: bytes) -> str:
+    """What would be changed, as a patch."""
+    return patch(file, before, after, harmless)
+
 
 _SETTINGS = "urdfkin.settings"
 #: Settings that are called as options.
@@ -137,13 +252,13 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
       urdfkin explain URDF502
     """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
     if options["fix"] and options["diff"]:
-        refuse_idle(context, ("fix",), "with --diff")
+        reject_unused_options(context, ("fix",), "with --diff")
     if not (options["fix"] or options["diff"]):
-        refuse_idle(context, ("unsafe_fixes",), "without --fix and --diff")
+        reject_unused_options(context, ("unsafe_fixes",), "without --fix and --diff")
     if options["write_baseline"] is not None:
-        refuse_idle(context, ("output", "style", "statistics"), "with --write-baseline")
+        reject_unused_options(context, ("output", "style", "statistics"), "with --write-baseline")
     if options["statistics"] and options["style"] not in ("terminal", "concise"):
-        refuse_idle(context, ("statistics",), f"with --format {options['style']}")
+        reject_unused_options(context, ("statistics",), f"with --format {options['style']}")
     run = _run(context.meta[_SETTINGS], options)
     for word in files or ["."]:
         run.take(word, options["exclude"])

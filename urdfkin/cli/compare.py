@@ -8,9 +8,9 @@ from pathlib import Path
 import click
 
 from urdfkin.cli.arguments import forms
-from urdfkin.cli.numbers import NumberFrom
+from urdfkin.cli.options import NumberFrom
 from urdfkin.cli.output import console, write_file
-from urdfkin.cli.reports import check_writable
+from urdfkin.cli.report_options import check_writable
 
 EXAMPLE = "urdfkin compare main.json branch.json --markdown comment.md"
 
@@ -40,8 +40,11 @@ def command(
     refused.
     Exit 0: no regression. 1: a regression. 2: a file that cannot be used.
     """
-    from urdfkin.report.compare import compare  # noqa: PLC0415  keeps --help fast
-    from urdfkin.report.comparison import markdown_of, print_comparison  # noqa: PLC0415
+    from urdfkin.report.compare import (  # noqa: PLC0415
+        compare,
+        markdown_of,
+        print_comparison,
+    )
     from urdfkin.report.reading import read_document  # noqa: PLC0415
 
     before, after = read_document(old), read_document(new)

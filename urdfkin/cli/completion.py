@@ -7,7 +7,7 @@ from typing import Literal
 import click
 from click.shell_completion import get_completion_class
 
-from urdfkin.cli.door import say_file
+from urdfkin.cli.streams import say_file
 
 SHELLS = ("bash", "zsh", "fish")
 #: What a shell's script asks by; click looks for it under this name.

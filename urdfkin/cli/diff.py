@@ -7,11 +7,11 @@ from pathlib import Path
 import click
 
 from urdfkin.cli.arguments import forms, load_two, xacro_option
-from urdfkin.cli.completing import complete_robot
-from urdfkin.cli.door import say_file
+from urdfkin.cli.completion_items import complete_robot
 from urdfkin.cli.output import compiling, console, write_file
-from urdfkin.cli.reports import check_writable
-from urdfkin.errors.printable import json_text
+from urdfkin.cli.report_options import check_writable
+from urdfkin.cli.streams import say_file
+from urdfkin.errors.escape import json_text
 
 EXAMPLE = "urdfkin diff arm.urdf my.urdf --markdown comment.md"
 
@@ -39,8 +39,8 @@ def command(
     configurations within limits and at equal coordinates; and the same of all changes together.
     Exit 0: nothing changed. 1: something did. 2: bad input.
     """
-    from urdfkin.report.changes import as_data, markdown_of, print_changes  # noqa: PLC0415  keeps --help fast
-    from urdfkin.sameness.changes import diff  # noqa: PLC0415
+    from urdfkin.comparison.diff import diff  # noqa: PLC0415
+    from urdfkin.report.diff import as_data, markdown_of, print_changes  # noqa: PLC0415  keeps --help fast
 
     check_writable(markdown)
     old, new = load_two(a, b)

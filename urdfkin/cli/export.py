@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 
 from urdfkin.cli.arguments import frame_option, load_robot, reference_option, robot_options, verify_option
-from urdfkin.cli.completing import complete_robot
-from urdfkin.cli.door import say, say_file
-from urdfkin.cli.idle import refuse_idle
+from urdfkin.cli.completion_items import complete_robot
+from urdfkin.cli.options import reject_unused_options
 from urdfkin.cli.output import check_line, exit_code, write_file
+from urdfkin.cli.streams import say, say_file
 from urdfkin.errors import InputError
 from urdfkin.export import LANGUAGES, QUANTITIES
 
@@ -66,7 +66,7 @@ def command(
     if (robot is None) == (file is None):
         raise InputError("give a ROBOT to export, or --check FILE")
     if file is not None:
-        refuse_idle(
+        reject_unused_options(
             context, [p.name or "" for p in context.command.params if p.name != "file"], "with --check"
         )
         context.exit(_checked(file))

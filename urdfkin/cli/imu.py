@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.arguments import TRAJECTORY_HELP, Inputs
-from urdfkin.cli.computing import Computing, computing_options
-from urdfkin.cli.door import say
-from urdfkin.cli.idle import refuse_idle
+from urdfkin.cli.options import reject_unused_options
 from urdfkin.cli.output import compiling
+from urdfkin.cli.quantity import Computing, computing_options
+from urdfkin.cli.streams import say
 from urdfkin.verify.quantities import IMU
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def command(
         x = run.inputs()
     else:
         moved = ("base_placement", "base_velocity", "base_acceleration")
-        refuse_idle(context, ("q", "v", "a", *moved, "seed"), "along a --trajectory")
+        reject_unused_options(context, ("q", "v", "a", *moved, "seed"), "along a --trajectory")
         x = _along(run.robot, frame, trajectory)
     g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
     with compiling():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.arguments import forms, load_robot, robot_argument
-from urdfkin.errors.showing import ASCII, Table
+from urdfkin.errors.display import ASCII, Table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -31,7 +31,7 @@ def command(robot: str, format_: str) -> None:
     """
     loaded = load_robot(robot)
     if format_ == "json":
-        from urdfkin.validation.description import describe  # noqa: PLC0415  keeps --help fast
+        from urdfkin.validation.robot_summary import describe  # noqa: PLC0415  keeps --help fast
 
         json.dump(describe(loaded), sys.stdout, indent=2, allow_nan=False)
         click.echo()
@@ -53,8 +53,8 @@ def _print(robot: Robot) -> None:
 
 
 def _print_table(out: Console, table: Table) -> None:
-    from urdfkin.model.described import WORDS  # noqa: PLC0415
-    from urdfkin.report.listing import fits, make_table, print_named  # noqa: PLC0415
+    from urdfkin.model.summary import WORDS  # noqa: PLC0415
+    from urdfkin.report.pages import fits, make_table, print_named  # noqa: PLC0415
 
     rows = [[str(cell) for cell in row] for row in table.rows]
     if out.options.ascii_only:

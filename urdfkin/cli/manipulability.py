@@ -19,11 +19,11 @@ from urdfkin.cli.arguments import (
     seed_option,
     verify_option,
 )
-from urdfkin.cli.door import say
-from urdfkin.cli.endings import form_of
+from urdfkin.cli.options import format_from_suffix
 from urdfkin.cli.output import check_line, compiling, console, exit_code, hand_out, output_option
-from urdfkin.errors.printable import csv_cell, csv_text, json_text
-from urdfkin.report.listing import print_named
+from urdfkin.cli.streams import say
+from urdfkin.errors.escape import csv_cell, csv_text, json_text
+from urdfkin.report.pages import print_named
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -70,7 +70,7 @@ def command(
     sqrt(det J J^T); its derivatives by the rates come from the Hessian, and are nan where the smallest
     singular value cannot be told from 0.
     """
-    format_ = form_of(context, output, _ENDINGS, "csv")
+    format_ = format_from_suffix(context, output, _ENDINGS, "csv")
     loaded = load_robot(robot, verify=verify)
     x = read_inputs(loaded, frame, seed, q)
     with compiling():

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.arguments import Inputs
-from urdfkin.cli.door import say
-from urdfkin.errors.numerals import whole
-from urdfkin.errors.printable import csv_cell, csv_text, json_text
-from urdfkin.errors.showing import NOISE
-from urdfkin.report.listing import make_table, print_named
+from urdfkin.cli.streams import say
+from urdfkin.errors.display import NOISE
+from urdfkin.errors.escape import csv_cell, csv_text, json_text
+from urdfkin.errors.numbers import parse_int
+from urdfkin.report.pages import make_table, print_named
 from urdfkin.system.files import write_file
 
 __all__ = ["write_file"]
@@ -57,7 +57,7 @@ output_option = click.option(
 @contextmanager
 def compiling() -> Iterator[None]:
     """Say what takes so long when a kernel is compiled, once on a machine, and how long it took."""
-    from urdfkin.compiled.telling import listening  # noqa: PLC0415  keeps --help fast
+    from urdfkin.compiled.compiling import listen_to_compile_events  # noqa: PLC0415  keeps --help fast
 
     hints = ["; kept from now on, 'urdfkin warm' compiles all kernels at once"]
 
@@ -68,7 +68,7 @@ def compiling() -> Iterator[None]:
         else:
             say(f"urdfkin: compiled {name} in {seconds:.1f} s", err=True)
 
-    with listening(tell):
+    with listen_to_compile_events(tell):
         yield
 
 
@@ -82,7 +82,7 @@ def console(*, err: bool = False) -> Console:
 
 def _columns() -> int:
     """How wide a pipe is, as COLUMNS says; a shell may leave it empty, and 0 stands for what nobody knows."""
-    wanted = whole(os.environ.get("COLUMNS", "")) or 0
+    wanted = parse_int(os.environ.get("COLUMNS", "")) or 0
     return min(wanted, _WIDEST) if wanted > 0 else _WIDEST
 
 

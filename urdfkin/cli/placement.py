@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.arguments import Inputs, frame_name
-from urdfkin.cli.computing import Computing, computing_options
-from urdfkin.cli.idle import refuse_idle
+from urdfkin.cli.options import reject_unused_options
 from urdfkin.cli.output import compiling
+from urdfkin.cli.quantity import Computing, computing_options
+from urdfkin.verify.certificate import replay_line
 from urdfkin.verify.quantities import PLACEMENT
-from urdfkin.verify.replay import replay_line
 
 if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
@@ -59,7 +59,7 @@ def command(context: click.Context, relative_to: str | None, written: str, verif
     for standard input.
     """
     if relative_to is not None:
-        refuse_idle(context, ("base_placement",), "with --relative-to, which moves with the base")
+        reject_unused_options(context, ("base_placement",), "with --relative-to, which moves with the base")
     run = Computing(context)
     x = run.inputs()
     with compiling():
@@ -83,9 +83,9 @@ def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatAr
     of: Callable[[Any], FloatArray] = rpy_of if written == "rpy" else quaternion_of
     orientation = of(R := T[:, :3, :3])
     if verify and x.robot.certificate().verified:
-        from urdfkin.verify.orientation import demand_the_orientations  # noqa: PLC0415
+        from urdfkin.verify.orientation import check_orientations  # noqa: PLC0415
 
-        demand_the_orientations(orientation, R, x.frame, lambda k: _again(x, k, written))
+        check_orientations(orientation, R, x.frame, lambda k: _again(x, k, written))
     return np.hstack((T[:, :3, 3], orientation))
 
 

@@ -15,17 +15,17 @@ from urdfkin.cli.arguments import (
     robot_argument,
     seed_option,
 )
-from urdfkin.cli.door import say
-from urdfkin.cli.numbers import Number, Whole
+from urdfkin.cli.options import Number, Whole
 from urdfkin.cli.output import compiling, write_file
-from urdfkin.cli.reports import check_writable
+from urdfkin.cli.report_options import check_writable
+from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 
 if TYPE_CHECKING:
     from urdfkin.motion.trajectory import Trajectory
     from urdfkin.robot import Robot
 
-#: They repeat those of `urdfkin.view.plot.panels`, whose import --help does not need.
+#: They repeat those of `urdfkin.view.plot`, whose import --help does not need.
 PANELS = (
     *("q", "v", "a", "position", "orientation", "velocity", "angular-velocity", "acceleration"),
     *("angular-acceleration", "parts", "singular-values", "angular-singular-values", "manipulability"),
@@ -85,7 +85,7 @@ def command(
     from urdfkin.motion.frame_motion import frame_motion  # noqa: PLC0415
     from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415
     from urdfkin.view.figure import save  # noqa: PLC0415  keeps --help fast
-    from urdfkin.view.plot.sheet import foot, sheet  # noqa: PLC0415
+    from urdfkin.view.plot import foot, sheet  # noqa: PLC0415
 
     check_writable(output)
     loaded = load_robot(robot)

@@ -10,13 +10,12 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from urdfkin.cli.door import say
 from urdfkin.cli.output import console
-from urdfkin.errors.printable import printable
+from urdfkin.cli.streams import say
+from urdfkin.errors.escape import printable
 
 if TYPE_CHECKING:
-    from urdfkin.validation.gathering import Progress
-    from urdfkin.validation.standing import Standing
+    from urdfkin.validation.collector import CampaignProgress, Progress
 
 #: Seconds between two lines: of a log, and for a program.
 _LINES, _JSON = 10.0, 0.5
@@ -31,7 +30,7 @@ class Pace:
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._begin = now, now()
 
-    def of(self, standing: Standing) -> tuple[float | None, float | None]:
+    def of(self, standing: CampaignProgress) -> tuple[float | None, float | None]:
         """Chunks a second and seconds left; None while nobody can know."""
         seconds, fresh = self._now() - self._begin, standing.chunks_done - standing.chunks_kept
         if fresh <= 0:
@@ -59,7 +58,7 @@ def progress(*, as_json: bool) -> Iterator[Progress]:
             yield tell
 
 
-def line(standing: Standing, pace: Pace) -> str:
+def line(standing: CampaignProgress, pace: Pace) -> str:
     """It all in words."""
     return (
         f"{standing.robots_done:,} of {standing.robots:,} robots, {standing.chunks_done:,} of"
@@ -82,28 +81,28 @@ def duration(seconds: float) -> str:
     return f"{whole} s"
 
 
-def _kept(standing: Standing) -> str:
+def _kept(standing: CampaignProgress) -> str:
     return f" ({standing.chunks_kept:,} from before)" if standing.chunks_kept else ""
 
 
-def _speed(standing: Standing, pace: Pace) -> str:
+def _speed(standing: CampaignProgress, pace: Pace) -> str:
     rate, left = pace.of(standing)
     if rate is None or left is None:
         return "nothing computed yet, "
     return f"{rate:.3g} chunks/s, {duration(left)} left, "
 
 
-def _failures(standing: Standing) -> str:
+def _failures(standing: CampaignProgress) -> str:
     return f"{standing.failures:,} failed" if standing.failures else "none failed"
 
 
 @contextmanager
-def _now_and_then(seconds: float, show: Callable[[Standing], Any]) -> Iterator[Progress]:
+def _now_and_then(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
     """Show the first standing after some seconds and so on; JSON the first and the last one too."""
     shown, last = time.monotonic(), None
     first = seconds == _JSON
 
-    def tell(standing: Standing) -> None:
+    def tell(standing: CampaignProgress) -> None:
         nonlocal shown, last, first
         last = standing
         if first or time.monotonic() - shown >= seconds:
@@ -117,7 +116,7 @@ def _now_and_then(seconds: float, show: Callable[[Standing], Any]) -> Iterator[P
             show(last)
 
 
-def _json(standing: Standing, pace: Pace) -> None:
+def _json(standing: CampaignProgress, pace: Pace) -> None:
     rate, left = pace.of(standing)
     data = asdict(standing) | {"chunks_per_second": rate, "seconds_left": left}
     say(json.dumps(data), err=True)
@@ -135,7 +134,7 @@ def _bar(pace: Pace) -> Iterator[Progress]:
     with Progress(*columns, console=console(err=True), transient=True) as bar:
         task = bar.add_task("", total=None, words="")
 
-        def tell(standing: Standing) -> None:
+        def tell(standing: CampaignProgress) -> None:
             pace_ = _speed(standing, pace)
             words = f"{standing.robots_done}/{standing.robots} robots, {pace_}{_failures(standing)},"
             bar.update(

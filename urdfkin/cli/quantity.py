@@ -1,16 +1,83 @@
-"""Commands that compute a quantity of a frame, such as `urdfkin jacobian`: one for each row of the table."""
+"""What commands that compute a quantity of a frame share: their options, and what they begin and end with.
+
+Commands that compute a quantity of a frame, such as `urdfkin jacobian`: one for each row of the table.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import click
 
-from urdfkin.cli.arguments import reference_option
+from urdfkin.cli.arguments import (
+    Inputs,
+    a_option,
+    frame_option,
+    load_robot,
+    oracle_option,
+    q_option,
+    read_inputs,
+    reference_option,
+    robot_argument,
+    seed_option,
+    together,
+    v_option,
+    verify_option,
+)
+from urdfkin.cli.base import base_options, with_base
 from urdfkin.cli.breakdown import emit_breakdown
-from urdfkin.cli.computing import Computing, computing_options
-from urdfkin.cli.output import compiling
+from urdfkin.cli.options import format_from_suffix
+from urdfkin.cli.output import ENDINGS, compiling, emit, exit_code, format_option, output_option
+from urdfkin.cli.report_options import check_writable
 from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
+
+if TYPE_CHECKING:
+    from urdfkin.model.tree import FloatArray
+
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+_VALUES = {"q": q_option, "v": v_option, "a": a_option}
+
+
+def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Callable[[_F], _F]:
+    """Robot and frame, the command's own, what is computed with, who checks it, its last ones, the form."""
+    return together(
+        *(robot_argument, frame_option, *own, *(_VALUES[letter] for letter in inputs), base_options(inputs)),
+        *(seed_option, verify_option, oracle_option, *last, format_option, output_option, click.pass_context),
+    )
+
+
+class Computing:
+    """A running command that computes something of a frame: its robot, and how it answers."""
+
+    def __init__(self, context: click.Context) -> None:
+        self._context, self._asked = context, context.params
+        self.output = self._asked["output"]
+        self.format_ = format_from_suffix(context, self.output, ENDINGS, "csv")
+        check_writable(self.output)
+        asked = self._asked
+        self.robot = load_robot(asked["robot"], verify=asked["verify"], oracle=asked["oracle"])
+
+    def inputs(self) -> Inputs:
+        """What to compute with."""
+        asked, base = self._asked, ("base_placement", "base_velocity", "base_acceleration")
+        values = {letter: asked[letter] for letter in "qva" if letter in asked}
+        return with_base(
+            read_inputs(self.robot, asked["frame"], asked["seed"], **values), *map(asked.get, base)
+        )
+
+    def answer(
+        self, x: Inputs, quantity: Quantity, result: FloatArray, reference: str | None = None
+    ) -> NoReturn:
+        """Show or write the result, and end."""
+        emit(x, quantity, reference, result, self.format_, self.output)
+        self.end()
+
+    def end(self) -> NoReturn:
+        """Exit as the checks say."""
+        self._context.exit(exit_code(self.robot.certificate()))
+
 
 _ROBOT = (
     "ROBOT is a path (a table, .toml, .json or .csv, is made a robot), a name that `urdfkin robots` lists, or"

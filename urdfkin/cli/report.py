@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from urdfkin.cli.output import console
-from urdfkin.cli.reports import check_writable, report_options, say_written, write_reports
+from urdfkin.cli.report_options import check_writable, report_options, say_written, write_reports
 from urdfkin.system.files import is_folder
 
 EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.arguments import forms, load_two, xacro_option
-from urdfkin.cli.completing import complete_robot
-from urdfkin.cli.door import say, say_file
-from urdfkin.cli.numbers import NumberFrom, Whole
+from urdfkin.cli.completion_items import complete_robot
+from urdfkin.cli.options import NumberFrom, Whole
 from urdfkin.cli.output import compiling, console, write_file
-from urdfkin.cli.reports import check_writable
-from urdfkin.errors.printable import json_text
+from urdfkin.cli.report_options import check_writable
+from urdfkin.cli.streams import say, say_file
+from urdfkin.errors.escape import json_text
 
 if TYPE_CHECKING:
+    from urdfkin.comparison.result import Question, Sameness
     from urdfkin.robot import Robot
-    from urdfkin.sameness.result import Question, Sameness
 
 EXAMPLE = "urdfkin same ur5 ur5_limited --certificate same.json"
 _PATH = click.Path(path_type=Path, dir_okay=False)
@@ -81,7 +81,7 @@ def command(
     Exit 0: the same, or equivalent up to what is printed. 1: they differ; with --strict also where they are
     equivalent only. With --within: 0 if no frame is ever off by more as written, else 1. 2: bad input.
     """
-    from urdfkin.report.certificates import read_certificate, schema_text  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.same import read_certificate, schema_text  # noqa: PLC0415  keeps --help fast
 
     if schema:
         click.echo(schema_text(), nl=False)
@@ -92,7 +92,7 @@ def command(
     robots = load_two(a, b)
     with compiling():
         if recheck is not None:
-            from urdfkin.sameness.certificate import recheck as held  # noqa: PLC0415
+            from urdfkin.comparison.certificate import recheck as held  # noqa: PLC0415
 
             document = read_certificate(recheck)
             against = held(document, *robots)
@@ -102,9 +102,9 @@ def command(
             holds = f"the certificate holds: {document['verdict']}{''.join(first)}"
             say("the certificate does not hold" if against else holds)
             context.exit(1 if against or document["verdict"] == "differs" else 0)
-        from urdfkin.sameness.boxes import MOST  # noqa: PLC0415
-        from urdfkin.sameness.judging import parse_map, same  # noqa: PLC0415
-        from urdfkin.sameness.result import Question  # noqa: PLC0415
+        from urdfkin.comparison.branch_and_bound import MOST  # noqa: PLC0415
+        from urdfkin.comparison.result import Question  # noqa: PLC0415
+        from urdfkin.comparison.verdict import parse_map, same  # noqa: PLC0415
 
         how_many = MOST if boxes is None else boxes
         found = same(*robots, map=parse_map(pairs), boxes=how_many, within=within)
@@ -126,8 +126,8 @@ def _write(
     all_: bool,
 ) -> None:
     """Every form that was asked for; `words` are the command's options besides the question."""
-    from urdfkin.report.sameness import markdown_of, print_sameness  # noqa: PLC0415
-    from urdfkin.sameness.certificate import certificate  # noqa: PLC0415
+    from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
+    from urdfkin.report.same import markdown_of, print_sameness  # noqa: PLC0415
 
     data = json_text(certificate(found)) + "\n"
     if (path := paths["certificate"]) is not None:
@@ -135,7 +135,7 @@ def _write(
     if (path := paths["markdown"]) is not None:
         write_file(path, markdown_of(found, question).encode())
     if (path := paths["html"]) is not None:
-        from urdfkin.report.sameness_html import as_html  # noqa: PLC0415
+        from urdfkin.report.same import as_html  # noqa: PLC0415
 
         write_file(path, as_html(found, robots, question, words).encode())
     if format_ == "json":

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.answer import Answer, path_command
-from urdfkin.cli.numbers import Whole
+from urdfkin.cli.options import Whole
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
@@ -26,9 +26,9 @@ def command(robot: Robot, base: str | None, tip: str | None, digits: int, verify
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.cli.door import say  # noqa: PLC0415  keeps --help fast
+    from urdfkin.cli.streams import say  # noqa: PLC0415  keeps --help fast
     from urdfkin.dh.export.screws import write_screws  # noqa: PLC0415
-    from urdfkin.verify.screws import check_screws  # noqa: PLC0415
+    from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
 
     screws = robot.screws(tip, base, verify=False)
 

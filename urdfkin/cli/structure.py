@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.arguments import load_robot, path_options, robot_argument, verify_option
-from urdfkin.cli.numbers import Number
+from urdfkin.cli.options import Number
 from urdfkin.cli.output import end_of_path
 
 if TYPE_CHECKING:
@@ -47,9 +47,9 @@ def command(
     """
     import json  # noqa: PLC0415  keeps --help fast
 
-    from urdfkin.cli.door import say, say_file  # noqa: PLC0415
+    from urdfkin.cli.streams import say, say_file  # noqa: PLC0415
     from urdfkin.dh.structure import structure  # noqa: PLC0415
-    from urdfkin.verify.screws import check_screws  # noqa: PLC0415
+    from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
 
     loaded = load_robot(robot, verify=verify)
     if opw is not None:
@@ -70,9 +70,9 @@ def command(
 def _opw(robot: Robot, path: FrameChain, tolerance: float, *, verify: bool) -> int:
     import json  # noqa: PLC0415  keeps --help fast
 
-    from urdfkin.cli.door import say, say_file  # noqa: PLC0415
-    from urdfkin.dh.opw import opw_of  # noqa: PLC0415
-    from urdfkin.verify.screws import check_opw  # noqa: PLC0415
+    from urdfkin.cli.streams import say, say_file  # noqa: PLC0415
+    from urdfkin.dh.structure import opw_of  # noqa: PLC0415
+    from urdfkin.verify.chain_checks import check_opw  # noqa: PLC0415
 
     found = opw_of(path, tolerance)
     said = check_opw(robot.verifier, path, found) if verify else None
@@ -83,8 +83,8 @@ def _opw(robot: Robot, path: FrameChain, tolerance: float, *, verify: bool) -> i
 
 
 def _lines(found: Structure) -> list[str]:
-    from urdfkin.dh.export.terminal import aligned  # noqa: PLC0415  keeps --help fast
-    from urdfkin.errors.printable import printable  # noqa: PLC0415
+    from urdfkin.dh.export.text import aligned  # noqa: PLC0415  keeps --help fast
+    from urdfkin.errors.escape import printable  # noqa: PLC0415
 
     spare = len(found.joints) - found.freedoms
     lines = [

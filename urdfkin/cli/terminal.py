@@ -7,8 +7,8 @@ from typing import Any, TextIO, cast
 
 from rich.console import Console
 
-from urdfkin.cli.door import Door
-from urdfkin.errors.printable import printable
+from urdfkin.cli.streams import SafeStream
+from urdfkin.errors.escape import printable
 
 _TRAILING = re.compile(r" +$", re.MULTILINE)
 
@@ -17,7 +17,7 @@ class Terminal(Console):
     """Rich's console, on which each text that is printed is one line without markup."""
 
     def __init__(self, stream: TextIO, **options: Any) -> None:
-        door = Door(stream, styled=True)
+        door = SafeStream(stream, styled=True)
         super().__init__(file=cast("TextIO", door), highlight=False, emoji=False, markup=False, **options)
         door.styled = self.is_terminal
 

@@ -9,23 +9,22 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
+from urdfkin.cli.accuracy import judge_all
 from urdfkin.cli.arguments import how_to_load, mimic_option, root_joint_option, xacro_option
-from urdfkin.cli.completing import complete_robot
-from urdfkin.cli.door import say
-from urdfkin.cli.idle import refuse_idle
-from urdfkin.cli.judgement import judge_all
-from urdfkin.cli.numbers import Whole
+from urdfkin.cli.completion_items import complete_robot
+from urdfkin.cli.exit import stoppable
+from urdfkin.cli.options import Whole, reject_unused_options
 from urdfkin.cli.output import compiling, console
 from urdfkin.cli.progress import progress
-from urdfkin.cli.reports import FILES, check_writable, report_options, say_written, write_reports
-from urdfkin.cli.stopping import stoppable
+from urdfkin.cli.report_options import FILES, check_writable, report_options, say_written, write_reports
+from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 from urdfkin.urdf.catalogue import examples
 from urdfkin.verify.quantities import compared, not_compared
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
-    from urdfkin.validation.engine import Engine
+    from urdfkin.validation.engines import Engine
     from urdfkin.validation.results import ValidationReport
 
 _T = TypeVar("_T", bound=click.Command)
@@ -112,13 +111,13 @@ def command(
     from urdfkin.report.document import Document  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.terminal import print_report  # noqa: PLC0415
     from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415
+    from urdfkin.validation.accuracy_store import Asked  # noqa: PLC0415
     from urdfkin.validation.campaign import validate  # noqa: PLC0415
-    from urdfkin.validation.judging import Asked  # noqa: PLC0415
 
     check_writable(*files.values())
     how = how_to_load()
     if how["xacro_args"] and not any(map(is_xacro, robots)):
-        refuse_idle(context, ("xacro_arg",), "without a .xacro file")
+        reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
     given = [_once(robot, how) if judged else robot for robot in robots or examples()]
     with stoppable() as stop, compiling(), _cluster(scheduler) as on, progress(as_json=json_progress) as tell:
         report = validate(given, executor=on, progress=tell, **asked, **how)

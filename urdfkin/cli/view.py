@@ -8,9 +8,9 @@ from contextlib import nullcontext
 import click
 
 from urdfkin.cli.arguments import load_robot, q_option, read_inputs, robot_argument, seed_option
-from urdfkin.cli.door import say
-from urdfkin.cli.numbers import Whole
+from urdfkin.cli.options import Whole
 from urdfkin.cli.output import compiling
+from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 
 EXAMPLE = "urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04"
@@ -37,8 +37,11 @@ def command(robot: str, q: str, seed: int, host: str, port: int, browser: bool |
     The address that is printed holds a key: open it as it stands, and show it to nobody who should not see
     or move the robot. Other pages and other users of this machine are refused.
     """
-    from urdfkin.view.opening import has_screen, opened_page  # noqa: PLC0415
-    from urdfkin.view.server import new_server  # noqa: PLC0415  keeps --help fast
+    from urdfkin.view.server import (  # noqa: PLC0415
+        has_screen,
+        new_server,
+        opened_page,
+    )
     from urdfkin.view.viewer import Viewer  # noqa: PLC0415
 
     loaded = load_robot(robot)

@@ -6,7 +6,7 @@ import time
 
 import click
 
-from urdfkin.cli.door import say
+from urdfkin.cli.streams import say
 from urdfkin.errors import SourceError
 
 EXAMPLE = "urdfkin warm"
@@ -19,9 +19,8 @@ def command() -> None:
     Commands and programs compile each kernel when they first need it, some seconds each. XDG_CACHE_HOME says
     where they are kept; kernels of another processor are compiled again. Exit 2: they cannot be kept.
     """
-    from urdfkin.compiled.compiling import cache_folder  # noqa: PLC0415  keeps --help fast
+    from urdfkin.compiled.compiling import cache_folder, listen_to_compile_events  # noqa: PLC0415
     from urdfkin.compiled.single import one_configuration  # noqa: PLC0415
-    from urdfkin.compiled.telling import listening  # noqa: PLC0415
     from urdfkin.verify.ahead import load_kernels  # noqa: PLC0415
 
     folder = cache_folder()
@@ -34,7 +33,7 @@ def command() -> None:
     def tell(name: str, seconds: float | None) -> None:
         say(f"compiling {name} ..." if seconds is None else f"compiled {name} in {seconds:.1f} s", err=True)
 
-    with listening(tell):
+    with listen_to_compile_events(tell):
         load_kernels()
         _ = one_configuration.compiled
     kept = set(folder.glob("*.kernel"))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import sys
 
-from urdfkin.system.interpreter import not_reading
+from urdfkin.system.processes import not_reading
 
 if "numba" not in sys.modules:
     with not_reading(".numba_config.yaml"):

@@ -11,8 +11,8 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from itertools import pairwise
 
-from urdfkin.compiled.registers import LANES
-from urdfkin.errors.demands import whole_number
+from urdfkin.compiled.memory import LANES
+from urdfkin.errors.validators import whole_number
 from urdfkin.model.tree import FloatArray
 
 #: A batch is spread over threads by itself only from here on: a thread costs some ten microseconds.

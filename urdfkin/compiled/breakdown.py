@@ -28,10 +28,10 @@ import numpy as np
 
 from urdfkin.compiled.batch import in_parts
 from urdfkin.compiled.evaluate import placements, velocities
-from urdfkin.compiled.plan import Plan, make_plan
+from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.errors import NotFiniteError, RangeError
-from urdfkin.errors.showing import Sheet, Shown, Table
-from urdfkin.kinematics.arrays import chapter as eq
+from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.kinematics.number_kinds import array_equations as eq
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
@@ -45,7 +45,7 @@ _SHOWN = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AccelerationBreakdown(Shown):
+class AccelerationBreakdown(Displayable):
     """A frame's acceleration as a sum over joints and kinds.
 
     Attributes:
@@ -70,7 +70,7 @@ class AccelerationBreakdown(Shown):
                 if self.terms[(*sample, j, k)].any():
                     yield joint, kind, self.terms[(*sample, j, k)]
 
-    def _sheet(self) -> Sheet:
+    def _sheet(self) -> TextDocument:
         heads = ("joint", "kind", "lin x", "lin y", "lin z", "ang x", "ang y", "ang z")
         batch = self.base.shape[:-1]
         parts: list[str | Table] = ["m/s^2 and rad/s^2; the parts sum to the acceleration (7.125, 7.130)."]
@@ -80,7 +80,7 @@ class AccelerationBreakdown(Shown):
             parts.append(Table(heads, [*rows, ("sum", "", *self.total[sample].tolist())], left=2))
         if (more := math.prod(batch) - _SHOWN) > 0:
             parts.append(f"... and {more} more samples")
-        return Sheet("Acceleration by joint and kind", parts)
+        return TextDocument("Acceleration by joint and kind", parts)
 
     @cached_property
     def total(self) -> FloatArray:
@@ -143,7 +143,7 @@ def acceleration_breakdown(
     if not np.isfinite(a).all():  # the walks below, which look at their inputs themselves, take q and v
         raise NotFiniteError("q, v and a must be finite")
     moving = moving_joints(tree, link)
-    plan = make_plan(tree, [0, *(i + 1 for i in tree.path(link))])  # the links on the way
+    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # the links on the way
     n = len(q)
     terms = np.empty((n, len(moving), len(KINDS), 6)) if out is None else out
     of_base = np.empty((n, 6))
@@ -173,7 +173,7 @@ def moving_joints(tree: KinematicTree, link: int) -> list[int]:
 def _contributions(
     tree: KinematicTree,
     link: int,
-    plan: Plan,
+    plan: CompiledTree,
     q: FloatArray,
     v: FloatArray,
     a: FloatArray,

@@ -15,30 +15,30 @@ from numpy.typing import NDArray
 
 from urdfkin.compiled.batch import in_blocks
 from urdfkin.compiled.compiling import Core
-from urdfkin.compiled.plan import LARGE, Plan
+from urdfkin.compiled.kernel_args import KernelArgs, lines, scratch
+from urdfkin.compiled.memory import LANES
+from urdfkin.compiled.plan import LARGE, CompiledTree
 from urdfkin.compiled.program import Program, program_of
-from urdfkin.compiled.registers import LANES
-from urdfkin.compiled.task import Task, lines, scratch
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.model.base_motion import STILL_STATE, against_gravity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.forking import importing
+from urdfkin.system.processes import importing
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-_PLACES = Task.BASE, Task.Q, Task.V, Task.A
+_PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
 #: Bytes of an output that no near cache keeps until it is read: it is written past them.
 _STREAMED = 2 << 20
 #: Numbers of a block that stay in half of the nearest cache until it is full.
 _MOST_STAGED = 3072
 
-_STRIDES = Task.STRIDE_BASE, Task.STRIDE_Q, Task.STRIDE_V, Task.STRIDE_A
+_STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
 
 
 def _cores() -> Any:
     with importing:
-        from urdfkin.compiled import cores  # noqa: PLC0415
-    return cores
+        from urdfkin.compiled import kernels  # noqa: PLC0415
+    return kernels
 
 
 class How(TypedDict, total=False):
@@ -55,14 +55,14 @@ class How(TypedDict, total=False):
     threads: int | None
 
 
-def placements(plan: Plan, q: FloatArray, **how: Unpack[How]) -> FloatArray:
+def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[How]) -> FloatArray:
     """(n, frames, 4, 4) T_world_frame: 7.77 with the rotations alongside."""
     program = program_of(plan, turned=True)
     return _computed(_cores().placements, plan, program, [q], _ALIGNED, (4, 4), **how)
 
 
 def velocities(
-    plan: Plan, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
+    plan: CompiledTree, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
     """(n, frames, 6) [linear; angular]: 7.127, 7.128."""
     local = reference is Reference.LOCAL
@@ -71,7 +71,7 @@ def velocities(
 
 
 def accelerations(
-    plan: Plan,
+    plan: CompiledTree,
     q: FloatArray,
     v: FloatArray,
     a: FloatArray,
@@ -84,28 +84,38 @@ def accelerations(
     return _computed(core, plan, program_of(plan, turned=local), [q, v, a], reference, (6,), **how)
 
 
-def jacobians(plan: Plan, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]) -> FloatArray:
+def jacobians(
+    plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
+) -> FloatArray:
     """(n, frames, 6, nv) velocity Jacobians: 7.85."""
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
     return _computed(_cores().jacobians, plan, program, [q], reference, (6, plan.nv), **how)
 
 
 def jacobian_rates(
-    plan: Plan, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
+    plan: CompiledTree, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
     """(n, frames, 6, nv) time derivatives of the velocity Jacobians: the J-dot of 7.126."""
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
     return _computed(_cores().jacobian_rates, plan, program, [q, v], reference, (6, plan.nv), **how)
 
 
-def hessians(plan: Plan, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]) -> FloatArray:
+def hessians(
+    plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
+) -> FloatArray:
     """(n, frames, 6, nv, nv) derivatives of the velocity Jacobians: [..., i, j] of column i by rate j."""
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True, pairs=True)
     return _computed(_cores().hessians, plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
 
 
 def imus(
-    plan: Plan, q: FloatArray, v: FloatArray, a: FloatArray, *, gravity: FloatArray, **how: Unpack[How]
+    plan: CompiledTree,
+    q: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+    *,
+    gravity: FloatArray,
+    **how: Unpack[How],
 ) -> FloatArray:
     """(n, frames, 6) [proper acceleration; angular velocity] in each frame's own axes.
 
@@ -118,7 +128,7 @@ def imus(
 
 def _computed(
     core: Core,
-    plan: Plan,
+    plan: CompiledTree,
     program: Program,
     inputs: Sequence[FloatArray],
     reference: Reference,
@@ -170,16 +180,16 @@ def task_of(
         out: (n, ...) to be filled.
         staged: Whether its blocks are (`is_staged`).
     """
-    width, memory, task = out[0].size, scratch(program), np.zeros(len(Task), dtype=np.int64)
+    width, memory, task = out[0].size, scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
     stage = lines(LANES * width if staged else 0)
-    task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
-    task[Task.SCRATCH], task[Task.OUT] = memory.ctypes.data, out.ctypes.data
-    task[Task.REFERENCE], task[Task.N], task[Task.WIDTH] = reference, len(out), width
-    task[Task.STAGE] = stage.ctypes.data if staged else 0
+    task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.addresses
+    task[KernelArgs.SCRATCH], task[KernelArgs.OUT] = memory.ctypes.data, out.ctypes.data
+    task[KernelArgs.REFERENCE], task[KernelArgs.N], task[KernelArgs.WIDTH] = reference, len(out), width
+    task[KernelArgs.STAGE] = stage.ctypes.data if staged else 0
     for place, of_place, x in zip(_PLACES, _STRIDES, inputs, strict=False):
         task[place], task[of_place] = x.ctypes.data, 0 if len(x) == 1 else x.shape[1]
     if inputs[0] is STILL_STATE:
-        task[Task.BASE] = 0
+        task[KernelArgs.BASE] = 0
     return task, (memory, stage)
 
 

@@ -11,11 +11,10 @@ import numpy as np
 
 from urdfkin.compiled import compiled_equations as eq
 from urdfkin.compiled.compiling import compiled
-from urdfkin.compiled.memory import write_rows
+from urdfkin.compiled.memory import constant, numbers_of, put, same, write_rows
 from urdfkin.compiled.numbers import nothing, zero
 from urdfkin.compiled.program import ONE_ROW, OUT_ROW, PAIR_WIDTH, ZERO_ROW, Head
-from urdfkin.compiled.registers import constant, numbers_of, put, same
-from urdfkin.compiled.walk import put_vector, vector
+from urdfkin.compiled.recursion import put_vector, vector
 
 _LOCAL, _WORLD, _ALIGNED = 0, 1, 2
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)

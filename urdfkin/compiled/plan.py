@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from urdfkin.kinematics.rotation.aligning import axis_aligning
+from urdfkin.kinematics.rotation.matrix import axis_aligning
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 IntArray = NDArray[np.int64]
@@ -29,7 +29,7 @@ LARGE = 1e45
 
 
 class Step(IntEnum):
-    """Columns of `Plan.steps` (whole numbers)."""
+    """Columns of `CompiledTree.steps` (whole numbers)."""
 
     KIND = 0
     Q = 1
@@ -46,7 +46,7 @@ class Motion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Columns of `Plan.geometry`: R (9), the offset in the axes before (3), then the mimic rule."""
+    """Columns of `CompiledTree.geometry`: R (9), the offset in the axes before (3), then the mimic rule."""
 
     R = 0
     OFFSET = 9
@@ -55,7 +55,7 @@ class Geometry(IntEnum):
 
 
 class Column(IntEnum):
-    """Columns of `Plan.columns`: a column of eq. 7.85 each row."""
+    """Columns of `CompiledTree.columns`: a column of eq. 7.85 each row."""
 
     STEP = 0
     AXIS = 1
@@ -81,7 +81,7 @@ _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class CompiledTree:
     """The steps of a walk from the base outwards, and the frames met on the way.
 
     Attributes:
@@ -141,11 +141,11 @@ class Plan:
         numbers = self.geometry, self.offsets, self.lengths
         return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
-    def __reduce__(self) -> tuple[type[Plan], tuple[Any, ...]]:
+    def __reduce__(self) -> tuple[type[CompiledTree], tuple[Any, ...]]:
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
 
-def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
+def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
     """The walk that meets the frames of the given links.
 
     Args:
@@ -167,7 +167,7 @@ def make_plan(tree: KinematicTree, links: Sequence[int]) -> Plan:
     places = zip(steps[:, Step.Q].tolist(), needed, strict=True)
     order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)
     ends = [anchors[links[place]] for place in order]
-    return Plan(
+    return CompiledTree(
         nq=tree.nq,
         nv=tree.nv,
         joints=tuple(needed),

@@ -13,12 +13,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from urdfkin.compiled.plan import Plan
-from urdfkin.compiled.task import Task
-from urdfkin.model.given import Given
+from urdfkin.compiled.kernel_args import KernelArgs
+from urdfkin.compiled.plan import CompiledTree
+from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.forking import importing
+from urdfkin.system.processes import importing
 
 #: q, or q and v, or q, v and a, and where to write or None: the result. For what it does not take as it is it
 #: returns None; the robot's way then does it all the same, or says what is wrong.
@@ -71,7 +71,7 @@ class PreparedFrame:
         "reference",
     )  # fmt: skip
 
-    def __init__(self, robot: _Robot, frame: str, reference: Reference, plan: Plan) -> None:
+    def __init__(self, robot: _Robot, frame: str, reference: Reference, plan: CompiledTree) -> None:
         self.frame, self.reference = frame, reference
         self._robot, self._plan = robot, plan
         # Compiled, or read from disk, when they are first called.
@@ -127,6 +127,6 @@ class PreparedFrame:
         if robots or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
             return None
         compute, task = single(quantity, self._plan, self.reference)
-        self._robot.verifier.ledger.account(quantity).counters.append((task, Task.COUNT))
+        self._robot.verifier.ledger.account(quantity).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{quantity}", compute)
         return compute(q, *others)

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from urdfkin.compiled.plan import Column, Geometry, IntArray, Motion, Plan, Step
+from urdfkin.compiled.plan import Column, CompiledTree, Geometry, IntArray, Motion, Step
 from urdfkin.model.tree import FloatArray
 
 
@@ -97,7 +97,7 @@ class Program:
         return self.words.ctypes.data, self.constants.ctypes.data
 
 
-def program_of(plan: Plan, *, turned: bool, columns: bool = False, pairs: bool = False) -> Program:
+def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False) -> Program:
     """The program that meets a plan's frames, made once.
 
     Args:
@@ -114,7 +114,7 @@ def program_of(plan: Plan, *, turned: bool, columns: bool = False, pairs: bool =
 
 
 class _Writer:
-    def __init__(self, plan: Plan, turned: bool, columns: bool, pairs: bool) -> None:
+    def __init__(self, plan: CompiledTree, turned: bool, columns: bool, pairs: bool) -> None:
         self.plan, self.turned, self.columns, self.pairs = plan, turned, columns, pairs
         self.code: list[tuple[int, int, int, int, int]] = []
         self.constants: list[float] = [0.0]

@@ -17,8 +17,8 @@ from numba import types
 from numba.extending import intrinsic
 
 from urdfkin.compiled.compiling import compiled
+from urdfkin.compiled.memory import LANES, put
 from urdfkin.compiled.numbers import fused
-from urdfkin.compiled.registers import LANES, put
 
 _LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, _PI_2, _PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17

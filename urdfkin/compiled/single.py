@@ -22,18 +22,24 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from urdfkin.compiled import cores
+from urdfkin.compiled import kernels
 from urdfkin.compiled.compiling import Core, compiled, core
-from urdfkin.compiled.plan import IntArray, Plan
+from urdfkin.compiled.kernel_args import KernelArgs, scratch
+from urdfkin.compiled.memory import WHOLE_NUMBERS, whole_numbers_at
+from urdfkin.compiled.plan import CompiledTree, IntArray
 from urdfkin.compiled.program import program_of
-from urdfkin.compiled.registers import WHOLE_NUMBERS, whole_numbers_at
-from urdfkin.compiled.task import Task, scratch
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-_CORE, _BUSY, _COUNT = int(Task.CORE), int(Task.BUSY), int(Task.COUNT)
-_Q, _OUT, _NQ, _NV, _ORDERS = int(Task.Q), int(Task.OUT), int(Task.NQ), int(Task.NV), int(Task.ORDERS)
-_AXES, _ROWS, _COLUMNS = int(Task.AXES), int(Task.ROWS), int(Task.COLUMNS)
+_CORE, _BUSY, _COUNT = int(KernelArgs.CORE), int(KernelArgs.BUSY), int(KernelArgs.COUNT)
+_Q, _OUT, _NQ, _NV, _ORDERS = (
+    int(KernelArgs.Q),
+    int(KernelArgs.OUT),
+    int(KernelArgs.NQ),
+    int(KernelArgs.NV),
+    int(KernelArgs.ORDERS),
+)
+_AXES, _ROWS, _COLUMNS = int(KernelArgs.AXES), int(KernelArgs.ROWS), int(KernelArgs.COLUMNS)
 
 #: Words, of eight bytes, of a Python object: its type, what is its own, and the items of a tuple.
 _OWN = object.__basicsize__ // 8
@@ -192,16 +198,16 @@ def arrays_are_known() -> bool:
 #: For each quantity: its core, that for LOCAL, how many of q, v and a they take, and how many axes of a
 #: result are the rates'.
 _HOW: dict[str, tuple[Core, Core, int, int]] = {
-    "placement": (cores.placements, cores.placements, 1, 0),
-    "velocity": (cores.velocities, cores.local_velocities, 2, 0),
-    "jacobian": (cores.jacobians, cores.jacobians, 1, 1),
-    "hessian": (cores.hessians, cores.hessians, 1, 2),
-    "acceleration": (cores.accelerations, cores.local_accelerations, 3, 0),
+    "placement": (kernels.placements, kernels.placements, 1, 0),
+    "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
+    "jacobian": (kernels.jacobians, kernels.jacobians, 1, 1),
+    "hessian": (kernels.hessians, kernels.hessians, 1, 2),
+    "acceleration": (kernels.accelerations, kernels.local_accelerations, 3, 0),
 }
 
 
 def single(
-    quantity: str, plan: Plan, reference: Reference
+    quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     """What computes a quantity of a plan's only frame, compiled or read from disk; its base stands still.
 
@@ -217,13 +223,13 @@ def single(
     shape = (4, 4) if quantity == "placement" else (6, *[plan.nv] * columns)
     address = (local_core if local else core).address
     compute, task = _called(address, orders, shape, plan, program, memory)
-    task[Task.PROGRAM], task[Task.CONSTANTS] = program.addresses
-    task[Task.SCRATCH], task[Task.REFERENCE] = memory.ctypes.data, reference
+    task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.addresses
+    task[KernelArgs.SCRATCH], task[KernelArgs.REFERENCE] = memory.ctypes.data, reference
     return compute, task
 
 
 def called(
-    core: Any, orders: int, shape: tuple[int, ...], plan: Plan
+    core: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     """The same for a function of C's that takes a task, a result being of some shape.
 
@@ -238,11 +244,14 @@ def called(
 
 
 def _called(
-    address: int, orders: int, shape: tuple[int, ...], plan: Plan, *alive: object
+    address: int, orders: int, shape: tuple[int, ...], plan: CompiledTree, *alive: object
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    task = np.zeros(len(Task), dtype=np.int64)
-    task[Task.CORE], task[Task.ORDERS], task[Task.N] = address, orders, 1
-    task[Task.NQ], task[Task.NV] = plan.nq, plan.nv  # strides are 0: there is no next configuration
-    task[Task.AXES], task[Task.ROWS], task[Task.COLUMNS] = len(shape), *(*shape, 1)[:2]
+    task = np.zeros(len(KernelArgs), dtype=np.int64)
+    task[KernelArgs.CORE], task[KernelArgs.ORDERS], task[KernelArgs.N] = address, orders, 1
+    task[KernelArgs.NQ], task[KernelArgs.NV] = (
+        plan.nq,
+        plan.nv,
+    )  # strides are 0: there is no next configuration
+    task[KernelArgs.AXES], task[KernelArgs.ROWS], task[KernelArgs.COLUMNS] = len(shape), *(*shape, 1)[:2]
     bound = task, np.ndarray, None, np.empty, shape, *alive
     return _built_in("compute", one_configuration.address, *bound), task

@@ -16,20 +16,20 @@ from typing import TypeVar
 
 import numpy as np
 
-from urdfkin.dh.elements import along_axis, as_step, between_axes
-from urdfkin.dh.noise import Noise, noises, tilt_of
-from urdfkin.dh.normals import (
+from urdfkin.dh.common_normals import (
     NEARLY_PARALLEL,
     NearParallel,
+    PairLike,
     Step,
     cleaned_angle,
     cleaned_length,
     lifted,
+    near,
     step_between,
+    steps_like,
 )
-from urdfkin.dh.row import Convention, DHRow, convention_of
-from urdfkin.dh.steps_like import PairLike, near, steps_like
-from urdfkin.dh.table import DHTable
+from urdfkin.dh.noise import Noise, noises, tilt_of
+from urdfkin.dh.table import Convention, DHRow, DHTable, along_axis, as_step, between_axes, convention_of
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
 from urdfkin.model.chain import ChainJoint, FrameChain

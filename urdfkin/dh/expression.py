@@ -2,7 +2,7 @@ r"""A cell as people write it: `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\fra
 
 A cell is a sum: at most one of its terms is the joint's variable, the others are numbers, multiples of pi, in
 a unit that the cell says or not. What a cell may not be is refused here; what its numbers mean where no unit
-is said, and which cells may have a variable, is for the row to know (`urdfkin.dh.written_row`).
+is said, and which cells may have a variable, is for the row to know (`urdfkin.dh.rows`).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from urdfkin.errors.measured import UNITS
+from urdfkin.errors.numbers import UNITS
 
 #: Signs and letters of pages, PDFs and LaTeX -> what they mean.
 _SAME = str.maketrans(

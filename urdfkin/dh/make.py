@@ -6,8 +6,8 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from urdfkin.dh.derive import choices_of, derive
-from urdfkin.dh.lengths import demand_squares
-from urdfkin.dh.like import derive_like, reversed_like
+from urdfkin.dh.match_table import derive_like, reversed_like
+from urdfkin.dh.noise import demand_squares
 from urdfkin.dh.snapping import checked_tolerance, row_of_constant, snap_chain, snap_thetas, statement
 from urdfkin.dh.table import DHTable
 from urdfkin.model.chain import chain

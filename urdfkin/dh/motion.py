@@ -13,10 +13,10 @@ from functools import lru_cache
 import numpy as np
 
 from urdfkin.compiled.evaluate import accelerations, jacobians, velocities
-from urdfkin.compiled.plan import Plan, make_plan
+from urdfkin.compiled.plan import CompiledTree, compile_tree
+from urdfkin.dh.convert import free_tree
 from urdfkin.dh.table import DHTable
-from urdfkin.dh.to_tree import free_tree
-from urdfkin.model.given import Given
+from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
@@ -25,10 +25,10 @@ _TABLES = 64
 
 
 @lru_cache(_TABLES)
-def plan_of(table: DHTable) -> Plan:
+def plan_of(table: DHTable) -> CompiledTree:
     """The walk over a table's frames to its tip."""
     tree = free_tree(table)
-    return make_plan(tree, [len(tree.links) - 1])
+    return compile_tree(tree, [len(tree.links) - 1])
 
 
 def jacobian(

@@ -12,17 +12,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urdfkin.dh.export.cells import at_most, constant_of
-from urdfkin.dh.row import DHRow
+from urdfkin.dh.export.text import at_most, constant_of
 from urdfkin.dh.snapping import SAMPLES, range_of, travel, values_within
-from urdfkin.dh.table import DHTable
+from urdfkin.dh.table import DHRow, DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, TreeRow
 from urdfkin.dh.units import Units, cell_in_si, read_number
 from urdfkin.model.tree import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
-class Printed:
+class PrintedPrecision:
     """What the digits lose.
 
     Attributes:
@@ -45,7 +44,7 @@ class Printed:
         )
 
 
-def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Printed:
+def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
     """Read a table's printed form again and hold it against the table.
 
     Args:
@@ -63,7 +62,7 @@ def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Pri
     off = np.linalg.norm((base @ between @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound(table, rows, base, tool)
     worst = float(off.max(initial=0.0))
-    return Printed(units.digits, worst, bound if math.isfinite(bound) else None, SAMPLES)
+    return PrintedPrecision(units.digits, worst, bound if math.isfinite(bound) else None, SAMPLES)
 
 
 def _row(row: DHRow, units: Units) -> DHRow:
@@ -124,7 +123,7 @@ def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: Floa
     return total + table.rounding(np.zeros(len(table.joint_names))).item()
 
 
-def printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> Printed:
+def printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
     """What the digits of a whole robot's parameters lose, at its worst link.
 
     Args:
@@ -134,7 +133,7 @@ def printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> Printed:
     """
     again = replace(table, rows=tuple(_tree_row(row, units) for row in table.rows))
     off = np.linalg.norm((again.placements(q) - table.placements(q))[..., :3, 3], axis=-1)
-    return Printed(units.digits, float(off.max(initial=0.0)), None, len(q))
+    return PrintedPrecision(units.digits, float(off.max(initial=0.0)), None, len(q))
 
 
 def _tree_row(row: TreeRow, units: Units) -> TreeRow:

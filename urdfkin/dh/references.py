@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from urdfkin.dh.read import read_mapping
+from urdfkin.dh.parse_table import read_mapping
 from urdfkin.errors import UnknownNameError
 from urdfkin.system.files import exists
 from urdfkin.system.resources import robots_dir

@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.to_tree import UNBOUNDED_SLIDE
+from urdfkin.dh.convert import UNBOUNDED_SLIDE
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation
-from urdfkin.kinematics.rotation.nearest import ROUNDED, polar_factor
+from urdfkin.kinematics.rotation.matrix import ROUNDED, polar_factor
 from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.chain import FrameChain, motion_about_z
-from urdfkin.model.coupling import Coupling, coupling_of
-from urdfkin.model.given import Given
+from urdfkin.model.configuration_like import Given
+from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, frozen
 
@@ -44,7 +44,7 @@ class ScrewJoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Screws:
+class ProductOfExponentials:
     """A robot's path as a product of exponentials.
 
     Attributes:
@@ -155,7 +155,7 @@ class Screws:
         }
 
 
-def screws_of(path: FrameChain) -> Screws:
+def screws_of(path: FrameChain) -> ProductOfExponentials:
     """The screws of a path of a robot, at zero of every joint."""
     T, rows = np.eye(4), list[FloatArray]()
     for joint, A in zip(path.joints, path.constants, strict=False):
@@ -164,7 +164,9 @@ def screws_of(path: FrameChain) -> Screws:
         rows.append(np.concatenate([z, np.cross(p, z)] if joint.kind.turns else [np.zeros(3), z]) + 0.0)
     joints = tuple(ScrewJoint(one.name, one.kind, one.mimic, one.limit) for one in path.joints)
     ends = path.robot, path.base, path.tip
-    return Screws(joints, frozen(T @ path.T_last_tip), frozen(np.array(rows).reshape(-1, 6)), *ends)
+    return ProductOfExponentials(
+        joints, frozen(T @ path.T_last_tip), frozen(np.array(rows).reshape(-1, 6)), *ends
+    )
 
 
 def _rigid(M: FloatArray) -> FloatArray:
@@ -189,7 +191,7 @@ def screws_from(
     robot: str = "robot",
     base_frame: str = "base",
     tip_frame: str = "tip",
-) -> Screws:
+) -> ProductOfExponentials:
     """Screws that somebody wrote; a joint turns where w is not zero.
 
     Args:
@@ -241,10 +243,10 @@ def screws_from(
             )  # fmt: skip
         S[i, 3:] -= pitch * S[i, :3]
         made.append(ScrewJoint(name, JointKind.CONTINUOUS if turns else JointKind.PRISMATIC))
-    return Screws(tuple(made), frozen(pose), frozen(S), robot, base_frame, tip_frame)
+    return ProductOfExponentials(tuple(made), frozen(pose), frozen(S), robot, base_frame, tip_frame)
 
 
-def screws_of_mapping(data: Mapping[str, Any]) -> Screws:
+def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
     """Screws from a file's plain data: M, and space or body; errors as for `screws_from`.
 
     Raises:

@@ -1,4 +1,24 @@
-"""The Denavit-Hartenberg table: rows, a base and a tool, in a convention that is always named.
+"""One row of a table, and the two conventions in which rows are written.
+
+The elementary transforms of Denavit and Hartenberg, for one row or for a batch.
+
+Every table here is a product of two kinds of factors, in turns:
+
+    S = Rz(theta) Tz(d)              along and about a joint's axis
+    X = Tx(a) Rx(alpha) Ry(beta)     from one axis to the next; beta = 0 except in a Hayati row
+
+Standard rows are S_i X_i, modified rows X_{i-1} S_i: the same factors, bracketed differently.
+
+
+What snapping moved, said in metres and radians that are guaranteed, and measured besides.
+
+Turning one constant rotation of the chain by an angle eps about a joint's origin moves the tip by at most
+eps times the tip's distance from that origin. That distance never exceeds the length of the way: the sum of
+the constant offsets in between and the travel of the sliding joints. The changes add up. The bound so holds
+for every configuration; nothing in it was sampled.
+
+
+The Denavit-Hartenberg table: rows, a base and a tool, in a convention that is always named.
 
 Section 7.5 of the text. With S_i = Rz(theta_i) Tz(d_i) and X = Tx(a) Rx(alpha) Ry(beta):
 
@@ -13,30 +33,253 @@ d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.row import Convention, DHRow, convention_of
-from urdfkin.dh.statement import SnapStatement
 from urdfkin.dh.units import Units, units_of
-from urdfkin.errors import InputError
-from urdfkin.errors.printable import log_line
-from urdfkin.errors.showing import Shown
-from urdfkin.kinematics.roundings import EPS, of_rows
-from urdfkin.model.coupling import Coupling, coupling_of
-from urdfkin.model.given import Given
-from urdfkin.model.tree import FloatArray, frozen
-from urdfkin.system.asking import ask
+from urdfkin.errors import InputError, Question
+from urdfkin.errors.display import Displayable
+from urdfkin.errors.escape import log_line
+from urdfkin.kinematics.roundings import ANGLE, EPS, of_rows
+from urdfkin.model.configuration_like import Given
+from urdfkin.model.mimic import Coupling, coupling_of
+from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, frozen
+from urdfkin.system.lazy_import import hook
+
+
+class Convention(StrEnum):
+    """Where a joint's axis stands: z_{i-1} (standard, distal) or z_i (modified, proximal, Craig)."""
+
+    STANDARD = "standard"
+    MODIFIED = "modified"
+
+
+def convention_of(name: str) -> Convention:
+    """The convention by name; raises InputError for anything else."""
+    try:
+        return Convention(name)
+    except (ValueError, TypeError):
+        raise InputError(
+            "unknown convention",
+            found=repr(name),
+            remedy="say 'standard' or 'modified'",
+            question=Question.WHICH_DH_CONVENTION,
+        ) from None
+
+
+@dataclass(frozen=True, slots=True)
+class DHRow:
+    """One joint: the constant parts of its parameters, metres and radians.
+
+    Attributes:
+        a: Length along x: a_i in a standard table, a_{i-1} in a modified one.
+        alpha: Turn about x, likewise.
+        d: Offset along the joint's axis; the joint's value is added for a prismatic joint.
+        theta: Turn about the joint's axis; the joint's value is added for a turning joint.
+        kind: Revolute, continuous or prismatic.
+        joint: The joint's name.
+        sense: +1, or -1 where the row counts the joint's value the other way.
+        beta: Turn about y, after alpha: 0 except in a Hayati row.
+        mimic: Whom the joint follows; None if it has a coordinate of its own.
+        limit: Its bounds, None where there are none.
+    """
+
+    a: float
+    alpha: float
+    d: float
+    theta: float
+    kind: JointKind
+    joint: str
+    sense: int = 1
+    beta: float = 0.0
+    mimic: Mimic | None = None
+    limit: Limit | None = None
+
+    def __post_init__(self) -> None:
+        where = f"row of joint {self.joint}"
+        for name in ("a", "alpha", "d", "theta", "beta"):
+            if not math.isfinite(getattr(self, name)):
+                raise InputError(
+                    f"{name} is not a finite number", where=where, found=str(getattr(self, name))
+                )
+        if self.sense not in (1, -1):
+            raise InputError("the sense is +1 or -1", where=where, found=str(self.sense))
+        if not self.kind.has_axis:
+            raise InputError(
+                "a row is a revolute, continuous or prismatic joint", where=where, found=self.kind.value
+            )
+
+    @property
+    def cells(self) -> tuple[float, float, float, float, float]:
+        """(a, alpha, d, theta, beta)."""
+        return (self.a, self.alpha, self.d, self.theta, self.beta)
+
+    @property
+    def foot(self) -> float:
+        """Metres: how far away four parameters would put the foot of this row's common normal.
+
+        A Hayati row's x reaches the next axis at `a`, where that axis leans by `beta` along x and by `alpha`
+        across. The common normal stands across both; its foot lies at a sin(beta) / sin^2(tilt).
+        """
+        across, along = math.sin(self.alpha) * math.cos(self.beta), math.sin(self.beta)
+        return abs(self.a * along) / (across**2 + along**2) if self.beta else 0.0
+
+    @property
+    def X(self) -> FloatArray:
+        """(4, 4) Tx(a) Rx(alpha) Ry(beta)."""
+        return between_axes(self.a, self.alpha, self.beta)
+
+    def S(self, value: ArrayLike = 0.0) -> FloatArray:
+        """(..., 4, 4) Rz(theta) Tz(d) with the joint at `value`, rad or m."""
+        moved = self.sense * np.asarray(value, dtype=np.float64)
+        return (
+            along_axis(self.theta + moved, self.d)
+            if self.kind.turns
+            else along_axis(self.theta, self.d + moved)
+        )
+
+
+#: How far from a multiple of 15 degrees people write one, as a share of 15 degrees.
+_WRITTEN = 1e-3
+
+
+def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:
+    """(..., 4, 4) S = Rz(theta) Tz(d), radians and metres; the arguments are broadcast."""
+    theta, d = np.broadcast_arrays(np.asarray(theta, np.float64), np.asarray(d, np.float64))
+    S = np.zeros((*theta.shape, 4, 4))
+    S[..., 0, 0] = S[..., 1, 1] = np.cos(theta)
+    S[..., 1, 0] = np.sin(theta)
+    S[..., 0, 1] = -S[..., 1, 0]
+    S[..., 2, 2] = S[..., 3, 3] = 1.0
+    S[..., 2, 3] = d
+    return S
+
+
+def between_axes(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
+    """(4, 4) X = Tx(a) Rx(alpha) Ry(beta), metres and radians."""
+    ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
+    return np.array(
+        [
+            [cb, 0.0, sb, a],
+            [sa * sb, ca, -sa * cb, 0.0],
+            [-ca * sb, sa, ca * cb, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def as_step(T: FloatArray) -> tuple[float, float] | None:
+    """(a, alpha) where a pose is Tx(a) Rx(alpha) to rounding of its rotation, else None.
+
+    Example:
+        >>> as_step(between_axes(0.5, math.pi))
+        (0.5, 3.141592653589793)
+    """
+    crossed = (T[0, 1], T[0, 2], T[1, 0], T[2, 0])
+    if max(map(abs, crossed)) > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
+        return None
+    alpha = math.atan2(T[2, 1], T[2, 2])
+    twelfth = nearest_twelfth(alpha)
+    return float(T[0, 3]), wrapped(twelfth if abs(alpha - twelfth) <= ANGLE * EPS else alpha) + 0.0
+
+
+def wrapped(angle: float) -> float:
+    """The angle's representative in (-pi, pi], where a rounding error below -pi counts as pi.
+
+    Example:
+        >>> wrapped(-math.pi) == math.pi, wrapped(7.0) == 7.0 - 2 * math.pi
+        (True, True)
+    """
+    turned = math.remainder(angle, 2.0 * math.pi)
+    return math.pi if turned <= -math.pi * (1.0 - EPS) else turned
+
+
+def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
+    """Whether an angle is a multiple of 15 degrees, and not 0, as far as people write them: 1.571 is.
+
+    >>> looks_round(1.571), looks_round(0.0), looks_round(0.25), looks_round(90.0, twelfth=15.0)
+    (True, False, False, True)
+    """
+    return abs(angle) > 0.5 * twelfth and abs(math.remainder(angle, twelfth)) <= _WRITTEN * twelfth
+
+
+def nearest_twelfth(angle: float) -> float:
+    """The multiple of pi/12 (15 degrees) nearest to an angle."""
+    return round(angle * 12.0 / math.pi) * math.pi / 12.0
+
+
+@dataclass(frozen=True, slots=True)
+class SnapChange:
+    """One constant rotation that was made round.
+
+    Attributes:
+        row: Index of the row in which it shows (0 is the first); -1 for the base, the number of rows for the
+            tool.
+        what: The joint and the quantity.
+        angle: By how much everything beyond turned, radians.
+        lever: Metres: the tip is never farther from the pivot than this while sliding joints are at zero.
+        sliders: Names of the sliding joints beyond the pivot, whose travel lengthens the lever.
+    """
+
+    row: int
+    what: str
+    angle: float
+    lever: float
+    sliders: tuple[str, ...] = ()
+
+    @property
+    def tip(self) -> float:
+        """Metres: how far this change moves the tip at most, with the sliding joints at zero."""
+        return self.angle * self.lever
+
+
+@dataclass(frozen=True, slots=True)
+class SnapReport:
+    """All that was snapped, and how far the tip moves.
+
+    Attributes:
+        tolerance: Radians, as asked for.
+        changes: What was moved, base to tip.
+        metres: Guaranteed: the tip's position moves by no more, within the limits of sliding joints.
+        radians: Guaranteed: its orientation turns by no more.
+        per_metre: What each metre of travel of a sliding joint adds, for joints without limits too.
+        measured_metres: The largest displacement seen on samples.
+        measured_radians: The largest turn seen on them.
+        samples: How many.
+    """
+
+    tolerance: float
+    changes: tuple[SnapChange, ...]
+    metres: float
+    radians: float
+    per_metre: Mapping[str, float]
+    measured_metres: float = 0.0
+    measured_radians: float = 0.0
+    samples: int = 0
+
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """Rows (from 0) that show a change, in order; -1 is the base, the number of rows the tool."""
+        return tuple(sorted({change.row for change in self.changes}))
+
+    def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
+        """(...,) metres: the guarantee at given values (by joint name) of the sliding joints."""
+        at_zero = sum(change.tip for change in self.changes)
+        travel = [np.abs(values[name]) * rate for name, rate in self.per_metre.items()]
+        return np.asarray(at_zero + sum(travel, np.zeros(())), dtype=np.float64)
+
 
 #: How far the rotation of a pose may be from one: people type seven digits.
 _TYPED = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DHTable(Shown):
+class DHTable(Displayable):
     """A Denavit-Hartenberg table: data, and the products of its own matrices.
 
     `urdfkin.load` makes a robot of it; `urdfkin.dh` has its motion and its other forms.
@@ -62,7 +305,7 @@ class DHTable(Shown):
     robot: str = "robot"
     base_frame: str = "base"
     tip_frame: str = "tip"
-    snap: SnapStatement | None = None
+    snap: SnapReport | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "convention", convention_of(self.convention))
@@ -108,7 +351,7 @@ class DHTable(Shown):
         return self._written("html", units_of(angles, lengths, digits))
 
     def _written(self, form: str, units: Units) -> str:
-        return str(ask("a table in a form")(self, form, units)).rstrip("\n")
+        return str(hook("a table in a form")(self, form, units)).rstrip("\n")
 
     def _repr_html_(self) -> str:
         return self.to_html()

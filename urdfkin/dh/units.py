@@ -13,8 +13,8 @@ from numbers import Real
 
 from urdfkin.dh.expression import cell_of
 from urdfkin.errors import InputError
-from urdfkin.errors.demands import shown
-from urdfkin.errors.measured import in_radians
+from urdfkin.errors.numbers import in_radians
+from urdfkin.errors.validators import safe_repr
 
 
 class Angles(StrEnum):
@@ -148,10 +148,10 @@ def read_number(value: object, where: str) -> float:
         number = _number(value)
     except (ValueError, TypeError, OverflowError, ZeroDivisionError):
         raise InputError(
-            "not a number", where=where, found=shown(value), remedy="write 1.5708 or pi/2"
+            "not a number", where=where, found=safe_repr(value), remedy="write 1.5708 or pi/2"
         ) from None
     if not math.isfinite(number):
-        raise InputError("not a finite number", where=where, found=shown(value))
+        raise InputError("not a finite number", where=where, found=safe_repr(value))
     return number
 
 

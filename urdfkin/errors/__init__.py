@@ -1,4 +1,8 @@
-"""One family of exceptions, each with the facts a person needs to act on it.
+"""Names that look like another, found in bounded time.
+
+Where a message leads whoever asks why: headings of docs/questions.md, which `urdfkin explain` prints.
+
+One family of exceptions, each with the facts a person needs to act on it.
 
 Every message says what is wrong, where, what was found and what to do about it; the same facts are
 attributes, so that a program need not read the sentence.
@@ -6,12 +10,78 @@ attributes, so that a program need not read the sentence.
 
 from __future__ import annotations
 
+import difflib
+import heapq
 from collections.abc import Callable, Iterable
+from enum import Enum
 from typing import Any, Self, TypeVar
 
-from urdfkin.errors.nearest import nearest
-from urdfkin.errors.printable import log_line
-from urdfkin.errors.questions import Question
+from urdfkin.errors.escape import log_line
+
+#: Characters of a name that are compared.
+_COMPARED = 128
+
+#: Pairs of characters that are compared for one word, after what tells at a glance that names differ.
+WORK = 1_000_000
+#: How many names are offered.
+_OFFERED = 3
+
+
+def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int = WORK) -> list[str]:
+    """Up to three known names that look like `word`, the nearest first, as `difflib.get_close_matches`.
+
+    Args:
+        word: What was written.
+        known: The names there are.
+        cutoff: How alike they must be, from 0 to 1.
+        work: Pairs of characters to compare before the search ends with what it has.
+
+    >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
+    ['panda_hand']
+    """
+    begins = word[:_COMPARED]
+    matcher = difflib.SequenceMatcher(b=begins)
+    found = []
+    for name in known:
+        matcher.set_seq1(name[:_COMPARED])
+        if matcher.real_quick_ratio() < cutoff or matcher.quick_ratio() < cutoff:
+            continue
+        work -= len(begins) * len(name[:_COMPARED])
+        if work < 0:
+            break
+        if (alike := matcher.ratio()) >= cutoff:
+            found.append((alike, name))
+    return [name for _, name in heapq.nlargest(_OFFERED, found)]
+
+
+class Question(Enum):
+    """A question by its heading's anchor; as text, the command that answers it.
+
+    >>> print(Question.MIMIC_JOINTS)
+    `urdfkin explain mimic-joints` says more
+    """
+
+    REFERENCE_FRAMES = "reference-frames"
+    TWO_ACCELERATIONS = "two-accelerations"
+    JOINT_ORDER = "joint-order"
+    CONTINUOUS_JOINTS = "continuous-joints"
+    MIMIC_JOINTS = "mimic-joints"
+    PACKAGES_AND_MESHES = "packages-and-meshes"
+    URDF_TO_DH = "urdf-to-dh"
+    WHICH_DH_CONVENTION = "which-dh-convention"
+    DH_AND_URDF_DISAGREE = "dh-and-urdf-disagree"
+    UNKNOWN_FRAMES = "unknown-frames"
+    ROW_ORDER = "row-order"
+    FIXED_JOINTS = "fixed-joints"
+    WRONG_PINOCCHIO = "the-wrong-pinocchio"
+    AXES = "axes-that-are-not-unit-vectors"
+    XACRO = "xacro-without-ros"
+    GRAVITY = "gravity-in-an-acceleration"
+    FLOATING_BASES = "floating-bases"
+
+    def __str__(self) -> str:
+        return f"`urdfkin explain {self.value}` says more"
+
 
 _E = TypeVar("_E", bound="UrdfkinError")
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from urdfkin.errors import InputError
 from urdfkin.export.seal import is_sealed
 from urdfkin.system.files import read_text
-from urdfkin.system.interpreter import own_python
+from urdfkin.system.processes import own_python
 
 #: What every file says in its first lines.
 _MARK = "straight-line code for this robot and frame"

@@ -6,10 +6,10 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
-from urdfkin.compiled.plan import Plan, Step
+from urdfkin.compiled.plan import CompiledTree, Step
 from urdfkin.errors import InputError
-from urdfkin.errors.demands import word, words
-from urdfkin.export import walk
+from urdfkin.errors.validators import as_names, as_str
+from urdfkin.export import recursion
 from urdfkin.export.expression import Node, Number
 from urdfkin.export.function import Function, function_of
 from urdfkin.export.naming import all_safe, shown, title
@@ -97,7 +97,7 @@ class Code:
 
 def code_of(
     verifier: Verifier,
-    plan_of: Callable[[Sequence[int]], Plan],
+    plan_of: Callable[[Sequence[int]], CompiledTree],
     frame: str,
     quantities: Collection[str],
     reference: Reference | str,
@@ -128,7 +128,7 @@ def code_of(
 
 def bare(
     tree: KinematicTree,
-    plan: Plan,
+    plan: CompiledTree,
     frame: str,
     rows: Sequence[Quantity],
     reference: Reference,
@@ -152,11 +152,11 @@ def bare(
 
 def exported() -> list[Quantity]:
     """The quantities that can be written as code."""
-    return [row for row in walked() if row.name in walk.QUANTITIES]
+    return [row for row in walked() if row.name in recursion.QUANTITIES]
 
 
 def _rows(names: Collection[str]) -> list[Quantity]:
-    named = [word(name, "each of quantities") for name in words(names, "quantities")]
+    named = [as_str(name, "each of quantities") for name in as_names(names, "quantities")]
     rows = [quantity(name.replace("_", " ")) for name in dict.fromkeys(named)]
     if not rows:
         raise InputError(

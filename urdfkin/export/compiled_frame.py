@@ -1,4 +1,10 @@
-"""One frame of one robot, compiled for it alone: the fastest form, single configurations and batches.
+"""The C of one function, made into machine code by the system's compiler and kept between runs, sealed.
+
+What is kept is named by the text, the compiler and the processor it was made for. It is loaded from memory,
+not from a file that somebody might change after it was looked at.
+
+
+One frame of one robot, compiled for it alone: the fastest form, single configurations and batches.
 
 The C that `export` writes goes through the system's compiler the first time that a quantity is asked for.
 What comes back is held against Pinocchio before it is used. Without a compiler Numba's walk computes.
@@ -7,35 +13,155 @@ What comes back is held against Pinocchio before it is used. Without a compiler 
 from __future__ import annotations
 
 import ctypes
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
+from itertools import count
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from urdfkin.compiled.batch import in_blocks
 from urdfkin.compiled.evaluate import is_staged
-from urdfkin.compiled.plan import Plan
+from urdfkin.compiled.kernel_args import KernelArgs, lines
+from urdfkin.compiled.memory import LANES
+from urdfkin.compiled.plan import CompiledTree
 from urdfkin.compiled.prepared import Fast
-from urdfkin.compiled.registers import LANES
-from urdfkin.compiled.task import Task, lines
 from urdfkin.errors import NotFiniteError, RangeError
-from urdfkin.export.code import bare
-from urdfkin.export.library import NoCompilerError, library
-from urdfkin.model.given import Given
+from urdfkin.export.c import Layout, advance, framed, spare, unit
+from urdfkin.export.code import Code, bare
+from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.forking import importing, lock_over_forks
+from urdfkin.system.cache import get, kept_folder, put
+from urdfkin.system.processes import importing, lock_over_forks
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.sampling import draw
 from urdfkin.verify.verifier import Verifier
 
+_FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
+#: GCC takes half a register on many processors whose whole ones are as fast.
+_WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
+_PATIENCE = 600.0
+_names = count()
+
+
+class NoCompilerError(Exception):
+    """There is none, or it does not take the code; the message is its own."""
+
+
+def library(code: Code) -> ctypes.CDLL:
+    """What computes the code's only function: `task`, which takes a row of `compiled.task` and says whether.
+
+    Raises:
+        NoCompilerError: no C compiler, or it fails.
+    """
+    if (compiler := shutil.which("cc")) is None:
+        raise NoCompilerError("cc is not installed")
+    text = unit(code) + _entrance(code)
+    flags = (*_FLAGS, *_WHOLE_REGISTERS.get(platform.machine(), ()))
+    folder = kept_folder("library", [], text, *flags, _version(compiler), _processor())
+    data = get(folder / "machine.code") if folder else None
+    if data is None:
+        data = _compiled(text, [compiler, *flags])
+        if folder:
+            put(folder / "machine.code", data)
+    return _loaded(data)
+
+
+def _entrance(code: Code) -> str:
+    (function,) = code.functions
+    widths, layout = code.widths(function), Layout(function)
+    spread = (
+        f"    for (int k = 0; k < LANES; ++k) in[{at} * LANES + k] = {x.op}[{x.of[0]}];"
+        for at, x in enumerate(layout.inputs)
+    )
+    lines = {
+        "inputs": "    const double *{x} = (const double *)(uintptr_t)places[{place}];",
+        "look": "        look({width}, {x}, bad);",
+        "look_left": "    for (size_t i = 0; i < n * {width}; ++i) bad[0][0] += 0.0 * {x}[i];",
+    }
+    parts = {
+        part: "\n".join(
+            line.format(x=x, width=width, place=int(KernelArgs[x.upper()])) for x, width in widths.items()
+        )
+        for part, line in lines.items()
+    }
+    return framed(
+        "library.c",
+        N=int(KernelArgs.N),
+        OUT=int(KernelArgs.OUT),
+        title=code.name,
+        name=function.name,
+        passed=", ".join(widths),
+        given=", ".join(f"const double *{x}" for x in widths),
+        room=layout.room,
+        spread="\n".join([*(f"    (void){x};" for x in widths), *spread]),
+        count=len(function.results),
+        STAGE=int(KernelArgs.STAGE),
+        spare=spare(code, function),
+        advance=advance(code, function),
+        **parts,
+    )
+
+
+def _compiled(text: str, command: list[str]) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        source, made = Path(folder, "robot.c"), Path(folder, "robot.so")
+        source.write_text(text, encoding="utf-8")
+        done = subprocess.run(
+            [*command, str(source), "-o", str(made), "-lm"],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_PATIENCE,
+            check=False,
+        )
+        if done.returncode != 0:
+            raise NoCompilerError(
+                next(iter(done.stderr.splitlines()), f"{command[0]} ended with {done.returncode}")
+            )
+        return made.read_bytes()
+
+
+def _loaded(data: bytes) -> ctypes.CDLL:
+    descriptor = os.memfd_create("urdfkin", os.MFD_CLOEXEC)
+    with os.fdopen(descriptor, "wb") as file:
+        file.write(data)
+        file.flush()
+        # The loader takes what has the same name for the same library: no two names are alike.
+        return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_names)}{descriptor}")
+
+
+@cache
+def _version(compiler: str) -> str:
+    done = subprocess.run(
+        [compiler, "--version"], capture_output=True, text=True, errors="replace", check=False
+    )
+    return done.stdout
+
+
+@cache
+def _processor() -> str:
+    """What it can do, which `-march=native` asks."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
+
+
 #: Configurations that Pinocchio is asked about, besides the neutral one and the ends of the limits.
 CHECKED = 100
 #: Of eight configurations they lie on the stack, half a megabyte at most.
 _MOST_RESULTS = 8192
-_PLACES = Task.Q, Task.V, Task.A
+_PLACES = KernelArgs.Q, KernelArgs.V, KernelArgs.A
 _compiling = lock_over_forks()
 
 
@@ -45,7 +171,7 @@ class _Robot(Protocol):
     verifier: Verifier
 
     @property
-    def plan(self) -> Callable[[Sequence[int]], Plan]: ...
+    def plan(self) -> Callable[[Sequence[int]], CompiledTree]: ...
     @property
     def compute(self) -> Callable[..., FloatArray]: ...
     @property
@@ -152,7 +278,7 @@ class CompiledFrame:
         if (core := self._machine_code(row)) is None:
             return None
         compute, task = called(core, len(row.inputs), row.own_shape(self._plan.nv), self._plan)
-        self._robot.verifier.ledger.account(name).counters.append((task, Task.COUNT))
+        self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         return compute(q, *others)
 
@@ -203,11 +329,11 @@ class CompiledFrame:
         found = np.empty((call.n, 1, *row.own_shape(self._tree.nv))) if out is None else out
 
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
-            task = np.zeros(len(Task), dtype=np.int64)
-            task[Task.N], task[Task.OUT] = len(part), part.ctypes.data
+            task = np.zeros(len(KernelArgs), dtype=np.int64)
+            task[KernelArgs.N], task[KernelArgs.OUT] = len(part), part.ctypes.data
             # Of rows that are shorter than a register, the last is written with what lies beyond its end.
             stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(found) else None
-            task[Task.STAGE] = 0 if stage is None else stage.ctypes.data
+            task[KernelArgs.STAGE] = 0 if stage is None else stage.ctypes.data
             for place, x in zip(_PLACES, parts, strict=False):
                 task[place] = x.ctypes.data
             return int(made(task.ctypes.data))

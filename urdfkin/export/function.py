@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.compiled.plan import Plan
-from urdfkin.export import walk
+from urdfkin.compiled.plan import CompiledTree
+from urdfkin.export import recursion
 from urdfkin.export.expression import Graph, Node, Number, needed
 from urdfkin.model.recursion import State
 from urdfkin.model.reference import Reference
@@ -42,7 +42,7 @@ class Function:
 
     quantity: Quantity
     reference: Reference
-    plan: Plan
+    plan: CompiledTree
     results: tuple[Number, ...]
 
     @property
@@ -137,7 +137,7 @@ def _bare(node: Node) -> Node:
     return node.of[0] if node.op == "neg" else node
 
 
-def function_of(plan: Plan, quantity: Quantity, reference: Reference) -> Function:
+def function_of(plan: CompiledTree, quantity: Quantity, reference: Reference) -> Function:
     """The function for the plan's only frame.
 
     Args:
@@ -150,14 +150,14 @@ def function_of(plan: Plan, quantity: Quantity, reference: Reference) -> Functio
     def entering(place: int) -> None:
         graph.place = place
 
-    kind = walk.Kind(graph.chapter, graph.sine_cosine, graph.root, entering, _name)
+    kind = recursion.Kind(graph.chapter, graph.sine_cosine, graph.root, entering, _name)
     inputs = [
         [graph.input(letter, i) for i in range(plan.nq if letter == "q" else plan.nv)]
         if letter in quantity.inputs
         else [0.0] * plan.nv
         for letter in _INPUTS
     ]
-    results = walk.QUANTITIES[quantity.name](plan, kind, inputs, reference)
+    results = recursion.QUANTITIES[quantity.name](plan, kind, inputs, reference)
     return Function(quantity, reference, plan, tuple(x if isinstance(x, Node) else x + 0.0 for x in results))
 
 

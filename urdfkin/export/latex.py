@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urdfkin.errors.printable import latex_text
+from urdfkin.errors.escape import latex_text
 from urdfkin.export.code import Code, Writer
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from urdfkin.dh.export.code import plain
+from urdfkin.dh.export.numeric_code import plain
 
 #: MATLAB takes names of 63 letters.
 _LONGEST = 40

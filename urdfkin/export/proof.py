@@ -16,18 +16,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urdfkin.compiled.plan import Plan
+from urdfkin.compiled.plan import CompiledTree
 from urdfkin.export.function import Function
 from urdfkin.export.naming import quiet
 from urdfkin.kinematics.roundings import SMALLEST
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.versions import own_version
+from urdfkin.system.lazy_import import own_version
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
-from urdfkin.verify.exact.decimals import read_exact
+from urdfkin.verify.exact.numbers import DIGITS, exact, mp, read_exact
 from urdfkin.verify.exact.recursion import move
-from urdfkin.verify.exact.vectors import DIGITS, exact, mp
 from urdfkin.verify.sampling import draw
 from urdfkin.verify.verifier import Verifier, bound_of
 
@@ -90,7 +89,7 @@ class Proof:
 
 def prove(
     verifier: Verifier,
-    plan_of: Callable[[Sequence[int]], Plan],
+    plan_of: Callable[[Sequence[int]], CompiledTree],
     frame: str,
     reference: Reference,
     functions: Sequence[Function],
@@ -119,7 +118,7 @@ def prove(
 
 def _vectors(
     verifier: Verifier,
-    plan_of: Callable[[Sequence[int]], Plan],
+    plan_of: Callable[[Sequence[int]], CompiledTree],
     frame: str,
     reference: Reference,
     functions: Sequence[Function],

@@ -2,8 +2,8 @@
 
 A vector is a triple of numbers (x, y, z), a rotation a triple of rows. Nothing is imported: whoever brings
 numbers brings their arithmetic, and a kind of number whose vectors are not triples brings its own functions
-in the place of those of the first part (`urdfkin.kinematics.arithmetic`). Batches in vector registers, NumPy
-arrays, 50 digits, intervals, lengths and words of LaTeX all go through the lines below.
+in the place of those of the first part (`urdfkin.kinematics.number_kinds`). Batches in vector registers,
+NumPy arrays, 50 digits, intervals, lengths and words of LaTeX all go through the lines below.
 
 All vectors of an equation are seen in the same axes, whichever these are: the world's, as in the text, or the
 link's own, where z is (0, 0, 1) and d a constant.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError
-from urdfkin.errors.demands import is_real, shown
+from urdfkin.errors.validators import is_real, safe_repr
 
 FloatArray = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def floats(value: ArrayLike, name: str) -> FloatArray:
             raise TypeError(array.dtype)
         return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} must be real numbers", found=shown(value)) from error
+        raise InputError(f"{name} must be real numbers", found=safe_repr(value)) from error
 
 
 def _is_masked(value: object) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from urdfkin.kinematics import equations
-from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.number_kinds import bound
 
 #: What the parameters of equations are called in the text.
 _SYMBOLS = {

@@ -102,8 +102,9 @@ for each rule up to the joint that moves, and one more, times the size of all th
 
 **Numbers near zero.** Products below the smallest normal number lose bits one by one. Such a product is off
 by 2^-1075, half the smallest subnormal number, which is (eps/2) times the smallest normal number: counting
-every size that is not zero as that large at least (`urdfkin.kinematics.lengths`) puts it among the roundings
-counted here, whatever it is multiplied with afterwards. The least unit is then eps times it, 2^-1074.
+every size that is not zero as that large at least (`urdfkin.kinematics.number_kinds`) puts it among the
+roundings counted here, whatever it is multiplied with afterwards. The least unit is then eps times it,
+2^-1074.
 
 **A row** of a Denavit-Hartenberg table rounds its pose by 8 at most:
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
-from urdfkin.errors.printable import printable
+from urdfkin.errors.escape import printable
 from urdfkin.lint.pages import page
 from urdfkin.lint.rule import Rule
 

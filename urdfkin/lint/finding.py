@@ -1,4 +1,13 @@
-"""One finding about a URDF: a stable code, where it is, what was found and what to do about it.
+"""Pieces of a file made safe to print: nothing in them may act on a terminal or pretend to be a message.
+
+The line of the file that a finding is about, with a caret below what is meant.
+
+Mechanical cures: which bytes of a file to put others in place of, and everything else left as it is.
+
+Places count in the bytes that follow a byte order mark, as the findings' lines and columns do.
+
+
+One finding about a URDF: a stable code, where it is, what was found and what to do about it.
 
 A finding is plain data, so that it can be printed, compared, turned into JSON or SARIF and sent to another
 process. The rules stand in `urdfkin.lint.rules`, with their pages beside them.
@@ -6,16 +15,122 @@ process. The rules stand in `urdfkin.lint.rules`, with their pages beside them.
 
 from __future__ import annotations
 
+import codecs
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from enum import Enum
 from typing import Any
 
 from urdfkin.errors import UrdfkinError
-from urdfkin.errors.printable import log_line, printable
-from urdfkin.errors.showing import Sheet, Shown, Table
-from urdfkin.lint.escape import shortened
-from urdfkin.lint.fixes import Fix
+from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.errors.escape import log_line, printable
+from urdfkin.system.files import Edit, edited
+
+#: Longest piece of a file that is quoted in a message.
+QUOTED = 60
+
+
+def shortened(text: str, limit: int = QUOTED) -> str:
+    """At most `limit` characters of a text, safe to print."""
+    return printable(text if len(text) <= limit else text[: limit - 3] + "...")
+
+
+def quoted(text: str, limit: int = QUOTED) -> str:
+    """A piece of the file in double quotes, safe to print, cut when it is long."""
+    return '"' + shortened(text, limit).replace('"', '\\"') + '"'
+
+
+#: Characters of a line that are shown, and how many of them before what is meant.
+SHOWN, BEFORE = 100, 60
+
+_TAB = "    "
+
+
+class Excerpts:
+    """Lines of one file.
+
+    Args:
+        data: Its bytes behind a byte order mark.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self.lines = data.splitlines()
+        self.number, self.text = 0, ""
+
+    def of(self, finding: Finding) -> str | None:
+        """Two lines: the file's, and the caret's; None for a finding about the file as a whole.
+
+        >>> from urdfkin.lint.finding import Severity
+        >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
+        >>> print(Excerpts(b'<axis xyz="0 0 2"/>').of(finding))
+          1 | <axis xyz="0 0 2"/>
+            |       ^^^^^^^^^^^
+        """
+        if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
+            return None
+        if self.number != finding.line:  # one file may be one line, of megabytes
+            self.number = finding.line
+            self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
+        start = finding.column - 1
+        first = max(start - BEFORE, 0) if len(self.text) > SHOWN else 0
+        last = first + SHOWN
+        end = min(start + finding.width, last)
+        before, meant, behind = map(
+            _shown, (self.text[first:start], self.text[start:end], self.text[end:last])
+        )
+        lead, tail = "..." if first else "", "..." if len(self.text) > last else ""
+        number = f"{finding.line:>3}"
+        caret = " " * (_cells(lead) + _cells(before)) + "^" * max(_cells(meant), 1)
+        return f"{number} | {lead}{before}{meant}{behind}{tail}\n{' ' * len(number)} | {caret}"
+
+
+def _shown(text: str) -> str:
+    return printable(text.replace("\t", _TAB))
+
+
+def _cells(text: str) -> int:
+    """How many columns of a terminal a text takes."""
+    return sum(
+        0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
+    )
+
+
+#: Radians: what rounding an angle of a turn to a double moves at most.
+ROUNDING = 2.0**-50
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """What cures a finding.
+
+    Attributes:
+        edits: What to put where, in the order of the file, none into another.
+        turns: By how much it may turn the joint's frame, rad; with 0 the robot stays as it is.
+    """
+
+    edits: tuple[Edit, ...]
+    turns: float = 0.0
+
+    @property
+    def is_safe(self) -> bool:
+        """Whether it turns no joint by more than the rounding of one number."""
+        return self.turns <= ROUNDING
+
+
+def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
+    """A file with as many fixes as go together, and which these are; one that overlaps another waits.
+
+    >>> apply(b'<axis xyz="0 0 2"/>', [Fix((Edit(11, 16, "0 0 1"),))])[0]
+    b'<axis xyz="0 0 1"/>'
+    """
+    mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
+    taken, end = list[Fix](), 0
+    for fix in sorted(fixes, key=lambda fix: fix.edits[0].start):
+        if fix.edits[0].start >= end:
+            taken.append(fix)
+            end = fix.edits[-1].end
+    return mark + edited(data.removeprefix(mark), [edit for fix in taken for edit in fix.edits]), taken
 
 
 class Severity(Enum):
@@ -125,15 +240,15 @@ class Finding:
         return data
 
 
-class Findings(list[Finding], Shown):
+class Findings(list[Finding], Displayable):
     """Findings about one file, by line: a list that shows itself."""
 
-    def _sheet(self) -> Sheet:
+    def _sheet(self) -> TextDocument:
         rows = [(f"{f.file}:{f.line}:{f.column}", f.code, f.severity.value, f.sentence) for f in self]
         counts = {s: sum(f.count for f in self if f.severity is s) for s in Severity}
         said = [f"{n} {s.value}{'s' if n > 1 else ''}" for s, n in counts.items() if n]
         table = [Table(("place", "code", "severity", "what"), rows, left=4)] if rows else []
-        return Sheet(", ".join(said) or "no findings", table)
+        return TextDocument(", ".join(said) or "no findings", table)
 
 
 def _lines(lines: tuple[int, ...], shown: int = 4) -> str:

@@ -13,8 +13,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from urdfkin.errors import UnknownNameError
-from urdfkin.errors.questions import Question
+from urdfkin.errors import Question, UnknownNameError
 from urdfkin.lint import rules
 from urdfkin.lint.rule import Rule
 from urdfkin.lint.rules import (

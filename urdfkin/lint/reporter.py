@@ -8,13 +8,12 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
-from urdfkin.errors.nearest import nearest
-from urdfkin.lint.finding import Finding, Severity
-from urdfkin.lint.fixes import Fix
+from urdfkin.errors import nearest
+from urdfkin.lint.finding import Finding, Fix, Severity
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
 from urdfkin.lint.rule import Rule
-from urdfkin.lint.silence import Comment, Silences
-from urdfkin.system.edits import Edit
+from urdfkin.lint.suppressions import Comment, Silences
+from urdfkin.system.files import Edit
 from urdfkin.urdf.element import ATTRIBUTE, START_TAG, Element
 
 #: How many misspelt names of a file get suggestions, from how many names and after how much comparing.

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from urdfkin.errors.demands import switch, word
+from urdfkin.errors.validators import as_bool, as_str
 from urdfkin.lint.finding import Finding, Findings
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
 from urdfkin.lint.pages import CODES
@@ -73,10 +73,10 @@ def check(
     <text>:1:42: URDF411 error: link 'stray': the link has no parent, and neither has "base"; ...
     """
     if mimic is not None:
-        switch(mimic, "mimic")
+        as_bool(mimic, "mimic")
     if root_joint is not None:
-        word(root_joint, "root_joint")
-    switch(fold, "fold")
+        as_str(root_joint, "root_joint")
+    as_bool(fold, "fold")
     text = read_source(source, limits.bytes, xacro_args)
     return Findings(examine(text, limits=limits, mimic=mimic, root_joint=root_joint, fold=fold).findings)
 

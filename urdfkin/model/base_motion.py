@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.errors import InputError
-from urdfkin.errors.questions import Question
-from urdfkin.kinematics.rotation.nearest import nearest_rotation
+from urdfkin.errors import InputError, Question
+from urdfkin.kinematics.rotation.matrix import nearest_rotation
 from urdfkin.model.tree import FloatArray, frozen
 
 

@@ -15,11 +15,11 @@ from functools import cached_property
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.errors.printable import log_line
-from urdfkin.errors.showing import Sheet, Shown, Table
+from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.rotation import axis_aligning
-from urdfkin.model.coupling import Coupling, coupling_of
-from urdfkin.model.given import Given
+from urdfkin.model.configuration_like import Given
+from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.pose import inverse, pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, frozen
 
@@ -50,7 +50,7 @@ class ChainJoint:
 
 
 @dataclass(frozen=True, repr=False)
-class FrameChain(Shown):
+class FrameChain(Displayable):
     """The joints between two frames, base to tip.
 
     Placement:  T_base_tip(q) = A_0 M_1(q_1) A_1 M_2(q_2) ... M_n(q_n) A_n, with the constants A_{i-1} =
@@ -78,7 +78,7 @@ class FrameChain(Shown):
     def __repr__(self) -> str:
         return log_line(f"<FrameChain {self.robot}: {self.base} to {self.tip}, {len(self.joints)} joints>")
 
-    def _sheet(self) -> Sheet:
+    def _sheet(self) -> TextDocument:
         heads = ("joint", "kind", "lower", "upper", "x", "y", "z", "axis x", "axis y", "axis z")
         stand = zip(self.joints, self.origins().tolist(), self.axes().tolist(), strict=False)
         rows = [
@@ -92,7 +92,7 @@ class FrameChain(Shown):
             for joint, origin, axis in stand
         ]
         x, y, z = (self.origins()[-1].round(12) + 0.0).tolist()
-        return Sheet(
+        return TextDocument(
             f"{self.robot}: {self.base} to {self.tip}, {len(self.joints)} joints",
             (
                 f"With every coordinate at 0, in {self.base} (m); the tip is at ({x:.6g}, {y:.6g}, {z:.6g}).",

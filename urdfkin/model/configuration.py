@@ -14,11 +14,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError, NotFiniteError
-from urdfkin.errors.questions import Question
+from urdfkin.errors import InputError, NotFiniteError, Question
 from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, unit_quaternions
-from urdfkin.model.given import Given, Instead, Places, by_name
+from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name
 from urdfkin.model.ranges import coordinate_ranges
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, frozen
 
@@ -72,7 +71,7 @@ def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
     return tuple(unit for _, unit in _named(tree, _OF_Q if what == "q" else _OF_RATES))
 
 
-def places(tree: KinematicTree, what: str) -> Places:
+def places(tree: KinematicTree, what: str) -> CoordinateLayout:
     """How the numbers of "q", "v" or "a" are called and measured, for those who give them by name."""
     is_q = what == "q"
     spans = {
@@ -80,7 +79,7 @@ def places(tree: KinematicTree, what: str) -> Places:
         for joint, at in zip(tree.joints, tree.q_index if is_q else tree.v_index, strict=True)
         if joint.nv > 1
     }
-    return Places(
+    return CoordinateLayout(
         what,
         _names(tree, what),
         units(tree, what),
@@ -91,34 +90,34 @@ def places(tree: KinematicTree, what: str) -> Places:
     )
 
 
-def _without_coordinate(tree: KinematicTree) -> dict[str, Instead]:
+def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
     """Joints that have no number of their own, and what to do instead of giving one."""
     return {
-        joint.name: Instead(
+        joint.name: Hint(
             f"it follows {joint.mimic.leader}: give that, or load with mimic=False (--no-mimic)",
             Question.MIMIC_JOINTS,
         )
         if joint.mimic
-        else Instead("it is fixed: leave it out", Question.FIXED_JOINTS)
+        else Hint("it is fixed: leave it out", Question.FIXED_JOINTS)
         for joint in tree.joints
         if not joint.nv
     }
 
 
-def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Instead]:
+def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
     """Pinocchio's lengths where they differ from ours, and what to do about them."""
     follow = any(joint.mimic for joint in tree.joints)
-    free = Instead(
+    free = Hint(
         "mimic joints follow their leaders: leave them out, or load with mimic=False (--no-mimic)",
         Question.MIMIC_JOINTS,
     )
     of_followers = sum(joint.kind.nv for joint in tree.joints if joint.mimic)
-    found: dict[int, Instead] = {}
+    found: dict[int, Hint] = {}
     if what == "q":
         for mimic in (False, True):
             length = _pinocchio_length(tree, mimic=mimic)
             asks = f", mimic={mimic}" if follow else ""
-            found[length] = Instead(
+            found[length] = Hint(
                 f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) gives urdfkin's",
                 Question.CONTINUOUS_JOINTS,
             )
@@ -195,7 +194,7 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
 
 
 def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
-    """q, v or a as float64 with the right last axis, as they are given (`urdfkin.model.given`)."""
+    """q, v or a as float64 with the right last axis (`urdfkin.model.configuration_like`)."""
     if (named := by_name(value, what)) is not None:
         return places(tree, what).read(named)
     array, width = floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv

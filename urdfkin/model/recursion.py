@@ -1,7 +1,7 @@
 """The recursion of section 7.7 and what is read off a frame, on any kind of number.
 
-`eq` are the chapter's equations, computing with that kind (`urdfkin.kinematics.arithmetic.bound`). The walk
-in compiled code is `urdfkin.compiled.walk`.
+`eq` are the chapter's equations, computing with that kind (`urdfkin.kinematics.number_kinds.bound`). The walk
+in compiled code is `urdfkin.compiled.recursion`.
 """
 
 from __future__ import annotations

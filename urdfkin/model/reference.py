@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from urdfkin.errors import UnknownNameError
-from urdfkin.errors.demands import shown
-from urdfkin.errors.questions import Question
+from urdfkin.errors import Question, UnknownNameError
+from urdfkin.errors.validators import safe_repr
 
 
 class Reference(IntEnum):
@@ -31,7 +30,7 @@ class Reference(IntEnum):
         """The member that a user means; raises UnknownNameError for another name."""
         if isinstance(value, Reference):
             return value
-        name = value if isinstance(value, str) else shown(value)
+        name = value if isinstance(value, str) else safe_repr(value)
         if name.upper() not in cls.__members__:
             known = [member.lower() for member in cls.__members__]
             raise UnknownNameError("reference", name, known, question=Question.REFERENCE_FRAMES)

@@ -16,9 +16,8 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.errors.demands import shown
-from urdfkin.errors.questions import Question
+from urdfkin.errors import InputError, Question, UnknownNameError
+from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, floats
 from urdfkin.model.frame_names import FrameName, JointFrame, LinkFrame
 
@@ -301,7 +300,7 @@ class KinematicTree:
             InputError: a link and a joint elsewhere share the name.
         """
         if not isinstance(name, str):
-            raise InputError("a frame is the name of a link or joint", where=self.name, found=shown(name))
+            raise InputError("a frame is the name of a link or joint", where=self.name, found=safe_repr(name))
         if isinstance(name, FrameName):
             return self._meant(name)
         link, joint = self._link_index.get(name), self._joint_index.get(name)

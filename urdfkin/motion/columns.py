@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.errors.numerals import decimal, remedy
+from urdfkin.errors.numbers import parse_float, remedy
 from urdfkin.kinematics.inputs import FloatArray
-from urdfkin.model.given import listed, wrong_count
+from urdfkin.model.configuration_like import listed, wrong_count
 
 
 def read_columns(
@@ -71,7 +71,7 @@ def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[floa
         raise wrong_count(names, len(cells), where)
     values = []
     for name, cell in zip(names, cells, strict=True):
-        if (value := decimal(cell)) is None:
+        if (value := parse_float(cell)) is None:
             raise InputError(
                 "not a finite number", where=f"{where}, {name}", found=repr(cell.strip()), remedy=remedy(cell)
             )
@@ -92,7 +92,7 @@ def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
 
 def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
     """Whether a line names columns: a joint may be called 1."""
-    return sorted(cells) == sorted(names) or all(decimal(cell) is None for cell in cells)
+    return sorted(cells) == sorted(names) or all(parse_float(cell) is None for cell in cells)
 
 
 def _check_names(

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.compiled.breakdown import AccelerationBreakdown, acceleration_breakdown
-from urdfkin.errors.demands import word
+from urdfkin.errors.validators import as_str
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.bounds import movable, result_k
 from urdfkin.verify.call import Call
+from urdfkin.verify.comparison import worst_of_each
 from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, PLACEMENT, VELOCITY, Quantity, validated
 from urdfkin.verify.verifier import held_against
-from urdfkin.verify.worst import worst_of_each
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ def frame_motion(
         InputError: wrong lengths, numbers that are not finite.
         UnknownNameError: no such frame.
     """
-    call = Call(robot.tree, robot.plan, word(frame, "frame"), reference, None, (q, v, a))
+    call = Call(robot.tree, robot.plan, as_str(frame, "frame"), reference, None, (q, v, a))
     inputs, reference = (call.q, *call.rates), call.reference
     ours = {row: call.compute(row.ours, call.plan, inputs, reference) for row in validated()}
     reason = robot.verifier.cannot()

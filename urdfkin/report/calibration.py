@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from urdfkin.calibration.calibrate import Calibration, doubts
+from urdfkin.calibration.fit import Fit
+from urdfkin.calibration.write_back import Rewritten
+from urdfkin.comparison.result import angle, length
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.listing import print_named
+from urdfkin.report.pages import print_named
 from urdfkin.report.words import counted
-from urdfkin.sameness.calibration.calibrate import Calibration, doubts
-from urdfkin.sameness.calibration.fit import Fit
-from urdfkin.sameness.calibration.rewritten import Rewritten
-from urdfkin.sameness.result import angle, length
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -1,4 +1,8 @@
-"""What changed between two reports: versions, robots, verdicts, figures; and which changes are regressions.
+"""What changed about a robot itself between two reports: joints, their axes, places, limits and leaders.
+
+A comparison of two reports, to read: on a terminal and as Markdown.
+
+What changed between two reports: versions, robots, verdicts, figures; and which changes are regressions.
 
 A change is a regression when something that held no longer does: the run passed and does not, a robot is gone
 or its verdict worse, more results lie outside their bound, a quantity, a table, samples or results are
@@ -9,15 +13,158 @@ a change, and so is another name of its file: it is known again by what its text
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from urdfkin.errors.printable import log_line
-from urdfkin.report.document import Check, Document, Robot, Units, outcome_of
-from urdfkin.report.model_changes import model_changes
+import numpy as np
+
+from urdfkin.comparison.result import angle, length
+from urdfkin.comparison.wording import pose_words
+from urdfkin.dh.snapping import rotation_angle
+from urdfkin.errors.escape import log_line
+from urdfkin.errors.escape import markdown_text as text
+from urdfkin.model.mechanisms.mechanism import Tolerance
+from urdfkin.model.summary import axis_words, rule_words
+from urdfkin.report.document import Check, Document, Joint, Model, Robot, Units, outcome_of
+from urdfkin.report.markdown import LIMIT, shortened
+from urdfkin.report.pages import print_named
 from urdfkin.report.tip_motion import tip_motion
-from urdfkin.report.words import VERDICTS, check_name, percent, units, worst
+from urdfkin.report.words import VERDICTS, check_name, counted, percent, quantity_name, summary, units, worst
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+#: Texts longer than this say no more.
+_LONGEST = 200
+#: Digits of a pose that are told; how far it is from the old one says the rest.
+_TOLD = Tolerance(1e-9, 1e-9)
+
+
+def model_changes(old: Model | None, new: Model | None) -> Iterator[tuple[str, str, str]]:
+    """What, before, after; empty words where it was not there."""
+    before, after = _joints(old), _joints(new)
+    for name in dict.fromkeys([*before, *after]):
+        was, now = before.get(name), after.get(name)
+        if was is None or now is None:
+            yield f"joint {name}", was["kind"] if was else "", now["kind"] if now else ""
+            continue
+        for aspect, first, second in _joint_changes(was, now):
+            yield f"joint {name}, {aspect}", _cut(first), _cut(second)
+    if old is not None and new is not None:
+        for entry, what in (("base", "base frame"), ("tip", "tip frame"), ("coordinates", "coordinates")):
+            frames = dict(old)[entry], dict(new)[entry]
+            if frames[0] != frames[1]:
+                yield what, _cut(_names(frames[0])), _cut(_names(frames[1]))
+
+
+def _joints(model: Model | None) -> dict[str, Joint]:
+    return {joint["name"]: joint for joint in model["joints"]} if model else {}
+
+
+def _joint_changes(was: Joint, now: Joint) -> Iterator[tuple[str, str, str]]:
+    """The same of one joint: lengths and angles as people say them."""
+    for entry, aspect in (("kind", "kind"), ("parent", "parent link"), ("child", "child link")):
+        if dict(was)[entry] != dict(now)[entry]:
+            yield aspect, str(dict(was)[entry]), str(dict(now)[entry])
+    if was["axis"] != now["axis"]:
+        first, second = (axis_words(axis) if axis else "none" for axis in (was["axis"], now["axis"]))
+        yield "axis", first, second + _turned(was["axis"], now["axis"])
+    if was["placement"] != now["placement"]:
+        Ts = [np.array(joint["placement"]) for joint in (was, now)]
+        away = length(float(np.linalg.norm(Ts[1][:3, 3] - Ts[0][:3, 3])))
+        turned = angle(float(rotation_angle(Ts[0][:3, :3], Ts[1][:3, :3])))
+        first, second = (pose_words(T, _TOLD) for T in Ts)
+        yield "origin", first, f"{second}: {away} away, turned by {turned}"
+    limits = [dict(joint["limit"] or {}) for joint in (was, now)]
+    for entry in ("lower", "upper", "velocity", "effort"):
+        bounds = [limit.get(entry) for limit in limits]
+        if bounds[0] != bounds[1]:
+            first, second = ("none" if bound is None else f"{bound:.12g}" for bound in bounds)
+            yield f"{entry} limit", first, second
+    if was["mimic"] != now["mimic"]:
+        yield "leader", _rule(was), _rule(now)
+
+
+def _turned(first: Sequence[float] | None, second: Sequence[float] | None) -> str:
+    if not first or not second:
+        return ""
+    a, b = np.array(first), np.array(second)
+    return f", turned by {angle(float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))}"
+
+
+def _rule(joint: Joint) -> str:
+    rule = joint["mimic"]
+    return rule_words(rule["leader"], rule["multiplier"], rule["offset"]) if rule else "none"
+
+
+def _names(value: Any) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 4] + " ..."
+
+
+def print_comparison(old: Document, new: Document, found: Comparison, out: Console) -> None:
+    """Print what changed; every line reads without colour."""
+    for title, document in (("old", old), ("new", new)):
+        out.print(f"{title}: {document['started']}, {summary(document)}")
+    heads = ["worst, eps*scale", "old", "new"]
+    rows = [[quantity_name(name), _cell(a), _cell(b)] for name, a, b in figures(old, new)]
+    print_named(out, heads, rows)
+    for change in sorted(found.changes, key=lambda change: not change.regression):
+        mark = "REGRESSION " if change.regression else ""
+        out.print(f"{mark}{change}", style="bold red" if change.regression else "")
+    out.print(f"{verdict(found)} ({_exit(found)})", style="bold red" if found.regressions else "bold green")
+
+
+def verdict(found: Comparison) -> str:
+    """The outcome in one line."""
+    if found.regressions:
+        return f"{counted(len(found.regressions), 'regression')}, {counted(len(found.changes), 'change')}"
+    return f"no regression, {counted(len(found.changes), 'change')}"
+
+
+def _exit(found: Comparison) -> str:
+    """What the command's exit code means."""
+    if found.regressions:
+        return "exit 1: a regression"
+    return "exit 0: changes alone do not fail, a regression would (1)" if found.changes else "exit 0"
+
+
+def markdown_of(old: Document, new: Document, found: Comparison, limit: int = LIMIT) -> str:
+    """What changed, for a pull request's comment."""
+    mark = "❌" if found.regressions else "✅"
+    lines = [f"## {mark} {verdict(found)[0].upper()}{verdict(found)[1:]}", ""]
+    lines += ["| worst, eps·scale | old | new |", "| --- | ---: | ---: |"]
+    lines += [
+        f"| {text(quantity_name(name))} | {_cell(a)} | {_cell(b)} |" for name, a, b in figures(old, new)
+    ]
+    lines += ["", *(["| | what | old | new |", "| --- | --- | --- | --- |"] if found.changes else [])]
+    left = limit - sum(len(line) + 1 for line in lines) - 100
+    ordered = sorted(found.changes, key=lambda change: not change.regression)
+    for shown, change in enumerate(ordered):
+        row = _row(change)
+        left -= len(row) + 1
+        if left < 0:
+            lines += ["", f"{counted(len(ordered) - shown, 'change')} more did not fit."]
+            break
+        lines.append(row)
+    return "\n".join([*lines, ""])
+
+
+def _row(change: Change) -> str:
+    where = f"{change.robot}: " if change.robot else ""
+    cells = [where + change.what, change.old, change.new]
+    mark = "❌ regression" if change.regression else ""
+    return f"| {mark} | {' | '.join(text(shortened(cell, 300)) for cell in cells)} |"
+
+
+def _cell(value: Units | str) -> str:
+    return value if isinstance(value, str) else units(value)
+
 
 #: A worst disagreement may grow by this factor before it counts: the largest of many samples is a lottery.
 FACTOR = 2.0

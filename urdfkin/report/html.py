@@ -14,9 +14,8 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.report import pages
-from urdfkin.report.distributions import distributions
 from urdfkin.report.document import Document, Robot, asset, outcome_of
-from urdfkin.report.scene import scene
+from urdfkin.report.figures import distributions, scene
 from urdfkin.report.words import (
     VERDICTS,
     check_name,
@@ -35,7 +34,7 @@ from urdfkin.report.words import (
     witness_title,
     worst,
 )
-from urdfkin.validation.portrait import chain_disagreement
+from urdfkin.validation.robot_summary import chain_disagreement
 from urdfkin.verify.quantities import compared, not_compared
 from urdfkin.view.figure import installed
 

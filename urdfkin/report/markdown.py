@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from urdfkin.errors.printable import markdown_code, printable
-from urdfkin.errors.printable import markdown_text as text
+from urdfkin.errors.escape import markdown_code, printable
+from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.document import Document, Robot, outcome_of
 from urdfkin.report.words import (
     VERDICTS,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from urdfkin.errors.printable import printable
+from urdfkin.errors.escape import printable
 from urdfkin.report.document import Check, Document, Judgement, Robot, outcome_of
-from urdfkin.report.listing import print_named
+from urdfkin.report.pages import print_named
 from urdfkin.report.words import (
     SIDES,
     check_name,

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from urdfkin.comparison.result import angle, length
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.errors import UrdfkinError
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic
 from urdfkin.report.document import Joint as JointData
 from urdfkin.report.document import Model
-from urdfkin.sameness.result import angle, length
 
 #: Configurations, the one at zero first.
 _SAMPLES = 200

@@ -8,8 +8,8 @@ from typing import Literal
 
 from urdfkin.report.document import Check, Document, Judged, Judgement, Robot, Units, Witness
 from urdfkin.validation.outcome import Verdict
+from urdfkin.verify.oracles import WITNESSES
 from urdfkin.verify.quantities import QUANTITIES
-from urdfkin.verify.witnesses import WITNESSES
 
 SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
 #: Worse verdicts first.

@@ -1,4 +1,6 @@
-"""The one reader of files: whole, up to a limit, regular files only, or refused in one clear line.
+"""Pieces of a text exchanged where they stand: every other byte stays as it is.
+
+The one reader of files: whole, up to a limit, regular files only, or refused in one clear line.
 
 A folder of a stranger may hold a link to a device that never ends, or a named pipe that nobody writes to.
 A path that the caller named may be a pipe, since `urdfkin check <(xacro arm.xacro)` names one; it is given up
@@ -14,9 +16,39 @@ import stat
 import sys
 import tempfile
 import time
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
-from urdfkin.errors import SourceError
+from urdfkin.errors import InputError, SourceError
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """The bytes from `start` up to `end` become `text`; nothing is replaced where the two are one."""
+
+    start: int
+    end: int
+    text: str = ""
+
+
+def edited(data: bytes, edits: Iterable[Edit]) -> bytes:
+    """The text with all edits made.
+
+    >>> edited(b"a=1 b=2", [Edit(6, 7, "3"), Edit(2, 3, "10")])
+    b'a=10 b=3'
+
+    Raises:
+        InputError: two of them overlap.
+    """
+    parts, cursor = list[bytes](), 0
+    for edit in sorted(edits, key=lambda one: (one.start, one.end)):
+        if edit.start < cursor:
+            raise InputError("two edits of one place", found=f"byte {edit.start}")
+        parts += [data[cursor : edit.start], edit.text.encode()]
+        cursor = edit.end
+    return b"".join([*parts, data[cursor:]])
+
 
 #: How long to wait for somebody to open the other end of a named pipe, seconds.
 PATIENCE = 10.0

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from urdfkin.errors import UnknownNameError
-from urdfkin.errors.demands import word
+from urdfkin.errors.validators import as_str
 from urdfkin.system.resources import example_robots_dir, robots_dir
 
 
@@ -72,7 +72,7 @@ def robots(family: str | None = None) -> tuple[str, ...]:
     """
     families = {entry.family for entry in catalogue().values()}
     if family is not None and family not in families:
-        raise UnknownNameError("family", word(family, "family"), families)
+        raise UnknownNameError("family", as_str(family, "family"), families)
     return tuple(name for name, entry in catalogue().items() if family in (None, entry.family))
 
 

@@ -17,7 +17,7 @@ from typing import Any
 from urdfkin.urdf.confinement import MEMORY, Ground, confine, limit
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.packages import find_package
-from urdfkin.urdf.xacro_arguments import arguments_of
+from urdfkin.urdf.xacro import arguments_of
 
 #: What xacro lets expressions call although it gives them more than values.
 _NEVER = ("type", "vars")

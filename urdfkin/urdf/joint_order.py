@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from urdfkin.errors.questions import Question
+from urdfkin.errors import Question
 from urdfkin.urdf.plain_xml import plain_xml
 
 

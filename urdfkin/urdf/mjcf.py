@@ -240,7 +240,7 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
 
 
 def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False) -> Mjcf:
-    """The robot of an MJCF file or text, read in this process: `urdfkin.verify.made_of_mjcf` confines it.
+    """The robot of an MJCF file or text, read in this process: `urdfkin.verify.mjcf_check` confines it.
 
     Args:
         source: A path, or text; files that the file includes are read.

@@ -6,7 +6,7 @@ import warnings
 from typing import Any
 
 from urdfkin.errors import InputError
-from urdfkin.system.versions import installed_version
+from urdfkin.system.lazy_import import installed_version
 
 
 def library() -> Any:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.errors.demands import shown
+from urdfkin.errors.validators import safe_repr
 
 
 class XmlElement(Protocol):
@@ -68,7 +68,7 @@ def without_rotation(source: Any) -> list[str]:
 def _text(root: Any) -> str:
     """Elements, attributes and text; comments, whose tag is no name, are left out."""
     if not isinstance(root.tag, str):
-        raise InputError("an ElementTree whose root is no element", found=shown(root.tag))
+        raise InputError("an ElementTree whose root is no element", found=safe_repr(root.tag))
     try:
         copy = ElementTree.Element(root.tag, dict(root.attrib))
         open_ = [(root, copy)]

@@ -15,24 +15,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.errors.demands import shown, switch, whole_number, word
+from urdfkin.errors.validators import as_bool, as_str, safe_repr, whole_number
 from urdfkin.validation import memory
 from urdfkin.validation.answer import Answer, Failure, failure, traced, unforeseen
 from urdfkin.validation.chunk import Cut
-from urdfkin.validation.engine import Engine, Here, OnExecutor, Task
-from urdfkin.validation.gathering import Gathering, Progress
+from urdfkin.validation.collector import Progress, ResultCollector
+from urdfkin.validation.engines import Engine, ExecutorEngine, SerialEngine, Task
 from urdfkin.validation.manifest import Manifest
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.results import RobotReport, ValidationReport
+from urdfkin.validation.robot_input import Given, RobotInput, subjects
 from urdfkin.validation.store import Store, opened
-from urdfkin.validation.subject import Given, Subject, subjects
-from urdfkin.validation.workers import Processes
+from urdfkin.validation.worker_processes import ProcessEngine
 from urdfkin.verify.ahead import load_kernels
+from urdfkin.verify.oracles import PINOCCHIO, WitnessName, witness_of
 from urdfkin.verify.pinocchio_module import pinocchio
-from urdfkin.verify.witnesses import PINOCCHIO, WitnessName, witness_of
 
 if TYPE_CHECKING:
-    from urdfkin.validation.judgement import Judgement
+    from urdfkin.validation.accuracy import Judgement
 
 
 class StoreWarning(UserWarning):
@@ -97,9 +97,9 @@ def validate(
     (True, 0)
     """
     samples, seed = whole_number(samples, "samples", 0), whole_number(seed, "seed", 0)
-    jobs, isolate = whole_number(jobs, "jobs", 1), switch(isolate, "isolate")
-    shard = None if shard is None else word(shard, "shard")
-    if retry is not None and word(retry, "retry") != "failed":
+    jobs, isolate = whole_number(jobs, "jobs", 1), as_bool(isolate, "isolate")
+    shard = None if shard is None else as_str(shard, "shard")
+    if retry is not None and as_str(retry, "retry") != "failed":
         raise InputError(
             "what failed can be computed again", found=f"retry={retry!r}", remedy='retry="failed"'
         )
@@ -113,7 +113,7 @@ def validate(
     if witness_of(oracle) is not PINOCCHIO:
         found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
     cut = Cut(samples)
-    gathering = Gathering(found, cut, shares(len(found), cut, shard), progress)
+    gathering = ResultCollector(found, cut, shares(len(found), cut, shard), progress)
     most = memory.share(jobs) if executor is None else None  # an executor's machines know their own
     campaign = _Campaign(found, cut, seed, most, gathering)
     interrupted, kept, begin = False, None, time.perf_counter()
@@ -159,11 +159,11 @@ def _folder(store: str | os.PathLike[str]) -> Path:
     except (TypeError, ValueError):
         name = b""
     if not name or b"\0" in name:
-        raise InputError("a store is a folder's path", found=shown(store))
+        raise InputError("a store is a folder's path", found=safe_repr(store))
     return Path(os.fsdecode(name))
 
 
-def _is_robot(subject: Subject) -> bool:
+def _is_robot(subject: RobotInput) -> bool:
     """Whether there is something to compute with; what is wrong with it, its chunk reports."""
     try:
         subject.load()
@@ -184,7 +184,7 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
     store = Store.reading(Path(folder), _warn)
     store.check_names()
     manifest, found = store.manifest, store.manifest.subjects()
-    gathering = Gathering(found, manifest.cut, shares(len(found), manifest.cut))
+    gathering = ResultCollector(found, manifest.cut, shares(len(found), manifest.cut))
     _Campaign(found, manifest.cut, manifest.seed, None, gathering).use(store)
     reports, standing = tuple(gathering.reports()), gathering.standing()
     judgements, all_judged = _judgements(store, reports)
@@ -205,9 +205,9 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
     """What the judge said of each robot that was compared, if it was asked; and whether it is through."""
     if not store.has_judge:
         return (), True
-    from urdfkin.validation.judging import Judged, NotJudged  # noqa: PLC0415  fifty digits take a library
+    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged  # noqa: PLC0415  fifty digits take a library
 
-    if (judged := Judged.of(store)) is None:
+    if (judged := AccuracyResult.of(store)) is None:
         return (), True
     found = [judged.found(i) for i, report in enumerate(reports) if report.tallies]
     return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
@@ -217,11 +217,11 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
 class _Campaign:
     """The chunks of some robots, what is known of them and what is still to be done."""
 
-    subjects: Sequence[Subject]
+    subjects: Sequence[RobotInput]
     cut: Cut
     seed: int
     memory: int | None
-    gathering: Gathering
+    gathering: ResultCollector
     store: Store | None = None
 
     def task(self, robot: int, index: int) -> Task:
@@ -283,5 +283,5 @@ def _warn(message: str) -> None:
 
 def _engine(jobs: int, isolate: bool, executor: Executor | Engine | None) -> Engine:
     if executor is not None:
-        return OnExecutor(executor) if isinstance(executor, Executor) else executor
-    return Processes(jobs, isolate=isolate) if isolate or jobs > 1 else Here()
+        return ExecutorEngine(executor) if isinstance(executor, Executor) else executor
+    return ProcessEngine(jobs, isolate=isolate) if isolate or jobs > 1 else SerialEngine()

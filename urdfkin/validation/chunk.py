@@ -18,14 +18,14 @@ import numpy as np
 from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.validation import memory
-from urdfkin.validation.clock import Clock, total
-from urdfkin.validation.comparing import SecondWitness, tallies
-from urdfkin.validation.portrait import Portrait
-from urdfkin.validation.subject import Subject
-from urdfkin.validation.tally import Key, Tally
+from urdfkin.validation.comparison import SecondWitness, tallies
+from urdfkin.validation.error_stats import Key, Tally
+from urdfkin.validation.robot_input import RobotInput
+from urdfkin.validation.robot_summary import RobotSummary
+from urdfkin.validation.timings import Clock, total
+from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.sampling import Samples, draw
-from urdfkin.verify.witnesses import PINOCCHIO
 
 #: Samples that are drawn together.
 DRAWN = 25
@@ -50,7 +50,7 @@ class Chunk:
         memory: Bytes that the robot may take where it is run; None: half of what is free there.
     """
 
-    subject: Subject
+    subject: RobotInput
     seed: int
     index: int
     first: int
@@ -92,7 +92,7 @@ class ChunkResult:
     samples: int
     seconds: float
     clock: Clock
-    portrait: Portrait | None
+    portrait: RobotSummary | None
 
     def __add__(self, other: ChunkResult) -> ChunkResult:
         return ChunkResult(
@@ -126,7 +126,7 @@ class Cut:
         """Chunks of a robot; at least one, for the special configurations."""
         return max(1, -(-self.samples // (self._draws * DRAWN)))
 
-    def chunk(self, subject: Subject, seed: int, index: int, most: int | None = None) -> Chunk:
+    def chunk(self, subject: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:
         """One of them, for a robot that may take so many bytes."""
         first = index * self._draws
         samples = min(self._draws * DRAWN, self.samples - first * DRAWN)
@@ -141,7 +141,7 @@ class Cut:
         return random + (SPECIAL if chunks.start == 0 else 0)
 
 
-def chunks(subject: Subject, samples: int, seed: int, most: int | None = None) -> Iterator[Chunk]:
+def chunks(subject: RobotInput, samples: int, seed: int, most: int | None = None) -> Iterator[Chunk]:
     """The chunks of one robot."""
     cut = Cut(samples)
     return (cut.chunk(subject, seed, index, most) for index in range(len(cut)))
@@ -149,7 +149,7 @@ def chunks(subject: Subject, samples: int, seed: int, most: int | None = None) -
 
 #: The robot that was checked last. The chunks of a robot come one after another; a worker need not read it
 #: again for each, and two large ones at a time would be too much.
-_kept: dict[Subject, tuple[Robot, Oracle, SecondWitness | None]] = {}
+_kept: dict[RobotInput, tuple[Robot, Oracle, SecondWitness | None]] = {}
 
 
 def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondWitness | None]:
@@ -171,7 +171,7 @@ def run_chunk(chunk: Chunk) -> ChunkResult:
     """Compute what is compared of every frame, in all references, and compare it."""
     begin, clock = time.perf_counter(), Clock()
     robot, oracle, second = _loaded(chunk)
-    portrait = Portrait.of(robot, oracle) if chunk.index == 0 else None
+    portrait = RobotSummary.of(robot, oracle) if chunk.index == 0 else None
     clock.read = time.perf_counter() - begin
     found = tallies(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, clock, second)
     seconds = time.perf_counter() - begin

@@ -19,12 +19,12 @@ import dask
 from distributed import Client, Future, KilledWorker, Scheduler, SpecCluster, Worker, as_completed
 
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.urdf.origin import Origin
+from urdfkin.urdf.sources import Origin
 from urdfkin.validation import remote
 from urdfkin.validation.answer import Answer, Failure, failure
-from urdfkin.validation.engine import DIED_TWICE, Enter, Task, Work, died, lost
-from urdfkin.validation.provenance import provenance, version
-from urdfkin.validation.subject import Subject
+from urdfkin.validation.engines import DIED_TWICE, Enter, Task, Work, died, lost
+from urdfkin.validation.results import provenance, version
+from urdfkin.validation.robot_input import RobotInput
 
 #: Chunks in flight: so many for each thread of the workers, that none waits for the next, and a few more.
 _FOR_EACH, _MORE = 2, 4
@@ -34,7 +34,7 @@ _TRIES = 20
 _COUNT = 1.0
 #: What the scheduler must have as we do, if it has it.
 _COMPARED = ("urdfkin", "pin")
-_NOBODY = Subject(b"", Origin(""))
+_NOBODY = RobotInput(b"", Origin(""))
 
 
 class ClusterError(UrdfkinError, RuntimeError):

@@ -14,11 +14,10 @@ from functools import cached_property
 from typing import Any
 
 from urdfkin.errors import InputError
-from urdfkin.urdf.origin import Origin
+from urdfkin.urdf.sources import Origin
 from urdfkin.validation.chunk import Cut
-from urdfkin.validation.provenance import provenance
-from urdfkin.validation.results import versions
-from urdfkin.validation.subject import Subject
+from urdfkin.validation.results import provenance, versions
+from urdfkin.validation.robot_input import RobotInput
 
 #: Name and version of the layout of a store.
 LAYOUT = "urdfkin-campaign/1"
@@ -34,7 +33,7 @@ class Manifest:
         robots: Where each comes from, and the sha256 of its text; empty where that could not be had.
         samples: Random configurations for each.
         seed: What they are drawn from.
-        provenance: What computes; `urdfkin.validation.provenance`.
+        provenance: What computes; `urdfkin.validation.results`.
         versions: What the report says of that.
         started: When, ISO 8601, UTC.
     """
@@ -47,7 +46,7 @@ class Manifest:
     started: str
 
     @classmethod
-    def of(cls, subjects: Sequence[Subject], samples: int, seed: int, started: str) -> Manifest:
+    def of(cls, subjects: Sequence[RobotInput], samples: int, seed: int, started: str) -> Manifest:
         """The manifest of a campaign that begins here."""
         robots = tuple((subject.origin, subject.stamp) for subject in subjects)
         return cls(robots, samples, seed, provenance(), _versions(subjects), started)
@@ -57,9 +56,9 @@ class Manifest:
         """The chunks of each robot."""
         return Cut(self.samples)
 
-    def subjects(self) -> list[Subject]:
+    def subjects(self) -> list[RobotInput]:
         """The robots, as far as a report needs them."""
-        return [Subject(origin.source, origin, stamp) for origin, stamp in self.robots]
+        return [RobotInput(origin.source, origin, stamp) for origin, stamp in self.robots]
 
     def key(self, robot: int, index: int) -> str:
         """The key of a chunk."""
@@ -133,7 +132,7 @@ class Manifest:
         return [*said[:_SHOWN], f"{len(said) - _SHOWN} more"] if len(said) > _SHOWN + 1 else said
 
 
-def _versions(subjects: Sequence[Subject]) -> dict[str, str]:
+def _versions(subjects: Sequence[RobotInput]) -> dict[str, str]:
     return versions(subject.origin.oracle for subject in subjects)
 
 

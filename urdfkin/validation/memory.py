@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from urdfkin.model.tree import KinematicTree
-from urdfkin.validation.comparing import BLOCK_BYTES, frame_bytes
+from urdfkin.validation.comparison import BLOCK_BYTES, frame_bytes
 from urdfkin.verify.pinocchio import OracleError
 
 #: How much of the free memory a validation keeps to.

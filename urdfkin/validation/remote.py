@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
-from urdfkin.validation.child import Child
-from urdfkin.validation.provenance import provenance
+from urdfkin.validation.results import provenance
+from urdfkin.validation.worker_processes import WorkerProcess
 
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
@@ -26,7 +26,7 @@ Found = (
     | tuple[Literal["other code"], dict[str, str]]
 )
 
-_idle: list[Child] = []
+_idle: list[WorkerProcess] = []
 _lock = threading.Lock()
 
 
@@ -51,7 +51,7 @@ def run(robot: bytes, chunk: bytes, by: dict[str, str]) -> Found:
     if by != computes():
         return "other code", computes()
     cause = ""
-    for child in (_any, Child):
+    for child in (_any, WorkerProcess):
         try:
             return "answer", _answer(child(), _Parcel(robot, chunk))
         except _DiedError as death:
@@ -85,7 +85,7 @@ def _unpacked(robot: bytes, chunk: bytes) -> Chunk:
     return made
 
 
-def _any() -> Child:
+def _any() -> WorkerProcess:
     """A process that is there already and knows a robot, or another."""
     with _lock:
         while _idle:
@@ -93,10 +93,10 @@ def _any() -> Child:
             if child.alive:
                 return child
             child.end()
-    return Child()
+    return WorkerProcess()
 
 
-def _answer(child: Child, parcel: _Parcel) -> bytes:
+def _answer(child: WorkerProcess, parcel: _Parcel) -> bytes:
     try:
         child.connection.send(parcel)
         found = child.connection.recv_bytes()

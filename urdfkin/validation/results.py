@@ -1,34 +1,67 @@
-"""What a validation found, as data: for a person to read, for a program to act on, to be merged and kept.
+"""The results of a validation as data: to show, to store and to merge; and what they depend on.
 
-`ValidationReport.as_dict` is the JSON document; its layout is `SCHEMA` and changes only with its number.
+`ValidationReport.as_dict` returns the JSON document; its layout is `SCHEMA` and changes only with its number.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 import platform
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urdfkin.errors.showing import Sheet, Shown, Table
-from urdfkin.system.asking import ask
+from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.system.files import read_bytes
+from urdfkin.system.lazy_import import hook, installed_version
 from urdfkin.urdf.catalogue import examples
-from urdfkin.urdf.origin import Origin
-from urdfkin.validation.clock import Clock
+from urdfkin.urdf.sources import Origin
+from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Key, Tally, WorstCase
 from urdfkin.validation.outcome import Outcome, Verdict, outcome
-from urdfkin.validation.portrait import NO_PORTRAIT, Portrait
-from urdfkin.validation.provenance import version
-from urdfkin.validation.tally import HISTOGRAM_EDGES, Key, Tally, WorstCase
+from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary
+from urdfkin.validation.timings import Clock
+from urdfkin.verify.certificate import replay_line
+from urdfkin.verify.oracles import WITNESSES
 from urdfkin.verify.pinocchio_module import version as pinocchio_version
 from urdfkin.verify.quantities import QUANTITIES
-from urdfkin.verify.replay import replay_line
-from urdfkin.verify.witnesses import WITNESSES
 
 if TYPE_CHECKING:
-    from urdfkin.validation.judgement import Judgement
+    from urdfkin.validation.accuracy import Judgement
+
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+#: What only shows results, and may change between two runs of a campaign.
+_SHOWING = ("cli", "motion", "report", "view")
+#: Libraries that compute or read.
+LIBRARIES = ("urdfkin", "pin", "numpy", "numba", "llvmlite", "yourdfpy", "mujoco")
+
+
+@cache
+def provenance() -> dict[str, str]:
+    """Versions, and digests of urdfkin's own files: of all that compute, and of the equations."""
+    equations = hashlib.sha256(read_bytes(_PACKAGE / "kinematics" / "equations.py")).hexdigest()
+    return {name: version(name) for name in LIBRARIES} | {"code": _code(), "equations": equations}
+
+
+def version(package: str) -> str:
+    """The version of an installed package; in words where there is none."""
+    return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
+
+
+def _code() -> str:
+    digest = hashlib.sha256()
+    for path in sorted(_PACKAGE.rglob("*")):
+        place = path.relative_to(_PACKAGE)
+        if path.suffix in (".py", ".toml", ".json") and place.parts[0] not in _SHOWING:
+            content = read_bytes(path)
+            digest.update(f"{place.as_posix()}\0{len(content)}\0".encode() + content)
+    return digest.hexdigest()
+
 
 #: Name and version of the JSON layout: urdfkin/report/assets/validation-1.schema.json, docs/reports.md.
 SCHEMA = "urdfkin-validation/1"
@@ -62,7 +95,7 @@ class RobotReport:
     tallies: dict[Key, Tally]
     samples: int
     seconds: float
-    portrait: Portrait = NO_PORTRAIT
+    portrait: RobotSummary = NO_PORTRAIT
     clock: Clock | None = None
     error: str | None = None
 
@@ -162,7 +195,7 @@ def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> st
 
 
 @dataclass(frozen=True, slots=True)
-class ValidationReport(Shown):
+class ValidationReport(Displayable):
     """A whole run.
 
     Attributes:
@@ -190,13 +223,13 @@ class ValidationReport(Shown):
 
     def to_html(self) -> str:
         """The whole report as one page that opens offline, as `urdfkin validate --html` writes it."""
-        return str(ask("a report as a page")(self.as_dict()))
+        return str(hook("a report as a page")(self.as_dict()))
 
     def to_markdown(self) -> str:
         """The report as a pull request's comment, as `urdfkin validate --markdown` writes it."""
-        return str(ask("a report as a comment")(self.as_dict()))
+        return str(hook("a report as a comment")(self.as_dict()))
 
-    def _sheet(self) -> Sheet:
+    def _sheet(self) -> TextDocument:
         heads = ("robot", "verdict", "results", "outside", "worst [eps*scale]", "of the bound")
         rows = []
         for robot in self.robots:
@@ -207,7 +240,9 @@ class ValidationReport(Shown):
         verified = sum(robot.verdict is Verdict.VERIFIED for robot in self.robots)
         samples = f"{self.samples} samples of each, seed {self.seed}, in {self.seconds:.1f} s."
         reasons = [f"{robot.source}: {robot.reason}" for robot in self.robots if robot.reason]
-        return Sheet(f"{verified} of {self.asked} robots verified", (Table(heads, rows), samples, *reasons))
+        return TextDocument(
+            f"{verified} of {self.asked} robots verified", (Table(heads, rows), samples, *reasons)
+        )
 
     @property
     def command(self) -> str:

@@ -27,13 +27,12 @@ from typing import IO, TypeVar
 
 from urdfkin.errors import InputError, SourceError
 from urdfkin.system.files import read_bytes, read_if_there
-from urdfkin.validation.answer import Answer, Failure
-from urdfkin.validation.answer_file import DamagedError, read, written
+from urdfkin.validation.answer import Answer, DamagedError, Failure, read, written
 from urdfkin.validation.manifest import Manifest
 
 _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
-#: What the judge was asked for; `urdfkin.validation.judging`.
+#: What the judge was asked for; `urdfkin.validation.accuracy_store`.
 JUDGE = "judge.json"
 #: How the name of a file ends that holds what the judge found; its key is the judge's.
 JUDGED = ".judged"

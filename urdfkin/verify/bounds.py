@@ -1,4 +1,14 @@
-"""How far two correct computations may differ: the roundings that they count, times the size of their terms.
+"""The recursion on lengths: how large the terms are that a frame's motion is summed from.
+
+The equations of 7.58 and 7.127 to 7.130 run on `urdfkin.kinematics.number_kinds`, so that no intermediate
+value can exceed what is found here.
+
+One term is Pinocchio's alone: where 7.129 has v_i w_{i-1} x z it has v_i w_i x z. The joint's own share of
+w_i is parallel to z and adds nothing but rounding, v_i^2 |z x z|, which fast joints about an axis askew do
+show: the scale of alpha counts it, by giving the equation the w of the link behind the joint.
+
+
+How far two correct computations may differ: the roundings that they count, times the size of their terms.
 
 A result is accepted when every number differs from Pinocchio's by at most
 
@@ -28,13 +38,130 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from urdfkin.compiled.plan import Column, Geometry, Motion, Plan, Step
-from urdfkin.kinematics.lengths import chapter as eq
-from urdfkin.kinematics.lengths import norm, product
+from urdfkin.compiled.plan import Column, CompiledTree, Geometry, Motion, Step
+from urdfkin.kinematics.number_kinds import counted, norm, product
+from urdfkin.kinematics.number_kinds import length_equations as eq
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, MUJOCO, ROUNDINGS, of_joints
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.magnitudes import Magnitudes
+
+_UNTURNED = np.eye(3).ravel()
+_Z = 1.0  #: A joint's axis is as long as this.
+
+
+@dataclass(frozen=True, slots=True)
+class Magnitudes:
+    """Upper bounds on the size of everything that enters a frame's motion.
+
+    Attributes:
+        p: (n, frames) m: the length of the path from the world's origin, slides included.
+        w: (n, frames) rad/s.
+        vel: (n, frames) m/s.
+        alpha: (n, frames) rad/s^2.
+        acc: (n, frames) m/s^2.
+        roundings: (n, frames) of a factor: of each URDF joint on the path, of a base that is turned, and of
+            one joint more.
+    """
+
+    p: FloatArray
+    w: FloatArray
+    vel: FloatArray
+    alpha: FloatArray
+    acc: FloatArray
+    roundings: FloatArray
+
+
+@np.errstate(over="ignore", under="ignore", invalid="ignore")
+def magnitudes(
+    plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: FloatArray
+) -> Magnitudes:
+    """For flat batches q (n, nq), v and a (n, nv) or None, and a base state (1 or n, 24).
+
+    Without v, only p and roundings are those of the frames: what depends on places alone needs no more.
+    """
+    if v is not None and a is None:
+        a = np.zeros((1, plan.nv))
+    states = [[norm(base[:, at : at + 3]) for at in (9, 12, 15, 18, 21)]]
+    lengths = counted(plan.lengths)
+    for i in range(len(plan.steps)):
+        state = states[plan.parents[i] + 1]
+        moved = (
+            _place(plan, i, state, lengths[i], q)
+            if v is None or a is None
+            else _step(plan, i, state, lengths[i], q, v, a)
+        )
+        states.append(moved)
+    carry = _carry if v is not None else _carry_place
+    out = np.empty((6, len(q), len(plan.frames)))
+    for f, (step, place) in enumerate(plan.frames):
+        carried = carry(states[step + 1], lengths[len(plan.steps) + f])
+        for row, values in zip(out, carried, strict=False):
+            row[:, place] = values  # what is the same for all configurations is one number
+    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # such a base rounds like a joint
+    out[5] = of_joints(plan.depth + 1 + turned[:, np.newaxis], plan.tilts)
+    return Magnitudes(*out)
+
+
+def _carry(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
+    p, w, vel, alpha, acc = state
+    return [
+        eq.point_position(p, None, d),
+        w,
+        eq.point_velocity(vel, w, d),
+        alpha,
+        eq.point_acceleration(acc, alpha, w, d),
+    ]
+
+
+def _carry_place(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
+    return [eq.point_position(state[0], None, d), *state[1:]]
+
+
+def _slid(plan: CompiledTree, i: int, q: FloatArray) -> FloatArray:
+    """How far a joint slides."""
+    kind, at = int(plan.steps[i, Step.KIND]), int(plan.steps[i, Step.Q])
+    if kind != Motion.SLIDE:
+        return norm(q[:, at : at + (2 if kind == Motion.PLANAR else 3)])
+    multiplier, constant = np.abs(plan.geometry[i, Geometry.MULTIPLIER :])
+    return product(multiplier, np.abs(q[:, at])) + counted(constant)
+
+
+def _place(
+    plan: CompiledTree, i: int, state: list[FloatArray], length: float, q: FloatArray
+) -> list[FloatArray]:
+    turns = plan.steps[i, Step.KIND] == Motion.TURN
+    return _carry_place(state, length if turns else length + _slid(plan, i, q))
+
+
+def _step(
+    plan: CompiledTree,
+    i: int,
+    state: list[FloatArray],
+    length: float,
+    q: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+) -> list[FloatArray]:
+    kind, rate_at = int(plan.steps[i, Step.KIND]), int(plan.steps[i, Step.V])
+    d = length if kind == Motion.TURN else length + _slid(plan, i, q)
+    p, w, vel, alpha, acc = _carry(state, d)
+    if kind in (Motion.TURN, Motion.SLIDE):
+        multiplier = abs(plan.geometry[i, Geometry.MULTIPLIER])
+        rate, rate_2 = (product(multiplier, np.abs(x[:, rate_at])) for x in (v, a))
+        if kind == Motion.SLIDE:
+            acc = eq.sliding_acceleration(acc, w, _Z, rate, rate_2)
+            return [p, w, eq.sliding_velocity(vel, _Z, rate), alpha, acc]
+        w = eq.angular_velocity(w, _Z, rate)
+        return [p, w, vel, eq.angular_acceleration(alpha, w, _Z, rate, rate_2), acc]
+    slides, turns = (2, 1) if kind == Motion.PLANAR else (3, 3)
+    (u, o), (u_rate, o_rate) = (
+        (norm(x[:, rate_at : rate_at + slides]), norm(x[:, rate_at + slides : rate_at + slides + turns]))
+        for x in (v, a)
+    )
+    alpha = eq.free_angular_acceleration(alpha, eq.plus(w, o), o, o_rate)
+    acc = eq.free_acceleration(acc, w, o, u, u_rate)
+    return [p, eq.plus(w, o), eq.plus(vel, u), alpha, acc]
+
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
@@ -93,7 +220,7 @@ def about_the_root(size: Magnitudes) -> Magnitudes:
     )
 
 
-def placement_scale(plan: Plan, size: Magnitudes) -> FloatArray:
+def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
     """For (n, frames, 4, 4): the path's length for positions, 1 for rotations, 0 for the last row."""
     scale = np.zeros((*size.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
@@ -125,7 +252,7 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
 
 
 @_BEYOND
-def velocity_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
+def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """For (n, frames, 6)."""
     linear = size.vel
     if reference is Reference.WORLD:
@@ -134,7 +261,7 @@ def velocity_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatA
 
 
 @_BEYOND
-def acceleration_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
+def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """For (n, frames, 6). Pinocchio goes through spatial accelerations, which differ by w x vel.
 
     It is that of a breakdown's sum too. There the terms are gathered by joints: v_k z x (v_k z x d_k) and
@@ -173,7 +300,7 @@ def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 
 
 @_BEYOND
-def jacobian_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
+def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """For (n, frames, 6, nv): the path's length for turning columns, 1 for sliding ones, 0 for idle ones."""
     turning, sliding = column_weights(plan)
     linear, angular = eq.turning_column(turning, size.p[..., None])
@@ -181,7 +308,7 @@ def jacobian_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatA
 
 
 @_BEYOND
-def jacobian_rate_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
+def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """For (n, frames, 6, nv).
 
     A frame's turning columns are no longer than its path, and their arms change no faster than its origin
@@ -208,7 +335,7 @@ _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = 
 
 
 @_BEYOND
-def hessian_scale(plan: Plan, size: Magnitudes, reference: Reference) -> FloatArray:
+def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """For (n, frames, 6, nv, nv): of pairs of columns, a follower's with its leader's.
 
     No d is longer than the path. Pinocchio takes all from two columns c = [z x d; z] for the world's origin,
@@ -282,12 +409,12 @@ def hidden_scalar(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     return 1.5 * EPS * result_k(bound, leading)
 
 
-def nearest_singularity(plan: Plan) -> float:
+def nearest_singularity(plan: CompiledTree) -> float:
     """From where on (rad) rounding leaves Euler rates a digit: four times what R may be off by."""
     return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
 
 
-def column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
+def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     """(frames, nv) each: the sum of the mimic multipliers that turn, or slide, along each column."""
     made: tuple[FloatArray, FloatArray] | None = plan.made.get("column weights")
     if made is None:
@@ -295,7 +422,7 @@ def column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
     return made
 
 
-def _column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
+def _column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     weights = np.zeros((2, len(plan.frames), plan.nv))
     for f, (_, place) in enumerate(plan.frames):
         for c in np.flatnonzero(plan.leaders[f] >= 0):
@@ -305,7 +432,7 @@ def _column_weights(plan: Plan) -> tuple[FloatArray, FloatArray]:
     return weights[0], weights[1]
 
 
-def movable(plan: Plan, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
+def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
     """(frames, 6, nv) which numbers of a Jacobian are not 0 for every q, the base being where it may.
 
     The linear rows of a turning column are z x d. There d is 0 for every q where the path has no length and

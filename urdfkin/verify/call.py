@@ -10,15 +10,15 @@ from typing import Any, NamedTuple, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.compiled.plan import IntArray, Plan
+from urdfkin.compiled.plan import CompiledTree, IntArray
 from urdfkin.errors import InputError, NotFiniteError
-from urdfkin.errors.demands import shown
+from urdfkin.errors.validators import safe_repr
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.configuration import checked, numbers, shaped
-from urdfkin.model.given import Given, by_name
+from urdfkin.model.configuration_like import Given, by_name
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.verify.asked import Question, Rows
+from urdfkin.verify.oracle_query import OracleQuery, QueryBatch
 
 T = TypeVar("T")
 
@@ -39,12 +39,12 @@ class Part(NamedTuple):
         options: What else the call was given, by the method's names for it.
     """
 
-    plan: Plan
+    plan: CompiledTree
     reference: Reference
     q: FloatArray
     rates: tuple[FloatArray, ...]
     state: FloatArray
-    asked: Rows
+    asked: QueryBatch
     options: Mapping[str, object] = MappingProxyType({})
 
 
@@ -69,7 +69,7 @@ class Call:
     def __init__(
         self,
         tree: KinematicTree,
-        plan: Callable[[Sequence[int]], Plan],
+        plan: Callable[[Sequence[int]], CompiledTree],
         frame: str | Sequence[str],
         reference: Reference | str,
         base: BaseMotion | None,
@@ -87,7 +87,7 @@ class Call:
         self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
         self.several, self.frames = _frames(frame)
         joints = [(joint.name, joint.nv) for joint in tree.joints if joint.nv] if any(named) else ()
-        self.question = Question(frame, reference, base, inputs, named, joints)
+        self.question = OracleQuery(frame, reference, base, inputs, named, joints)
         self.reference = Reference.of(reference)
         self.links = tuple(tree.frame_link(name) for name in self.frames)
         self.plan = plan((*self.links, *(tree.frame_link(name) for name in also)))
@@ -194,6 +194,6 @@ def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
     except TypeError:
         raise InputError(
             "a frame is the name of a link or joint, or a list of names",
-            found=shown(frame),
+            found=safe_repr(frame),
             remedy="robot.link_frames are all links",
         ) from None

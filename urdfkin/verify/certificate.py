@@ -1,9 +1,14 @@
-"""What was checked, how closely it agreed, and what was not checked."""
+"""A command that computes one case again.
+
+What was checked, how closely it agreed, and what was not checked.
+"""
 
 from __future__ import annotations
 
 import math
 import os
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -11,14 +16,39 @@ import numpy as np
 
 from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import UrdfkinError
-from urdfkin.errors.printable import json_text, log_line
-from urdfkin.errors.showing import Sheet, Shown, Table
+from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.errors.escape import json_text, log_line
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.files import at_home, write_file
-from urdfkin.system.forking import lock_over_forks
+from urdfkin.system.processes import lock_over_forks
+from urdfkin.urdf.sources import Origin
 from urdfkin.verify.bounds import Bound, result_k
+from urdfkin.verify.comparison import worst_of_each
 from urdfkin.verify.quantities import QUANTITIES
-from urdfkin.verify.worst import worst_of_each
+
+
+def replay_line(
+    origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
+) -> str:
+    """The command; numbers are written so that they read back exactly.
+
+    Args:
+        origin: The robot; a text has to be given to the command on standard input.
+        command: The quantity's command.
+        frame: A link or joint.
+        reference: None for a placement, which has none.
+        values: Numbers of q, v and a, as many of the three as the command takes.
+
+    >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})
+    "urdfkin velocity ur5 --frame 'tool 0' --reference local --q 0.5,0.1 --v neutral"
+    """
+    words = ["urdfkin", command, origin.words, "--frame", shlex.quote(frame)]
+    if reference:
+        words += ["--reference", reference]
+    for letter, numbers in values.items():
+        words += [f"--{letter}", ",".join(repr(float(x)) for x in numbers) or "neutral"]
+    return " ".join(words)
+
 
 #: The reason that certificates give for what nobody wanted checked.
 NOT_ASKED_FOR = "verify=False was asked for"
@@ -147,7 +177,7 @@ _HEAD = ("robot", "source", "reading", "sha256", "urdfkin", "oracle")
 
 
 @dataclass(frozen=True, slots=True)
-class Certificate(Shown):
+class Certificate(Displayable):
     """What a robot's results so far are worth.
 
     Attributes:
@@ -198,7 +228,7 @@ class Certificate(Shown):
         """
         write_file(at_home(path), (json_text(self.as_dict()) + "\n").encode())
 
-    def _sheet(self) -> Sheet:
+    def _sheet(self) -> TextDocument:
         heads = ("quantity", "checked", "not checked", "worst [eps*scale]", "of the bound")
         rows = [
             (x.quantity, str(x.checked), str(x.unchecked), f"{x.worst:.2g}", f"{x.share:.1%}")
@@ -208,7 +238,7 @@ class Certificate(Shown):
         made = f"Computed by urdfkin {self.urdfkin} from {self.source} (sha256 {self.sha256})."
         reasons = [f"Not verified: {reason}." for reason in self.not_verified]
         read = [f"Read: {self.reading}."] if self.reading else []
-        return Sheet(
+        return TextDocument(
             f"{self.robot}: {word} by {self.oracle}",
             (Table(heads, rows), *reasons, *read, *([made] if self.sha256 else [])),
         )

@@ -31,9 +31,8 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
 from urdfkin.urdf.mujoco import compiled, library
 from urdfkin.urdf.plain_xml import plain_xml
-from urdfkin.verify.followers import rules_of_text
 from urdfkin.verify.pinocchio import demand_the_same, depth_of
-from urdfkin.verify.pinocchio_base import BaseNumbers, nearest_quaternion
+from urdfkin.verify.pinocchio_inputs import BaseNumbers, nearest_quaternion, rules_of_text
 
 #: What a root joint, or a base that moves, hangs from.
 WORLD = "universe"

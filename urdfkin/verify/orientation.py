@@ -20,9 +20,7 @@ from urdfkin.verify.pinocchio_module import pinocchio
 _ROUNDINGS = 16.0
 
 
-def demand_the_orientations(
-    numbers: FloatArray, R: FloatArray, frame: str, again: Callable[[int], str]
-) -> None:
+def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Callable[[int], str]) -> None:
     """Hold Pinocchio's rotations of the numbers against those that they are of.
 
     A matrix that is rotated by d from the nearest rotation has no numbers that mean it to less than d.

@@ -2,12 +2,12 @@
 
 The oracle reads the URDF text itself, with its own parser, so that nothing of urdfkin's reading is shared.
 Nor is anything between a user's arguments and the result: which frame a name means
-(`urdfkin.verify.pinocchio_frames`), which number of q is whose (`urdfkin.verify.pinocchio_layout`), how the
-base moves (`urdfkin.verify.pinocchio_base`) are all found here anew, from Pinocchio's model and the numbers
+(`urdfkin.verify.pinocchio_inputs`), which number of q is whose (`urdfkin.verify.pinocchio_inputs`), how the
+base moves (`urdfkin.verify.pinocchio_inputs`) are all found here anew, from Pinocchio's model and the numbers
 as they were given.
 
 Its model is built without mimic joints (with them, Pinocchio 4.1 refuses four of the robots it ships with);
-followers are coupled by the rules as `urdfkin.verify.followers` reads them from the text once more:
+followers are coupled by the rules as `urdfkin.verify.pinocchio_inputs` reads them from the text once more:
 q_full = G q + g_0, v_full = G v, J = J_full G.
 """
 
@@ -23,11 +23,16 @@ import numpy as np
 from urdfkin.errors import OracleError
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
-from urdfkin.system.deep_stack import with_stack
-from urdfkin.verify.followers import rules_of_text
-from urdfkin.verify.pinocchio_base import BaseNumbers, free_flyer, free_flyer_rates, free_flyer_second_rates
-from urdfkin.verify.pinocchio_frames import Frames
-from urdfkin.verify.pinocchio_layout import Layout
+from urdfkin.system.processes import with_stack
+from urdfkin.verify.pinocchio_inputs import (
+    BaseNumbers,
+    Frames,
+    Layout,
+    free_flyer,
+    free_flyer_rates,
+    free_flyer_second_rates,
+    rules_of_text,
+)
 from urdfkin.verify.pinocchio_module import pinocchio, version
 
 __all__ = ["MOST_RATES", "Oracle", "OracleError", "depth_of", "version"]

@@ -11,8 +11,7 @@ import importlib.metadata
 from pathlib import Path
 from typing import Any
 
-from urdfkin.errors import InstallationError
-from urdfkin.errors.questions import Question
+from urdfkin.errors import InstallationError, Question
 
 #: The versions that check: what accelerations and J-dot mean in them was measured.
 _MAJOR = "4"

@@ -22,20 +22,18 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from urdfkin.errors import UnknownNameError
-from urdfkin.errors.questions import Question
-from urdfkin.system.later import later
+from urdfkin.errors import Question, UnknownNameError
+from urdfkin.system.lazy_import import lazy_import
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from urdfkin.compiled.plan import Plan
+    from urdfkin.compiled.plan import CompiledTree
     from urdfkin.model.reference import Reference
     from urdfkin.model.tree import FloatArray
-    from urdfkin.verify.bounds import Bound
-    from urdfkin.verify.magnitudes import Magnitudes
+    from urdfkin.verify.bounds import Bound, Magnitudes
     from urdfkin.verify.pinocchio import Oracle
-    from urdfkin.verify.pinocchio_base import BaseNumbers
+    from urdfkin.verify.pinocchio_inputs import BaseNumbers
 
 #: The rows of a velocity, an acceleration or a Jacobian.
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
@@ -52,7 +50,7 @@ def asked(name: str) -> Callable[..., Any]:
     return ask
 
 
-_bound = later("urdfkin.verify.bounds:bound_of")
+_bound = lazy_import("urdfkin.verify.bounds:bound_of")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -138,7 +136,7 @@ class Quantity:
         return tuple(rates if size == "nv" else size for size in self.shape)
 
     def ours(
-        self, plan: Plan, inputs: Sequence[FloatArray], reference: Reference | None, **how: Any
+        self, plan: CompiledTree, inputs: Sequence[FloatArray], reference: Reference | None, **how: Any
     ) -> FloatArray:
         """(n, frames, ...) by the text's recursion; of q, v and a it takes what it needs."""
         found: FloatArray = self.compute(plan, *inputs[: len(self.inputs)], *self._in(reference), **how)
@@ -158,7 +156,7 @@ class Quantity:
         found: FloatArray = self.ask(oracle, *given, of, *self._in(reference), *moving)
         return found
 
-    def bound(self, plan: Plan, size: Magnitudes, reference: Reference | None) -> Bound:
+    def bound(self, plan: CompiledTree, size: Magnitudes, reference: Reference | None) -> Bound:
         """What the two are measured against."""
         scale = self.scale(plan, size, *self._in(reference))
         bound: Bound = _bound(scale, self.factors, size, *self._in(reference))
@@ -180,10 +178,10 @@ PLACEMENT = Quantity(
     inputs="q",
     shape=(4, 4),
     equations=("7.77",),
-    compute=later("urdfkin.compiled.evaluate:placements"),
+    compute=lazy_import("urdfkin.compiled.evaluate:placements"),
     ask=asked("placements"),
-    scale=later("urdfkin.verify.bounds:placement_scale"),
-    exact=later("urdfkin.verify.exact.recursion:placement_values"),
+    scale=lazy_import("urdfkin.verify.bounds:placement_scale"),
+    exact=lazy_import("urdfkin.verify.exact.recursion:placement_values"),
     factors=1,
     referred=False,
     head="place",
@@ -196,7 +194,7 @@ RELATIVE_PLACEMENT = replace(
     PLACEMENT,
     name="relative placement",
     title="placement in another frame",
-    against=partial(later("urdfkin.verify.relative:held_against"), PLACEMENT.bound),
+    against=partial(lazy_import("urdfkin.verify.derived:check_relative_placement"), PLACEMENT.bound),
     walked=False,
     command="",
 )
@@ -206,10 +204,10 @@ VELOCITY = Quantity(
     inputs="qv",
     shape=(6,),
     equations=("7.127", "7.128"),
-    compute=later("urdfkin.compiled.evaluate:velocities"),
+    compute=lazy_import("urdfkin.compiled.evaluate:velocities"),
     ask=asked("velocities"),
-    scale=later("urdfkin.verify.bounds:velocity_scale"),
-    exact=later("urdfkin.verify.exact.recursion:velocity_values"),
+    scale=lazy_import("urdfkin.verify.bounds:velocity_scale"),
+    exact=lazy_import("urdfkin.verify.exact.recursion:velocity_values"),
     factors=2,
     head="vel",
     units={"linear": "m/s", "angular": "rad/s"},
@@ -224,10 +222,10 @@ JACOBIAN = Quantity(
     inputs="q",
     shape=(6, "nv"),
     equations=("7.85",),
-    compute=later("urdfkin.compiled.evaluate:jacobians"),
+    compute=lazy_import("urdfkin.compiled.evaluate:jacobians"),
     ask=asked("jacobians"),
-    scale=later("urdfkin.verify.bounds:jacobian_scale"),
-    exact=later("urdfkin.verify.exact.recursion:jacobian_values"),
+    scale=lazy_import("urdfkin.verify.bounds:jacobian_scale"),
+    exact=lazy_import("urdfkin.verify.exact.recursion:jacobian_values"),
     factors=2,
     head="J",
     command="jacobian",
@@ -241,10 +239,10 @@ JACOBIAN_RATE = Quantity(
     inputs="qv",
     shape=(6, "nv"),
     equations=("7.126",),
-    compute=later("urdfkin.compiled.evaluate:jacobian_rates"),
+    compute=lazy_import("urdfkin.compiled.evaluate:jacobian_rates"),
     ask=asked("jacobian_rates"),
-    scale=later("urdfkin.verify.bounds:jacobian_rate_scale"),
-    exact=later("urdfkin.verify.exact.recursion:jacobian_rate_values"),
+    scale=lazy_import("urdfkin.verify.bounds:jacobian_rate_scale"),
+    exact=lazy_import("urdfkin.verify.exact.recursion:jacobian_rate_values"),
     factors=3,
     head="J-dot",
     command="jacobian-rate",
@@ -260,10 +258,10 @@ HESSIAN = Quantity(
     inputs="q",
     shape=(6, "nv", "nv"),
     equations=("7.85", "7.126"),
-    compute=later("urdfkin.compiled.evaluate:hessians"),
+    compute=lazy_import("urdfkin.compiled.evaluate:hessians"),
     ask=asked("hessians"),
-    scale=later("urdfkin.verify.bounds:hessian_scale"),
-    exact=later("urdfkin.verify.exact.recursion:hessian_values"),
+    scale=lazy_import("urdfkin.verify.bounds:hessian_scale"),
+    exact=lazy_import("urdfkin.verify.exact.recursion:hessian_values"),
     factors=3,
     validated=False,
     head="H",
@@ -279,10 +277,10 @@ ACCELERATION = Quantity(
     inputs="qva",
     shape=(6,),
     equations=("7.129", "7.130"),
-    compute=later("urdfkin.compiled.evaluate:accelerations"),
+    compute=lazy_import("urdfkin.compiled.evaluate:accelerations"),
     ask=asked("accelerations"),
-    scale=later("urdfkin.verify.bounds:acceleration_scale"),
-    exact=later("urdfkin.verify.exact.recursion:acceleration_values"),
+    scale=lazy_import("urdfkin.verify.bounds:acceleration_scale"),
+    exact=lazy_import("urdfkin.verify.exact.recursion:acceleration_values"),
     factors=3,
     head="acc",
     units={"linear": "m/s^2", "angular": "rad/s^2"},
@@ -299,8 +297,8 @@ ANALYTICAL_JACOBIAN = replace(
     name="analytical jacobian",
     title="analytical Jacobian",
     equations=("7.118", "7.122"),
-    compute=later("urdfkin.kinematics.bodies.representation:analytical_jacobian"),
-    against=partial(later("urdfkin.verify.analytical:held_against"), JACOBIAN.bound),
+    compute=lazy_import("urdfkin.kinematics.bodies:analytical_jacobian"),
+    against=partial(lazy_import("urdfkin.verify.derived:check_analytical_jacobian"), JACOBIAN.bound),
     walked=False,
     referred=False,
     command="",
@@ -310,7 +308,7 @@ ACCELERATION_BREAKDOWN = replace(
     name="acceleration breakdown",
     title="acceleration by its parts",
     equations=("7.125", "7.130"),
-    compute=later("urdfkin.compiled.breakdown:acceleration_breakdown"),
+    compute=lazy_import("urdfkin.compiled.breakdown:acceleration_breakdown"),
     walked=False,
     command="acceleration --explain",
 )
@@ -319,8 +317,8 @@ IMU = replace(
     name="imu",
     title="IMU reading",
     equations=("7.127", "7.129", "7.130"),
-    compute=later("urdfkin.compiled.evaluate:imus"),
-    against=later("urdfkin.verify.imu:held_against"),
+    compute=lazy_import("urdfkin.compiled.evaluate:imus"),
+    against=lazy_import("urdfkin.verify.derived:check_imu"),
     walked=False,
     referred=False,
     labels=("ax", "ay", "az", "wx", "wy", "wz"),

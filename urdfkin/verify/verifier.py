@@ -20,22 +20,26 @@ from urdfkin.errors import RangeError
 from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.system.versions import own_version
-from urdfkin.urdf.origin import Origin
+from urdfkin.system.lazy_import import own_version
+from urdfkin.urdf.sources import Origin
 from urdfkin.verify import bounds
-from urdfkin.verify.asked import Rows
-from urdfkin.verify.bounds import Bound
+from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.call import Call, Part
-from urdfkin.verify.certificate import Certificate, Comparison, Ledger, VerificationError, compare
-from urdfkin.verify.choosing import SAMPLE, Verify, checked_choice, parts
-from urdfkin.verify.magnitudes import magnitudes
+from urdfkin.verify.certificate import (
+    Certificate,
+    Comparison,
+    Ledger,
+    VerificationError,
+    compare,
+    replay_line,
+)
+from urdfkin.verify.oracle_query import QueryBatch
+from urdfkin.verify.oracles import PINOCCHIO, Witness, WitnessName, witness_of
 from urdfkin.verify.pinocchio import Oracle, OracleError, build_model
 from urdfkin.verify.pinocchio_module import pinocchio, version
 from urdfkin.verify.quantities import Quantity
-from urdfkin.verify.replay import replay_line
-from urdfkin.verify.sampling import draw
+from urdfkin.verify.sampling import SAMPLE, Verify, checked_choice, draw, parts
 from urdfkin.verify.tables import TableCheck, TableError, check_table
-from urdfkin.verify.witnesses import PINOCCHIO, Witness, WitnessName, witness_of
 
 #: Random configurations that a table is checked on, besides the neutral one and the ends of the limits.
 TABLE_SAMPLES = 40
@@ -306,7 +310,7 @@ def urdfkins(quantity: Quantity, x: Part) -> FloatArray:
 
 
 @np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite disagrees
-def theirs_of(quantity: Quantity, oracle: Oracle, asked: Rows) -> FloatArray:
+def theirs_of(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
     """(n, frames, ...) by a witness, for what the user asked."""
     return quantity.theirs(oracle, asked.inputs, asked.frames, asked.reference, asked.base)
 

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.row import Convention
-from urdfkin.dh.table import DHTable
+from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.tree import FloatArray
 from urdfkin.view.figure import label, new_figure, style

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.errors import InputError
-from urdfkin.errors.printable import printable
-from urdfkin.system.interpreter import not_reading
+from urdfkin.errors.escape import printable
+from urdfkin.system.processes import not_reading
 
 if TYPE_CHECKING:
     import matplotlib.axes

@@ -1,7 +1,7 @@
 """Found on PYTHONPATH by every process of a mutant's test: one module of the package is read with its slip.
 
-`URDFKIN_MUTANT` is the module's name and the slip's number, `urdfkin.validation.tally:17`; or the name alone,
-where `URDFKIN_MUTANT_TEXTS` is the slip: the text as it stands and the text instead, as JSON.
+`URDFKIN_MUTANT` is the module's name and the slip's number, `urdfkin.validation.error_stats:17`; or the name
+alone, where `URDFKIN_MUTANT_TEXTS` is the slip: the text as it stands and the text instead, as JSON.
 """
 
 import importlib.abc

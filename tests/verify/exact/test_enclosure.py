@@ -22,9 +22,8 @@ from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.exact import recursion
-from urdfkin.verify.exact.decimals import read_exact
 from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
-from urdfkin.verify.exact.vectors import exact, mp
+from urdfkin.verify.exact.numbers import exact, mp, read_exact
 from urdfkin.verify.quantities import QUANTITIES
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")

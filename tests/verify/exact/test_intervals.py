@@ -13,7 +13,7 @@ from tests.high_precision import mp as independent
 from tests.strategies import rotations
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.exact.intervals import ends, intervals, of_digits
-from urdfkin.verify.exact.vectors import Matrix
+from urdfkin.verify.exact.numbers import Matrix
 
 BITS = (53, 169)
 finite = st.floats(allow_nan=False, allow_infinity=False)

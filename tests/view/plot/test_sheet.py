@@ -16,8 +16,7 @@ from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.motion.trajectory import Trajectory, line
 from urdfkin.robot import Robot
 from urdfkin.view.figure import save
-from urdfkin.view.plot.panels import COORDINATES, PANELS
-from urdfkin.view.plot.sheet import foot, sheet
+from urdfkin.view.plot import COORDINATES, PANELS, foot, sheet
 
 pytest.importorskip("matplotlib")
 Case = tuple[Robot, FrameMotion, Trajectory]

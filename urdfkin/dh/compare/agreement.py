@@ -8,16 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.compare.fit import CELLS, Model, Wanted, columns, fit_cells, hidden_cells
+from urdfkin.dh.compare.fit import CELLS, Model, TargetPoses, columns, fit_cells, hidden_cells
 from urdfkin.dh.compare.freedoms import as_written, fitted_model
 from urdfkin.dh.compare.mistakes import Search
-from urdfkin.dh.compare.proof import most_apart
-from urdfkin.dh.compare.result import EXPLAINED, CellDifference, Comparison, TakenUp
+from urdfkin.dh.compare.proof import max_tip_error_bound
+from urdfkin.dh.compare.result import EXPLAINED, AbsorbedOffset, CellDifference, Comparison
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.lengths import demand_squares_of
-from urdfkin.dh.row import Convention
+from urdfkin.dh.noise import demand_squares_of
 from urdfkin.dh.snapping import rotation_angle
-from urdfkin.dh.table import DHTable
+from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
 from urdfkin.model.tree import FloatArray, JointKind, Limit, is_bounded
@@ -57,7 +56,7 @@ def compare(
         tolerance: Metres at the tip.
         fit: Whether base, tool, the zeros of the joints and the ways they count are fitted; False holds the
             table to what it says.
-        digits: How exactly each cell is written (`urdfkin.dh.digits`).
+        digits: How exactly each cell is written (`urdfkin.dh.rows`).
 
     Raises:
         InputError: the table has another number or other kinds of joints than the path.
@@ -71,7 +70,7 @@ def compare(
     off, residual = _off(fitted, written, judged), judged.apart(complete)[0]
     cells = _differences(chain, reference, fitted, complete, judged, digits, fit)
     table = _fitted_table(chain, standard, fitted)
-    most_metres, most_radians = most_apart(chain, table, _slides(chain))
+    most_metres, most_radians = max_tip_error_bound(chain, table, _slides(chain))
     found = Comparison(
         reference=table,
         reach=tried.scale,
@@ -122,7 +121,7 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
     return judged.apart(fitted_model(chain, standard, as_written(standard), tried, enough, hasty=True))
 
 
-def _off(fitted: Model, written: Model, judged: Wanted) -> dict[str, float]:
+def _off(fitted: Model, written: Model, judged: TargetPoses) -> dict[str, float]:
     """How far the tip is off, as fitted and as written."""
     names = ("metres", "radians", "written_metres", "written_radians")
     return dict(zip(names, (*judged.apart(fitted), *judged.apart(written)), strict=True))
@@ -157,11 +156,11 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
     demand_squares_of(chain, reference)
 
 
-def _wanted(chain: FrameChain) -> tuple[Wanted, Wanted]:
+def _wanted(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
     """What a fit is made on, and what it is judged on."""
     values, poses = _samples(chain, FIT_SAMPLES, _FIT_SEED)
     scale = _reach(chain, poses)
-    return Wanted(values, poses, scale), Wanted(*_samples(chain, CHECK_SAMPLES, _CHECK_SEED), scale)
+    return TargetPoses(values, poses, scale), TargetPoses(*_samples(chain, CHECK_SAMPLES, _CHECK_SEED), scale)
 
 
 def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -193,9 +192,9 @@ def _offsets(standard: DHTable, fitted: Model) -> tuple[float, ...]:
     return tuple(offsets)
 
 
-def _taken_up(written: FloatArray, fitted: FloatArray) -> TakenUp:
+def _taken_up(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
     shift = float(np.linalg.norm(fitted[:3, 3] - written[:3, 3]))
-    return TakenUp(shift, float(rotation_angle(written[:3, :3], fitted[:3, :3])))
+    return AbsorbedOffset(shift, float(rotation_angle(written[:3, :3], fitted[:3, :3])))
 
 
 def _cell_at(reference: DHTable, i: int, cell: str) -> int:
@@ -212,7 +211,7 @@ def _cells_of(reference: DHTable) -> FloatArray:
     return np.array([[float(_cell_at(reference, i, cell) < n) for cell in CELLS] for i in range(n)])
 
 
-def _hidden(reference: DHTable, fitted: Model, judged: Wanted) -> tuple[tuple[int, str], ...]:
+def _hidden(reference: DHTable, fitted: Model, judged: TargetPoses) -> tuple[tuple[int, str], ...]:
     """Cells that base, tool and offsets stand in for; a beta of zero is none."""
     found = [
         (_cell_at(reference, i, CELLS[k]), CELLS[k])
@@ -227,7 +226,7 @@ def _differences(
     reference: DHTable,
     fitted: Model,
     complete: Model,
-    judged: Wanted,
+    judged: TargetPoses,
     digits: Digits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
@@ -255,7 +254,7 @@ def _instead(
     reference: DHTable,
     written: Model,
     found: Comparison,
-    wanted: tuple[Wanted, Wanted],
+    wanted: tuple[TargetPoses, TargetPoses],
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
     """The cells that would have to change if nothing were fitted, where that is an explanation."""

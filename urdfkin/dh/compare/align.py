@@ -14,10 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urdfkin.dh.elements import along_axis
-from urdfkin.dh.normals import FAR_FEET, NEARLY_PARALLEL, NearParallel, Step, step_between
-from urdfkin.dh.row import DHRow
-from urdfkin.dh.table import DHTable
+from urdfkin.dh.common_normals import FAR_FEET, NEARLY_PARALLEL, NearParallel, Step, step_between
+from urdfkin.dh.table import DHRow, DHTable, along_axis
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
 from urdfkin.model.tree import FloatArray
 

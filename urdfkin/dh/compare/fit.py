@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urdfkin.dh.elements import along_axis, between_axes
 from urdfkin.dh.snapping import rotation_angle
+from urdfkin.dh.table import along_axis, between_axes
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.pose import pose
@@ -114,7 +114,7 @@ class Model:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class TargetPoses:
     """Where a model's tip is to come.
 
     Attributes:
@@ -139,7 +139,7 @@ class Wanted:
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
 
-def columns(model: Model, wanted: Wanted) -> tuple[FloatArray, FloatArray, FloatArray]:
+def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Tip poses and the twists (6 s, parameters) of freedoms and of cells, angles times the scale.
 
     Freedoms are the base's six, the tool's six and each row's own variable; cells are (n, 5) in order.
@@ -173,7 +173,7 @@ def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
     return out.reshape(-1, 6)
 
 
-def fit_cells(model: Model, wanted: Wanted, cells_of: FloatArray, *, free: bool) -> Model:
+def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: bool) -> Model:
     """The smallest and fewest changes of cells with which the table is the URDF.
 
     Args:
@@ -228,7 +228,7 @@ def _span(freedoms: FloatArray) -> FloatArray:
     return np.linalg.qr(freedoms)[0] if freedoms.any() else np.zeros((len(freedoms), 0))
 
 
-def hidden_cells(model: Model, wanted: Wanted) -> list[tuple[int, int]]:
+def hidden_cells(model: Model, wanted: TargetPoses) -> list[tuple[int, int]]:
     """(row, number of the cell) for which the freedoms can stand in, to a share of the cell's effect."""
     _, freedoms, cells = columns(model, wanted)
     Q = _span(freedoms)

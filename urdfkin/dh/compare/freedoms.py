@@ -15,9 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from urdfkin.dh.compare.align import Alignment, align
-from urdfkin.dh.compare.fit import LONGEST_STEP, Model, Wanted, columns, moved
-from urdfkin.dh.elements import along_axis, between_axes
-from urdfkin.dh.table import DHTable
+from urdfkin.dh.compare.fit import LONGEST_STEP, Model, TargetPoses, columns, moved
+from urdfkin.dh.table import DHTable, along_axis, between_axes
 from urdfkin.kinematics.roundings import EPS, of_a_fit
 from urdfkin.model.chain import FrameChain
 
@@ -55,7 +54,7 @@ def fitted_model(
     chain: FrameChain,
     standard: DHTable,
     written: Model,
-    wanted: Wanted,
+    wanted: TargetPoses,
     enough: float = 0.0,
     *,
     hasty: bool = False,
@@ -121,7 +120,7 @@ def _start(standard: DHTable, aligned: Alignment) -> Model:
     return start
 
 
-def fit_freedoms(model: Model, wanted: Wanted, *, turns: bool, ends: bool = False) -> Model:
+def fit_freedoms(model: Model, wanted: TargetPoses, *, turns: bool, ends: bool = False) -> Model:
     """The table's best fit.
 
     Args:
@@ -141,11 +140,11 @@ def fit_freedoms(model: Model, wanted: Wanted, *, turns: bool, ends: bool = Fals
     return model
 
 
-def _size(model: Model, wanted: Wanted) -> float:
+def _size(model: Model, wanted: TargetPoses) -> float:
     return float(np.linalg.norm(wanted.errors(model.poses(wanted.values))))
 
 
-def _descended(model: Model, wanted: Wanted, ends: bool) -> tuple[Model, float]:
+def _descended(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, float]:
     size, damping, slow = _size(model, wanted), _DAMPING, 0
     for _ in range(_ROUNDS):
         poses, freedoms, _ = columns(model, wanted)

@@ -15,15 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.compare.fit import Model, Wanted
+from urdfkin.dh.compare.fit import Model, TargetPoses
 from urdfkin.dh.compare.freedoms import HASTY, as_written, ends_gathered, fit_freedoms, starts
 from urdfkin.dh.compare.result import CellDifference, Fitted, Mistake, MistakeKind, resolution
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.row import Convention, DHRow
 from urdfkin.dh.snapping import rotation_angle
-from urdfkin.dh.table import DHTable
+from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.kinematics.rotation import log_rotation
-from urdfkin.kinematics.rotation.nearest import polar_factor
+from urdfkin.kinematics.rotation.matrix import polar_factor
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
@@ -56,8 +55,8 @@ class Search:
     """
 
     chain: FrameChain
-    tried: Wanted
-    judged: Wanted
+    tried: TargetPoses
+    judged: TargetPoses
     tolerance: float
 
     def mistakes(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:

@@ -13,18 +13,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from urdfkin.dh.convert import free_tree, link_names
 from urdfkin.dh.table import DHTable
-from urdfkin.dh.to_tree import free_tree, link_names
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.mechanisms.aligning import align
 from urdfkin.model.mechanisms.alignment import AS_WRITTEN
+from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import Mechanism, tolerance_of
-from urdfkin.model.mechanisms.upper import FINE, upper_bounds
+from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.mechanisms.variables import variables_of
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit, build_tree
 
 
-def most_apart(
+def max_tip_error_bound(
     path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]
 ) -> tuple[float, float]:
     """(m, rad) that the tip of a table of a path's joints is off at most, without what counts as rounding.

@@ -1,6 +1,6 @@
 """What a table that does not fit would have to be read as to fit: the slip is named, not only its size.
 
-Of all readings (`urdfkin.dh.reading`) those are tried whose shape is the URDF's: how far consecutive axes
+Of all readings (`urdfkin.dh.hypotheses`) those are tried whose shape is the URDF's: how far consecutive axes
 are apart, at which angle, and the offsets between the feet of their common normals. These do not change with
 signs, zeros, base and tool, and cost nothing to compute; a few readings that come close are then fitted.
 """
@@ -19,12 +19,10 @@ from urdfkin.dh.compare.agreement import best_fit, compare
 from urdfkin.dh.compare.result import Comparison
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.derive import Choices, Last, derive
-from urdfkin.dh.reading import Reading, as_said, other_readings
-from urdfkin.dh.row import Convention
+from urdfkin.dh.hypotheses import ConventionHypothesis, as_said, other_readings
 from urdfkin.dh.rows import table_from_mapping
-from urdfkin.dh.table import DHTable
-from urdfkin.errors import InputError, RangeError
-from urdfkin.errors.questions import Question
+from urdfkin.dh.table import Convention, DHTable
+from urdfkin.errors import InputError, Question, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
@@ -35,7 +33,7 @@ _EXPLAINS = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Slip:
+class CommonMistake:
     """A reading in which a table fits.
 
     Attributes:
@@ -45,8 +43,8 @@ class Slip:
         radians: Likewise its orientation.
     """
 
-    reading: Reading
-    said: Reading
+    reading: ConventionHypothesis
+    said: ConventionHypothesis
     metres: float
     radians: float
 
@@ -70,12 +68,12 @@ class Slip:
 
 def diagnose(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, off: float = math.inf
-) -> Slip | None:
+) -> CommonMistake | None:
     """The slip that explains why a table does not fit, or None.
 
     Args:
         chain: The path of the URDF.
-        data: The table's plain data, as `urdfkin.dh.read.mapping_from_text` reads them.
+        data: The table's plain data, as `urdfkin.dh.parse_table.mapping_from_text` reads them.
         tolerance: Metres at the tip up to which a table agrees.
         off: Metres that the tip is off as the table is read; what leaves most of that explains nothing.
     """
@@ -85,7 +83,7 @@ def diagnose(
         said = as_said(data)
     except InputError:  # what it says is no convention or no unit: that is the slip
         return None
-    close = list[tuple[float, int, Reading, DHTable]]()
+    close = list[tuple[float, int, ConventionHypothesis, DHTable]]()
     for reading, table in other_readings(data):
         if [row.kind.turns for row in table.rows] != kinds or not kinds:
             return None
@@ -95,7 +93,7 @@ def diagnose(
         return None
     worth = _WORTH * min(apart for apart, *_ in close) + tolerance
     close.sort(key=lambda one: one[0] + worth * one[1])
-    found = list[tuple[float, Slip]]()
+    found = list[tuple[float, CommonMistake]]()
     for _, slips, reading, table in close[:_TRIED]:
         try:
             metres, radians = best_fit(chain, table, tolerance)
@@ -103,7 +101,7 @@ def diagnose(
             continue
         off_here = metres + radians * chain.reach
         if off_here <= max(tolerance, min(_EXPLAINS * off, _EXPLAINS * chain.reach)):
-            found.append((off_here + tolerance * slips, Slip(reading, said, metres, radians)))
+            found.append((off_here + tolerance * slips, CommonMistake(reading, said, metres, radians)))
             if off_here <= tolerance:
                 break
     return min(found, key=lambda one: one[0])[1] if found else None

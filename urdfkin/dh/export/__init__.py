@@ -11,24 +11,24 @@ from urdfkin.errors import UnknownNameError
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-#: Format name -> (module that holds `write`, one-line summary).
+#: Format name -> (module that holds `write_NAME`, one-line summary).
 FORMATS: dict[str, tuple[str, str]] = {
-    "terminal": ("urdfkin.dh.export.terminal", "aligned text"),
-    "markdown": ("urdfkin.dh.export.markdown", "a Markdown table"),
-    "html": ("urdfkin.dh.export.html", "HTML, for a page or a notebook"),
-    "latex": ("urdfkin.dh.export.latex", "a LaTeX table (booktabs)"),
-    "csv": ("urdfkin.dh.export.csv", "comma-separated, read back by urdfkin"),
-    "json": ("urdfkin.dh.export.json", "JSON, read back by urdfkin"),
-    "toml": ("urdfkin.dh.export.toml", "TOML, read back by urdfkin"),
-    "numpy": ("urdfkin.dh.export.numpy", "Python code on NumPy"),
-    "matlab": ("urdfkin.dh.export.matlab", "MATLAB code, plain matrices"),
-    "sympy": ("urdfkin.dh.export.sympy", "Python code for SymPy, exact"),
-    "casadi": ("urdfkin.dh.export.casadi", "Python code for CasADi"),
-    "matlab-symbolic": ("urdfkin.dh.export.matlab_symbolic", "MATLAB code for the Symbolic Math Toolbox"),
-    "matlab-rst": ("urdfkin.dh.export.matlab_rst", "MATLAB code for the Robotics System Toolbox"),
-    "roboticstoolbox": ("urdfkin.dh.export.roboticstoolbox", "Python code for roboticstoolbox's DHRobot"),
+    "terminal": ("urdfkin.dh.export.text", "aligned text"),
+    "markdown": ("urdfkin.dh.export.text", "a Markdown table"),
+    "html": ("urdfkin.dh.export.text", "HTML, for a page or a notebook"),
+    "latex": ("urdfkin.dh.export.text", "a LaTeX table (booktabs)"),
+    "csv": ("urdfkin.dh.export.data", "comma-separated, read back by urdfkin"),
+    "json": ("urdfkin.dh.export.data", "JSON, read back by urdfkin"),
+    "toml": ("urdfkin.dh.export.data", "TOML, read back by urdfkin"),
+    "numpy": ("urdfkin.dh.export.numeric_code", "Python code on NumPy"),
+    "matlab": ("urdfkin.dh.export.numeric_code", "MATLAB code, plain matrices"),
+    "sympy": ("urdfkin.dh.export.symbolic_code", "Python code for SymPy, exact"),
+    "casadi": ("urdfkin.dh.export.symbolic_code", "Python code for CasADi"),
+    "matlab-symbolic": ("urdfkin.dh.export.symbolic_code", "MATLAB code for the Symbolic Math Toolbox"),
+    "matlab-rst": ("urdfkin.dh.export.toolboxes", "MATLAB code for the Robotics System Toolbox"),
+    "roboticstoolbox": ("urdfkin.dh.export.toolboxes", "Python code for roboticstoolbox's DHRobot"),
     "ets": ("urdfkin.dh.export.ets", "elementary transforms, Python code for roboticstoolbox"),
-    "c": ("urdfkin.dh.export.c", "C99 code"),
+    "c": ("urdfkin.dh.export.numeric_code", "C99 code"),
 }
 
 
@@ -46,4 +46,5 @@ def export(table: DHTable, format: str, units: Units | None = None) -> str:
     """
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)
-    return cast("str", importlib.import_module(FORMATS[format][0]).write(table, units or Units()))
+    write = getattr(importlib.import_module(FORMATS[format][0]), "write_" + format.replace("-", "_"))
+    return cast("str", write(table, units or Units()))

@@ -6,15 +6,14 @@ solvers take it.
 
 from __future__ import annotations
 
-from urdfkin.dh.export.cells import is_identity
-from urdfkin.dh.export.code import bounds, demand_free, docstring, numbers, plain
-from urdfkin.dh.row import Convention, DHRow
-from urdfkin.dh.table import DHTable
+from urdfkin.dh.export.numeric_code import bounds, demand_free, docstring, numbers, plain
+from urdfkin.dh.export.text import is_identity
+from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.dh.units import Units
 from urdfkin.model.tree import FloatArray
 
 
-def write(table: DHTable, units: Units) -> str:
+def write_ets(table: DHTable, units: Units) -> str:
     """A module with `ets`, and `robot`, a Robot made of it.
 
     Raises:

@@ -5,26 +5,23 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-from urdfkin.dh.export.cells import pose_lines
-from urdfkin.dh.export.code import identifier, numbers, plain
-from urdfkin.dh.export.latex import fitted, maths, pose
-from urdfkin.dh.export.matlab import matrix
-from urdfkin.dh.export.terminal import aligned
-from urdfkin.dh.screws import Screws
-from urdfkin.dh.subproblems import axes_and_steps
-from urdfkin.errors.printable import latex_text, printable
-from urdfkin.errors.showing import six_digits
+from urdfkin.dh.export.numeric_code import identifier, matrix, numbers, plain
+from urdfkin.dh.export.text import aligned, fitted, maths, pose, pose_lines
+from urdfkin.dh.screws import ProductOfExponentials
+from urdfkin.dh.structure import axes_and_steps
+from urdfkin.errors.display import six_digits
+from urdfkin.errors.escape import latex_text, printable
 from urdfkin.model.tree import FloatArray
 
 FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
 
-def write_screws(screws: Screws, form: str, digits: int = 10) -> str:
+def write_screws(screws: ProductOfExponentials, form: str, digits: int = 10) -> str:
     """One of the forms "terminal", "latex", "toml", "json", "numpy" and "matlab"."""
     return _FORMS[form](screws, digits)
 
 
-def _terminal(screws: Screws, digits: int) -> str:
+def _terminal(screws: ProductOfExponentials, digits: int) -> str:
     path = f"{screws.robot}: {screws.base_frame} to {screws.tip_frame}"
     lines = [f"{path}, product of exponentials (metres, angular first)", FORMULA]
     for what, rows in (("space screws S", screws.space), ("body screws B", screws.body)):
@@ -39,7 +36,7 @@ def _terminal(screws: Screws, digits: int) -> str:
     return "\n".join(map(printable, lines)) + "\n"
 
 
-def _latex(screws: Screws, digits: int) -> str:
+def _latex(screws: ProductOfExponentials, digits: int) -> str:
     names = f"{latex_text(screws.robot)}, {latex_text(screws.base_frame)} to {latex_text(screws.tip_frame)}"
     heads = r"$i$ & joint & $\omega_x$ & $\omega_y$ & $\omega_z$ & $v_x$ & $v_y$ & $v_z$ \\"
     rows = []
@@ -52,15 +49,15 @@ def _latex(screws: Screws, digits: int) -> str:
     return "\n".join([*lines, *pose("$M$", screws.M), r"\end{table}"]) + "\n"
 
 
-def _toml(screws: Screws, _digits: int) -> str:
+def _toml(screws: ProductOfExponentials, _digits: int) -> str:
     return "".join(f"{key} = {json.dumps(value)}\n" for key, value in screws.as_mapping().items())
 
 
-def _json(screws: Screws, _digits: int) -> str:
+def _json(screws: ProductOfExponentials, _digits: int) -> str:
     return json.dumps(screws.as_mapping(), indent=2) + "\n"
 
 
-def _numpy(screws: Screws, _digits: int) -> str:
+def _numpy(screws: ProductOfExponentials, _digits: int) -> str:
     lines = [
         f'"""{plain(screws.robot)}: M, space and body screws as columns (w, v), metres: Modern Robotics."""'
     ]
@@ -84,7 +81,7 @@ def _array(name: str, rows: FloatArray, end: str) -> list[str]:
     return [f"{name} = np.array(", "    [", *(f"        [{numbers(row)}]," for row in rows), "    ]", end]
 
 
-def _matlab(screws: Screws, _digits: int) -> str:
+def _matlab(screws: ProductOfExponentials, _digits: int) -> str:
     lines = [f"function [M, Slist, Blist] = {identifier(screws.robot)}_screws()"]
     lines += [f"% {plain(screws.robot)}: screws are columns (w; v), metres, as Modern Robotics has them"]
     lines += matrix("M", screws.M, 4)
@@ -93,7 +90,7 @@ def _matlab(screws: Screws, _digits: int) -> str:
     return "\n".join([*lines, "end"]) + "\n"
 
 
-_FORMS: dict[str, Callable[[Screws, int], str]] = {
+_FORMS: dict[str, Callable[[ProductOfExponentials, int], str]] = {
     "terminal": _terminal,
     "latex": _latex,
     "toml": _toml,

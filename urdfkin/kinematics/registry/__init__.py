@@ -1,19 +1,264 @@
-"""The chapter's equations: what each says, which function computes it, and what checks it.
+"""The equations as data, read from the TOML files beside this one.
+
+`docs/equations.md`: the table of every equation, generated from the registry.
+
+A page for each equation, as `urdfkin explain 7.130` prints it.
+
+The chapter's equations: what each says, which function computes it, and what checks it.
 
 One source for `docs/equations.md`, `urdfkin explain 7.130` and the tests that hold both to the truth.
 """
 
-from urdfkin.kinematics.registry.entries import (
-    LOST,
-    Equation,
-    Misprint,
-    Section,
-    equations,
-    misprints,
-    sections,
+from __future__ import annotations
+
+import inspect
+import re
+import textwrap
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from urdfkin.kinematics import equations as chapter
+from urdfkin.kinematics.latex import latex
+
+#: The highest equation number of the chapter.
+LAST = 130
+#: Equations of the chapter's page 2, which is missing from the text that this project has. (7.7 stood there
+#: as well, but section 7.2 says what it was.)
+LOST = ("7.6", "7.8", "7.9", "7.10")
+
+_FILES = (
+    "7_1_planar",
+    "7_2_1_fixed_axis",
+    "7_2_2_any_rotation",
+    "7_2_4_angles",
+    "7_3_spatial",
+    "7_4_joints",
+    "7_4_5_examples",
+    "7_5_manipulator_jacobian",
+    "7_6_acceleration",
+    "7_7_manipulator_accelerations",
 )
-from urdfkin.kinematics.registry.pages import explain
-from urdfkin.kinematics.registry.table import table
+
+
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """One numbered equation.
+
+    Attributes:
+        number: As printed, "7.130".
+        statement: In urdfkin's notation, plain characters.
+        latex: The same, in LaTeX.
+        meaning: One or two sentences.
+        written: The functions of `urdfkin.kinematics.equations` that are it, by name.
+        functions: What computes it, "module:name".
+        tests: Tests that fail without it, "file::name".
+        against: The independent source that the tests compare with.
+    """
+
+    number: str
+    statement: str
+    latex: str
+    meaning: str
+    written: tuple[str, ...]
+    functions: tuple[str, ...]
+    tests: tuple[str, ...]
+    against: str
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A section of the chapter.
+
+    Attributes:
+        number: As printed, "7.2.4, 7.2.5" for several.
+        title: What it is about.
+        equations: In the text's order.
+    """
+
+    number: str
+    title: str
+    equations: tuple[Equation, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Misprint:
+    """Something in the chapter that is wrong or incomplete.
+
+    Attributes:
+        where: In the text.
+        printed: What stands there.
+        correct: What should.
+        proof: Why, in a sentence.
+        test: The test that shows it, "file::name".
+    """
+
+    where: str
+    printed: str
+    correct: str
+    proof: str
+    test: str
+
+
+@cache
+def sections() -> tuple[Section, ...]:
+    """The chapter's sections with their equations, in order."""
+    return tuple(_section(_read(name)) for name in _FILES)
+
+
+@cache
+def equations() -> dict[str, Equation]:
+    """Every equation by its number, in order."""
+    return {equation.number: equation for section in sections() for equation in section.equations}
+
+
+@cache
+def misprints() -> tuple[Misprint, ...]:
+    """What is wrong in the chapter, with the proof."""
+    return tuple(Misprint(**entry) for entry in _read("misprints")["misprint"])
+
+
+def _read(name: str) -> dict[str, Any]:
+    return tomllib.loads((Path(__file__).with_name("data") / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def _section(data: dict[str, Any]) -> Section:
+    entries = tuple(_equation({**_defaults(data), **entry}) for entry in data["equation"])
+    return Section(data["section"], data["title"], entries)
+
+
+def _defaults(data: dict[str, Any]) -> dict[str, Any]:
+    return {"test_file": data["test_file"], "against": data["against"]}
+
+
+def _equation(entry: dict[str, Any]) -> Equation:
+    names = entry.get("tests") or [entry["test"]]
+    return Equation(
+        number=entry["number"],
+        statement=entry["statement"],
+        latex=entry["latex"],
+        meaning=entry["meaning"],
+        written=tuple(entry.get("written", ())),
+        functions=tuple(entry["functions"]),
+        tests=tuple(f"{entry['test_file']}::{name}" for name in names),
+        against=entry["against"],
+    )
+
+
+def table() -> str:
+    """The whole page in Markdown."""
+    parts = [_head()]
+    for section in sections():
+        parts += [
+            f"## {section.number} {section.title}",
+            "| | equation | computed by; a test that fails without it; checked with |\n|---|---|---|\n"
+            + "\n".join(_row(equation) for equation in section.equations),
+        ]
+    parts += ["## Misprints", _misprint_head(), *(_misprint(misprint) for misprint in misprints())]
+    return "\n\n".join(parts) + "\n"
+
+
+def _head() -> str:
+    return f"""# Every equation of the chapter
+
+Generated by `scripts/make_equations.py` from `urdfkin/kinematics/registry/data`; do not edit.
+
+{len(equations())} of {LAST} equations. The other {len(LOST)} ({", ".join(LOST)}) stood on page 2, which is
+lost; 7.7 did too, but section 7.2 says what it was. `urdfkin explain 7.130` prints an equation with its
+meaning, its code where it is written, and its check.
+
+The text: John M. Hollerbach, *Velocity and Acceleration*, chapter 7 of lecture notes on robotics, October
+2000. By name: the skew-symmetric matrix of a vector (7.16), Rodrigues' formula (7.28), the sum of angular
+velocities (7.50), the ZYZ Euler angle rates and their representational singularity (7.56), quaternion rates
+(7.57), the Denavit-Hartenberg interorigin vector (7.64), the velocity Jacobian (7.85), the analytical
+Jacobian (7.118), transverse, centripetal and Coriolis acceleration (7.125), the rate of the Jacobian
+(7.126), the recursion (7.127 to 7.130).
+
+A test holds this table to the truth: every number is there, every function exists, and each named test
+fails when one of the equation's functions gives a slightly wrong result. Vectors are expressed in frame 0
+unless it is said otherwise."""
+
+
+def _row(equation: Equation) -> str:
+    functions = "<br>".join(f"`{function.replace(':', '.')}`" for function in equation.functions)
+    tests = "<br>".join(f"`{test.split('::')[1]}`" for test in equation.tests)
+    return (
+        f"| {equation.number} | $`{equation.latex}`$<br>{_cell(equation.meaning)} "
+        f"| {functions}<br>{tests}<br>{_cell(equation.against)} |"
+    )
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
+
+
+def _misprint_head() -> str:
+    return "What is wrong or incomplete in the chapter as this project has it; each with a test as its proof."
+
+
+def _misprint(misprint: Misprint) -> str:
+    return (
+        f"* **{_cell(misprint.where)}**: “{_cell(misprint.printed)}” should be: {_cell(misprint.correct)} "
+        f"{_cell(misprint.proof)} (`{misprint.test.split('::')[1]}`)"
+    )
+
+
+_NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECASE)
+
+
+def explain(number: str) -> str | None:
+    """The equation, its meaning, its function and its check; None for what is no equation's number.
+
+    Args:
+        number: "7.130", "(7.130)" or "eq. 7.130".
+
+    Returns:
+        A page of plain text, or None.
+
+    Example:
+        >>> print(explain("7.5").splitlines()[2])
+        R_0_1 = R(theta1) = [[cos, -sin], [sin, cos]]
+    """
+    match = _NUMBER.match(number.strip())
+    if match is None or not 1 <= int(match[1].split(".")[1]) <= LAST:
+        return None
+    if match[1] in LOST:
+        return _lost(match[1])
+    return _page(equations()[match[1]])
+
+
+def _lost(number: str) -> str:
+    return (
+        f"Equation {number}\n\nIt stood on page 2 of the chapter, which is lost: {', '.join(LOST)} are not "
+        "known.\nEvery other equation up to 7.130 is here."
+    )
+
+
+def _page(equation: Equation) -> str:
+    section = next(section for section in sections() if equation in section.equations)
+    lines = [
+        f"Equation {equation.number}    section {section.number}: {section.title}",
+        "",
+        equation.statement,
+        "",
+        equation.meaning,
+        "",
+        *(f"computed by   {function.replace(':', '.')}" for function in equation.functions),
+        *(f"tested by     {test}" for test in equation.tests),
+        f"checked with  {equation.against}",
+    ]
+    for name in equation.written:
+        lines += ["", *_source(name), "", f"    {latex(name)}"]
+    return "\n".join(lines)
+
+
+def _source(name: str) -> list[str]:
+    """The equation as it runs, on every kind of number."""
+    source = textwrap.indent(inspect.getsource(getattr(chapter, name)).rstrip(), "    ")
+    return ["written once, in urdfkin/kinematics/equations.py; in code, and in LaTeX", "", source]
+
 
 __all__ = [
     "LOST",

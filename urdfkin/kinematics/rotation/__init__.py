@@ -3,7 +3,6 @@
 Section 7.2 of the text, equations 7.11 to 7.57. Every function takes any leading batch shape.
 """
 
-from urdfkin.kinematics.rotation.aligning import axis_aligning
 from urdfkin.kinematics.rotation.axis_angle import (
     angular_velocity_about,
     axis_angle_of,
@@ -16,34 +15,38 @@ from urdfkin.kinematics.rotation.axis_angle import (
 )
 from urdfkin.kinematics.rotation.euler import (
     SEQUENCES,
-    euler_of,
-    rotation_from_euler,
-    rotation_from_rpy,
-    rpy_of,
-)
-from urdfkin.kinematics.rotation.euler_rates import (
     angular_velocity_from_euler_rates,
     euler_condition,
+    euler_of,
     euler_rate_inverse,
     euler_rate_matrix,
     euler_rates,
+    rotation_from_euler,
+    rotation_from_rpy,
+    rpy_of,
     singularity_distance,
 )
-from urdfkin.kinematics.rotation.integrate import integrate_orientation
-from urdfkin.kinematics.rotation.nearest import nearest_rotation
-from urdfkin.kinematics.rotation.quaternion import conjugate, multiply, quaternion_of, rotation_of
-from urdfkin.kinematics.rotation.quaternion_rates import (
-    angular_velocity_from_quaternion_rates,
-    quaternion_rate_matrix,
-    quaternion_rates,
-)
-from urdfkin.kinematics.rotation.rates import (
+from urdfkin.kinematics.rotation.matrix import (
     add_angular_velocities,
     angular_velocity_of,
+    axis_aligning,
+    nearest_rotation,
+    rotate_skew,
     rotation_rate,
+    skew,
     turning_vector_rate,
+    unskew,
 )
-from urdfkin.kinematics.rotation.skew import rotate_skew, skew, unskew
+from urdfkin.kinematics.rotation.quaternion import (
+    angular_velocity_from_quaternion_rates,
+    conjugate,
+    integrate_orientation,
+    multiply,
+    quaternion_of,
+    quaternion_rate_matrix,
+    quaternion_rates,
+    rotation_of,
+)
 
 __all__ = [
     "SEQUENCES",

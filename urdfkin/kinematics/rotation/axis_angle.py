@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.kinematics.inputs import FloatArray, scalars, unit_vectors, vectors
+from urdfkin.kinematics.rotation.matrix import skew
 from urdfkin.kinematics.rotation.quaternion import quaternion_of
-from urdfkin.kinematics.rotation.skew import skew
 
 
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:

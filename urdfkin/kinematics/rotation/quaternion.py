@@ -1,15 +1,32 @@
 """Unit quaternions (qx, qy, qz, qw), scalar last as in a configuration; the text's q0 is qw.
 
 Section 7.2.5. A quaternion and its negative are the same rotation. Rates stand in `quaternion_rates`.
+
+
+Rates of a unit quaternion and the angular velocity, each from the other.
+
+Section 7.2.5, equation 7.57. Here the angular velocity may be expressed in the fixed frame 0, as the text
+does, or in the turning body's frame: `frame="fixed"` or `frame="body"`. There is no singularity.
+
+
+Orientation from an angular velocity over time, by quaternion rates with the norm kept.
+
+Section 7.2.5: "one converts from w to q-dot, then integrates". The integral of w itself is no orientation
+(example 7.3).
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError
-from urdfkin.kinematics.inputs import FloatArray, rotations, vectors
+from urdfkin.kinematics.inputs import FloatArray, rotations, scalars, vectors
+from urdfkin.kinematics.rotation.matrix import skew
 
 #: A quaternion this far from unit length is refused: it was not meant as a rotation.
 NORM_TOLERANCE = 1e-6
@@ -119,3 +136,130 @@ def conjugate(quat: ArrayLike) -> FloatArray:
     """
     conjugated: FloatArray = vectors(quat, "quat", 4) * np.array([-1.0, -1.0, -1.0, 1.0])
     return conjugated
+
+
+ExpressedIn = Literal["fixed", "body"]
+
+
+def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
+    """E, with (q-dot, q0-dot) = E w, that is 1/2 [q0 I - S(q); -q^T] for w in the fixed frame (7.57).
+
+    In the body's frame the sign of S(q) changes. The columns are perpendicular and 1/2 long, and
+    perpendicular to the quaternion, so that its length stays.
+
+    Args:
+        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
+        frame: Where `w` is expressed.
+
+    Returns:
+        (..., 4, 3), without unit.
+
+    Raises:
+        InputError: a shape, not of unit length, or an unknown `frame`.
+    """
+    if frame not in ("fixed", "body"):
+        raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
+    quat = unit_quaternions(quat)
+    q, q0 = quat[..., :3], quat[..., 3]
+    turn = -skew(q) if frame == "fixed" else skew(q)
+    top = turn + q0[..., np.newaxis, np.newaxis] * np.eye(3)
+    E: FloatArray = 0.5 * np.concatenate((top, -q[..., np.newaxis, :]), axis=-2)
+    return E
+
+
+def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
+    """The rate of the quaternion of a body that turns with w (7.57).
+
+    Args:
+        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
+        w: (..., 3) angular velocity of the body, rad/s.
+        frame: Where `w` is expressed: the fixed frame 0 or the body's own.
+
+    Returns:
+        (..., 4) rates, 1/s, scalar last.
+
+    Raises:
+        InputError: a shape, not of unit length, or an unknown `frame`.
+
+    Example:
+        >>> quaternion_rates([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0]) + 0.0
+        array([0., 0., 1., 0.])
+    """
+    return (quaternion_rate_matrix(quat, frame) @ vectors(w, "w")[..., np.newaxis])[..., 0]
+
+
+def angular_velocity_from_quaternion_rates(
+    quat: ArrayLike, rates: ArrayLike, frame: ExpressedIn = "fixed"
+) -> FloatArray:
+    """The angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
+
+    A part of the rates along the quaternion would change its length, is no motion, and does not count.
+
+    Args:
+        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
+        rates: (..., 4) its rates, 1/s, scalar last.
+        frame: Where the result is expressed: the fixed frame 0 or the body's own.
+
+    Returns:
+        (..., 3) angular velocity of the body, rad/s.
+
+    Raises:
+        InputError: a shape, not of unit length, or an unknown `frame`.
+    """
+    E = quaternion_rate_matrix(quat, frame)
+    w: FloatArray = 4.0 * (E.swapaxes(-1, -2) @ vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
+    return w
+
+
+def integrate_orientation(
+    w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
+) -> FloatArray:
+    """Quaternions at `times` of a body that turns with w(t): Runge-Kutta's fourth order on 7.57.
+
+    The exact flow keeps the quaternion's length; each step's rounding and truncation do not, so the
+    result of each step is put back to length one. Halving the steps divides the error by 16.
+
+    Args:
+        w: Angular velocity at a time in s: (..., 3) rad/s. Within a step it must be smooth: put a time
+            where it jumps. At the ends of a step it is asked for just inside.
+        quat: (..., 4) orientation at `times[0]`, unit quaternion, scalar last.
+        times: (n,) increasing, in s; one step from each to the next.
+        frame: Where w is expressed: the fixed frame 0 or the body's own.
+
+    Returns:
+        (n, ..., 4) unit quaternions, scalar last.
+
+    Raises:
+        InputError: a shape, or times that do not increase.
+    """
+    times = scalars(times, "times")
+    if times.ndim != 1 or (np.diff(times) <= 0.0).any():
+        raise InputError("times must be a row of increasing numbers", found=str(times.shape))
+    quats = [unit_quaternions(quat)]
+    for start, end in pairwise(times.tolist()):
+        quats.append(_step(w, quats[-1], start, end, frame))
+    return np.stack(quats)
+
+
+def _step(
+    w: Callable[[float], ArrayLike], quat: FloatArray, start: float, end: float, frame: ExpressedIn
+) -> FloatArray:
+    """One Runge-Kutta step, back at unit length."""
+    step = end - start
+    first, middle, last = (
+        vectors(w(t), "w") for t in (np.nextafter(start, end), (start + end) / 2.0, np.nextafter(end, start))
+    )
+    k1 = _rates(quat, first, frame)
+    k2 = _rates(quat + step / 2.0 * k1, middle, frame)
+    k3 = _rates(quat + step / 2.0 * k2, middle, frame)
+    k4 = _rates(quat + step * k3, last, frame)
+    stepped = quat + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    normalised: FloatArray = stepped / np.sqrt((stepped * stepped).sum(axis=-1, keepdims=True))
+    return normalised
+
+
+def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
+    """7.57 is linear in the quaternion: between the ends of a step its length is not one, and need not be."""
+    length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
+    rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
+    return rates

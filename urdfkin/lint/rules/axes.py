@@ -6,8 +6,7 @@ import math
 from collections.abc import Sequence
 from decimal import Decimal, localcontext
 
-from urdfkin.lint.escape import quoted
-from urdfkin.lint.finding import Severity
+from urdfkin.lint.finding import Severity, quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
 from urdfkin.urdf.element import Element

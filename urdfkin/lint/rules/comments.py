@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from urdfkin.lint.escape import quoted
+from urdfkin.lint.finding import quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import NOTE, WARNING, Rule
-from urdfkin.lint.silence import Comment, Silence, Silences
+from urdfkin.lint.suppressions import Comment, Silence, Silences
 
 BAD_COMMENT = Rule("URDF120", "bad-comment", WARNING)
 UNUSED_COMMENT = Rule("URDF121", "unused-comment", NOTE)

@@ -6,8 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
-from urdfkin.lint.escape import quoted, shortened
-from urdfkin.lint.finding import Severity
+from urdfkin.lint.finding import Severity, quoted, shortened
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, WARNING, Rule
 from urdfkin.lint.rules import names

@@ -10,12 +10,12 @@ from __future__ import annotations
 import re
 from xml.parsers import expat
 
-from urdfkin.lint.escape import QUOTED, quoted, shortened
+from urdfkin.lint.finding import QUOTED, quoted, shortened
 from urdfkin.lint.limits import ORACLE_DEPTH
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, REFUSES, WARNING, Rule
 from urdfkin.lint.rules.encoding import line_and_column, utf8_bytes
-from urdfkin.lint.silence import MARK, Comment
+from urdfkin.lint.suppressions import MARK, Comment
 from urdfkin.urdf.element import Element
 
 SYNTAX = Rule("URDF105", "xml-syntax", ERROR)

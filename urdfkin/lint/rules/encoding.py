@@ -5,11 +5,10 @@ from __future__ import annotations
 import codecs
 import re
 
-from urdfkin.lint.escape import quoted
-from urdfkin.lint.fixes import Fix
+from urdfkin.lint.finding import Fix, quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
-from urdfkin.system.edits import Edit
+from urdfkin.system.files import Edit
 
 EMPTY = Rule("URDF101", "empty-file", ERROR)
 ENCODING = Rule("URDF102", "not-utf8", ERROR)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from urdfkin.lint.escape import quoted
-from urdfkin.lint.finding import Finding, Severity
+from urdfkin.lint.finding import Finding, Severity, quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, WARNING, Rule
 from urdfkin.lint.rules.axes import LONGEST, SHORTEST

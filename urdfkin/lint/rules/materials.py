@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from urdfkin.lint.escape import quoted
+from urdfkin.lint.finding import quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, WARNING, Rule
 from urdfkin.urdf.element import Element

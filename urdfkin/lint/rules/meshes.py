@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from urdfkin.lint.escape import quoted
+from urdfkin.lint.finding import quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import WARNING, Rule
 from urdfkin.urdf.element import Element

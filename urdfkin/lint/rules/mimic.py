@@ -6,9 +6,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from urdfkin.lint.escape import quoted
-from urdfkin.lint.finding import Severity
-from urdfkin.lint.fixes import Fix
+from urdfkin.lint.finding import Fix, Severity, quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
 from urdfkin.lint.rules import joints

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 
-from urdfkin.lint.escape import quoted
-from urdfkin.lint.finding import Severity
+from urdfkin.lint.finding import Severity, quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import DIFFERS, ERROR, WARNING, Rule
 from urdfkin.urdf.element import Element

@@ -11,8 +11,8 @@ import math
 import re
 from dataclasses import dataclass
 
-from urdfkin.errors.numerals import DECIMAL
-from urdfkin.lint.escape import quoted
+from urdfkin.errors.numbers import DECIMAL
+from urdfkin.lint.finding import quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, REFUSES, WARNING, Rule
 from urdfkin.urdf.element import Element

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from urdfkin.lint.escape import quoted, shortened
+from urdfkin.lint.finding import quoted, shortened
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import WARNING, Rule
 from urdfkin.urdf.element import Element

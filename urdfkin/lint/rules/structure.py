@@ -5,7 +5,7 @@ Everything here is iterative: a chain of 50,000 links must not meet a stack.
 
 from __future__ import annotations
 
-from urdfkin.lint.escape import quoted
+from urdfkin.lint.finding import quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, Rule
 from urdfkin.urdf.records import JointRecord, RobotRecord

@@ -6,8 +6,7 @@ import math
 import re
 from fractions import Fraction
 
-from urdfkin.lint.escape import quoted
-from urdfkin.lint.finding import Severity
+from urdfkin.lint.finding import Severity, quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
 from urdfkin.urdf.records import AXIAL, JointRecord, RobotRecord

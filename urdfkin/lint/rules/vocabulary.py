@@ -6,8 +6,7 @@ import difflib
 from collections.abc import Iterator
 from functools import lru_cache, partial
 
-from urdfkin.lint.escape import quoted
-from urdfkin.lint.finding import Severity
+from urdfkin.lint.finding import Severity, quoted
 from urdfkin.lint.reporter import Reporter
 from urdfkin.lint.rule import ERROR, WARNING, Rule
 from urdfkin.urdf.element import Element

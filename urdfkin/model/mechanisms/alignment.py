@@ -18,9 +18,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from urdfkin.model.mechanisms.conversion import Conversion
-from urdfkin.model.mechanisms.mechanism import Mechanism, Screw, size_of, tolerance_of
-from urdfkin.model.mechanisms.rigid import apart
+from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism, Screw, apart, size_of, tolerance_of
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 
@@ -61,7 +59,7 @@ class Step:
     tilt: float
     shift: float
     unlike: str = ""
-    conversion: Conversion | None = None
+    conversion: JointTransform | None = None
 
     @property
     def differs(self) -> bool:
@@ -238,7 +236,7 @@ class Gauge:
     base: tuple[str, str] | None = None
     X: FloatArray = field(default_factory=lambda: IDENTITY)
     zeros: Mapping[str, tuple[int, float]] = field(default_factory=dict)
-    conversions: Mapping[str, Conversion] = field(default_factory=dict)
+    conversions: Mapping[str, JointTransform] = field(default_factory=dict)
     orders: tuple[tuple[str, ...], ...] = ()
 
 

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Tolerance
-from urdfkin.model.mechanisms.pairing import Came, Pair, Pairing, family
-from urdfkin.model.mechanisms.rigid import apart
+from urdfkin.model.mechanisms.joint_matching import Came, Pair, Pairing, family
+from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Tolerance, apart
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 

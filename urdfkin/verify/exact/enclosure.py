@@ -13,21 +13,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from urdfkin.compiled.plan import Plan
+from urdfkin.compiled.plan import CompiledTree
 from urdfkin.errors import InputError
-from urdfkin.errors.demands import whole_number, word
-from urdfkin.errors.printable import log_line
+from urdfkin.errors.escape import log_line
+from urdfkin.errors.validators import as_str, whole_number
 from urdfkin.kinematics.inputs import floats
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import checked
-from urdfkin.model.given import Given
+from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, frozen
 from urdfkin.verify.call import Call
-from urdfkin.verify.exact.decimals import read_exact
 from urdfkin.verify.exact.intervals import ends, of_digits
+from urdfkin.verify.exact.numbers import exact, read_exact
 from urdfkin.verify.exact.recursion import move, on_base
-from urdfkin.verify.exact.vectors import exact
 from urdfkin.verify.quantities import (
     ACCELERATION,
     HESSIAN,
@@ -141,7 +140,7 @@ class Enclosures:
 
 def enclose(
     verifier: Verifier,
-    plan_of: Callable[[Sequence[int]], Plan],
+    plan_of: Callable[[Sequence[int]], CompiledTree],
     inputs: tuple[Given, Given, Given],
     frame: str,
     reference: Reference | str,
@@ -154,7 +153,7 @@ def enclose(
     if digits is not None:
         digits = whole_number(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
     tree = verifier.tree
-    call = Call(tree, plan_of, word(frame, "frame"), reference, base, inputs)
+    call = Call(tree, plan_of, as_str(frame, "frame"), reference, base, inputs)
     if call.shape:
         raise InputError(
             "a proof is for one sample",

@@ -14,7 +14,7 @@ from functools import cache
 from mpmath.ctx_iv import MPIntervalContext
 from mpmath.libmp import dps_to_prec, from_float, from_int, mpf_gt, mpf_lt, to_float
 
-from urdfkin.verify.exact.vectors import Matrix, Number, defect, nearest_rotation
+from urdfkin.verify.exact.numbers import Matrix, Number, defect, nearest_rotation
 
 #: Bits beyond those asked for, where something is doubled or iterated.
 _SPARE = 30

@@ -18,9 +18,16 @@ from urdfkin.kinematics import equations
 from urdfkin.model.recursion import IDENTITY, Column, Matrix, Number, Recursion, State, Vector
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
-from urdfkin.verify.exact.decimals import ExactJoint
-from urdfkin.verify.exact.vectors import Context, about, exact, from_quaternion, mp, nearest_rotation
-from urdfkin.verify.pinocchio_base import BaseNumbers
+from urdfkin.verify.exact.numbers import (
+    Context,
+    ExactJoint,
+    about,
+    exact,
+    from_quaternion,
+    mp,
+    nearest_rotation,
+)
+from urdfkin.verify.pinocchio_inputs import BaseNumbers
 
 _WALK = Recursion(equations)
 

@@ -1,0 +1,128 @@
+"""List words that readers did not understand, with a plain form, and sentences that are too long.
+
+    python scripts/plain_words.py [PATH ...]         # words of the list; exit 1 where there is one
+    python scripts/plain_words.py --long [PATH ...]  # sentences of more than 30 words, for information
+
+The text is that of pages, docstrings, comments and messages. CONTRIBUTING.md states the rules of style.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import io
+import re
+import sys
+import tokenize
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[1]
+#: A pattern for text -> the plain form. Each pattern stood in sentences that a blind test's reader failed.
+PLAIN = {
+    r"\bwitness(es)?\b": "oracle",
+    r"\b(stands?|stood) still\b": "fixed",
+    r"\bodd poses?\b": "outlier",
+    r"\b(the house|rooms?)\b": "architecture, package",
+    r"\bhand(s|ed|ing)? out\b": "return, output",
+    r"\b(held|holds?|holding) (\w+ ){0,3}against\b": "compare with",
+    r"\bwhose doing\b": "contribution of each joint",
+    r"\b(stands?|standing) alone\b": "disagrees with the two others",
+    r"\bthe judge\b": "the accuracy study",
+    r"\brates? of the rates?\b": "joint acceleration",
+    r"\bfollowers?\b": "mimic joint",
+    r"\bwhom\b": "name the person or the thing",
+    r"\bwhoever\b": "name the person",
+    r"\bnobody\b": "no one; or name what does not happen",
+    r"\bdoes otherwise\b": "differs",
+    r"\bis told (of|by|that)\b": "receives, reports",
+    r"\bsays so\b": "reports it, states it",
+    r"\bwhat people (read|ask|write)\b": "a noun: printed text, questions, input",
+    r"\b(is|are) said (to be|up to|of|by)\b": "is reported, is stated",
+}
+#: More words than this in a sentence make it long.
+LONGEST = 30
+_SUFFIXES = (".py", ".md", ".toml")
+_SKIPPED = {".venv", ".git", "site", "node_modules", "build", "dist", "data"}
+_FILES_SKIPPED = {"CHANGELOG.md", "plain_words.py"}
+
+
+class Passage(NamedTuple):
+    """A piece of text that a person reads.
+
+    Attributes:
+        file: The file, relative to the repository.
+        line: Its first line.
+        text: Its words.
+    """
+
+    file: str
+    line: int
+    text: str
+
+
+def passages(path: Path) -> Iterator[Passage]:
+    """Yield the texts of a file: a page's lines, or a module's docstrings, comments and strings."""
+    name, text = str(path.relative_to(ROOT)), path.read_text(encoding="utf-8")
+    if path.suffix != ".py":
+        fenced = False
+        for number, line in enumerate(text.splitlines(), 1):
+            if line.startswith("```"):
+                fenced = not fenced
+            elif not fenced:
+                yield Passage(name, number, re.sub(r"`[^`]*`", "", line))
+        return
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value.strip():
+            yield Passage(name, node.lineno, re.sub(r"`[^`]*`", "", node.value))
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == tokenize.COMMENT:
+            yield Passage(name, token.start[0], token.string.lstrip("#: "))
+
+
+def files(paths: list[Path]) -> Iterator[Path]:
+    """Yield the files below some paths whose text people read."""
+    for path in paths:
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            parts = file.relative_to(ROOT).parts
+            if file.suffix in _SUFFIXES and not _SKIPPED & set(parts) and file.name not in _FILES_SKIPPED:
+                yield file
+
+
+def complaints(paths: list[Path]) -> list[str]:
+    """Return a line for each word of the list, with its place and its plain form."""
+    found = []
+    for file in files(paths):
+        for passage in passages(file):
+            for pattern, plain in PLAIN.items():
+                for match in re.finditer(pattern, passage.text, re.IGNORECASE):
+                    line = passage.line + passage.text[: match.start()].count("\n")
+                    found.append(f"{passage.file}:{line}: {match[0]!r}; write: {plain}")
+    return found
+
+
+def long_sentences(paths: list[Path]) -> list[str]:
+    """Return a line for each sentence of more than `LONGEST` words."""
+    found = []
+    for file in files(paths):
+        for passage in passages(file):
+            for sentence in re.split(r"(?<=[.!?:;])\s+|\n\s*\n", passage.text):
+                if (words := len(sentence.split())) > LONGEST and "|" not in sentence:
+                    found.append(
+                        f"{passage.file}:{passage.line}: {words} words: {' '.join(sentence.split())[:80]}"
+                    )
+    return found
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "paths", nargs="*", type=Path, default=[ROOT / "urdfkin", ROOT / "docs", ROOT / "README.md"]
+    )
+    parser.add_argument("--long", action="store_true", help="list long sentences instead")
+    options = parser.parse_args()
+    chosen = [path.resolve() for path in options.paths]
+    lines = long_sentences(chosen) if options.long else complaints(chosen)
+    print("\n".join(lines))
+    sys.exit(bool(lines) and not options.long)

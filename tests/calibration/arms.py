@@ -1,0 +1,91 @@
+"""Arms with known errors, and poses measured on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from urdfkin.calibration.parameters import Model, urdf_model
+from urdfkin.kinematics.rotation import exp_rotation
+from urdfkin.loading import load
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+
+#: Revolute, prismatic and continuous joints, about and along axes of every kind, on two branches.
+BRANCHED = """<?xml version="1.0"?>
+<!-- measured on the bench; do not touch -->
+<robot name="branched">
+  <link name="trunk"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="hand"/>
+  <joint name="one" type="continuous">
+    <parent link="trunk"/><child link="a"/>
+    <origin xyz="0.1 0.2 0.3"   rpy='0.1 -0.2 1.5'/>
+    <axis xyz="0 -1 0"/>
+  </joint>
+  <joint name="two" type="prismatic"><parent link="a"/><child link="b"/>
+    <axis xyz="0.6 0 0.8"/> <!-- no origin -->
+    <limit lower="-0.5" upper="0.5" effort="1" velocity="1"/></joint>
+  <joint name="three" type="revolute">
+    <origin
+        rpy="1.5707963267948966 0 0"
+        xyz="0 0.3 0"/>
+    <parent link="trunk"/>
+    <child link="c"/>
+    <axis xyz="0.48 0.6 0.64"/>
+    <limit lower="-2" upper="2" effort="1" velocity="1"/>
+  </joint>
+  <joint name="four" type="continuous"><parent link="c"/><child link="d"/><origin xyz="0.4 0 0.1"/>
+    <axis xyz="0 0 1"/></joint>
+  <joint name="fix" type="fixed"><parent link="d"/><child link="hand"/><origin xyz="0.05 0.06 0.07"/></joint>
+</robot>
+"""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A robot, the truth about its parameters, and poses of the true one."""
+
+    robot: Robot
+    model: Model
+    truth: FloatArray
+    q: FloatArray
+    T: FloatArray
+
+    def noisy(self, metres: float, radians: float, seed: int) -> FloatArray:
+        """(s, 4, 4) the poses as an instrument with this noise shows them."""
+        rng = np.random.default_rng(seed)
+        T, s = self.T.copy(), len(self.T)
+        T[:, :3, 3] += metres * rng.standard_normal((s, 3))
+        T[:, :3, :3] = exp_rotation(radians * rng.standard_normal((s, 3))) @ T[:, :3, :3]
+        return T
+
+
+def bench(
+    name: str,
+    fit: tuple[str, ...],
+    tip: str,
+    base: str,
+    *,
+    poses: int = 30,
+    error: float = 2e-3,
+    seed: int = 0,
+) -> Bench:
+    """A robot whose every parameter is off by some `error` (m, rad), ends not."""
+    robot = load(name, verify=False)
+    model = urdf_model(robot.tree, tip, base, fit)
+    rng = np.random.default_rng(seed)
+    truth = error * rng.standard_normal(len(model.way.parameters))
+    truth[[p.end for p in model.way.parameters]] = 0.0
+    q = robot.sample(poses, seed)
+    values = model.coupling.values(model.coupling.select(robot.tree, q))
+    return Bench(robot, model, truth, q, model.way.poses(values, truth))
+
+
+def pose(seed: int, away: float) -> FloatArray:
+    """(4, 4) any orientation, and a place at a distance."""
+    rng = np.random.default_rng(seed)
+    T = np.eye(4)
+    T[:3, :3] = exp_rotation(rng.uniform(-2.0, 2.0, 3))
+    direction = rng.standard_normal(3)
+    T[:3, 3] = away * direction / np.linalg.norm(direction)
+    return T

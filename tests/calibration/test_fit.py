@@ -1,0 +1,206 @@
+"""Known errors are found again, as closely as the noise allows and with the covariance that is said."""
+
+from __future__ import annotations
+
+import io
+import re
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from tests.calibration.arms import BRANCHED, Bench, bench, pose
+from tests.calibration.test_way import table
+from urdfkin.calibration.calibrate import Calibration, calibrate, doubts
+from urdfkin.calibration.parameters import table_model
+from urdfkin.dh.table import Convention
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.kinematics.rotation import log_rotation
+from urdfkin.loading import load
+from urdfkin.model.tree import FloatArray
+from urdfkin.report.calibration import print_calibration
+
+ENDS = ("base", "tool")
+
+
+def elsewhere(arm: Bench, at: FloatArray, n: int = 20) -> FloatArray:
+    """(n, 4, 4) poses at configurations that were not measured."""
+    values = arm.model.coupling.values(arm.model.coupling.select(arm.robot.tree, arm.robot.sample(n, 99)))
+    return arm.model.way.poses(values, at)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize(("arm", "tip", "base"), [("ur5", "tool0", "base"), (BRANCHED, "hand", "b")])
+def test_without_noise_the_true_arm_is_found_to_rounding(
+    arm: str, tip: str, base: str, complete: bool
+) -> None:
+    true = bench(arm, ("origins",), tip, base)
+    found = calibrate(true.robot, true.q, true.T if complete else true.T[:, :3, 3], tip=tip, base=base)
+    assert found.fitted is not None
+    away = elsewhere(true, found.fitted.at) - elsewhere(true, true.truth)
+    assert np.abs(away[:, :3, 3] if not complete else away).max() < 1e-13
+    assert found.certificate is not None
+    assert found.certificate.verified
+    written = load(found.written.text, verify=False)
+    q = true.robot.sample(20, 99)
+    T = np.linalg.solve(written.placement(q, base), written.placement(q, tip))
+    assert np.abs(T - elsewhere(true, found.fitted.at)).max() < 1e-13
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("complete", [True, False])
+def test_the_instrument_and_its_target_may_be_anywhere(complete: bool) -> None:
+    true = bench("panda", ("origins",), "panda_hand", "panda_link0", poses=40)
+    B, X = pose(1, 4.0), pose(2, 0.3)
+    T = B @ true.T @ X
+    poses = T if complete else T[:, :3, 3]
+    tip, base = "panda_hand", "panda_link0"
+    found = calibrate(true.robot, true.q, poses, tip=tip, base=base, fit=[*ENDS, "origins"])
+    assert found.fitted is not None
+    assert found.fitted.rms()[0] < 1e-13
+    rough = calibrate(true.robot, true.q, poses, tip=tip, base=base, fit=ENDS)
+    assert rough.base is not None
+    assert rough.tool is not None
+    # The arm's errors of 2 mm and 2 mrad a joint are what these are off by.
+    assert np.linalg.norm(rough.base[:3, 3] - B[:3, 3]) < 0.02
+    assert np.linalg.norm(rough.tool[:3, 3] - X[:3, 3]) < 0.02
+
+
+def test_joints_that_are_called_as_the_ends_are_no_ends() -> None:
+    text = BRANCHED.replace('"three"', '"base"').replace('"four"', '"tool"')
+    true = bench(text, ("origins",), "hand", "trunk")
+    B, X = pose(1, 4.0), pose(2, 0.3)
+    found = calibrate(true.robot, true.q, B @ true.T @ X, tip="hand", base="trunk", fit=[*ENDS, "origins"])
+    assert found.fitted is not None
+    assert found.fitted.rms()[0] < 1e-13
+    assert set(found.origins) <= {"base", "tool", "fix"}
+    assert found.base is not None
+    assert np.abs(found.base - B).max() < 0.05
+
+
+def test_joints_zeros_alone_are_found() -> None:
+    true = bench(BRANCHED, ("offsets",), "hand", "trunk", error=0.05)
+    found = calibrate(true.robot, true.q, true.T, tip="hand", base="trunk", fit=["offsets"])
+    assert [str(parameter) for parameter in found.parameters] == ["three rz", "four rz"]
+    np.testing.assert_allclose(found.values, true.truth, atol=1e-14)
+
+
+def test_gains_are_found_and_not_written() -> None:
+    true = bench("ur5", ("gains",), "tool0", "base", error=1e-3)
+    found = calibrate(true.robot, true.q, true.T, tip="tool0", base="base", fit=["gains"])
+    np.testing.assert_allclose(found.values, true.truth, atol=1e-14)
+    assert found.written.text == true.robot.urdf.encode()
+    assert any(line.startswith("a URDF has no gains: ") for line in doubts(found))
+
+
+@pytest.mark.parametrize("convention", list(Convention))
+def test_a_tables_cells_are_found_with_a_fifth_where_axes_are_parallel(convention: Convention) -> None:
+    drawn = table(convention)
+    model = table_model(drawn, ("origins",))
+    truth = model.way.start + 2e-3 * np.random.default_rng(4).standard_normal(len(model.way.start))
+    q = np.random.default_rng(5).uniform(-1.5, 1.5, (40, 4))
+    found = calibrate(drawn, q, model.way.poses(q, truth))
+    assert found.table is not None
+    assert found.fitted is not None
+    assert found.fitted.rms()[0] < 1e-14
+    np.testing.assert_allclose(found.table.placement(q), model.way.poses(q, truth), atol=1e-13)
+    assert found.table.convention is convention
+    assert max(abs(row.d) for row in found.table.rows) < 0.5
+
+
+def whitened(true: Bench, found: Calibration) -> float:
+    """chi^2, of 6 numbers, of where the tip is found to be at a configuration that was not measured."""
+    assert found.fitted is not None
+    values = true.model.coupling.values(true.model.coupling.select(true.robot.tree, true.robot.sample(1, 99)))
+    T, columns = found.model.way.columns(values, found.fitted.at)
+    J = columns[0][:, list(found.identification.kept)]
+    S = true.model.way.poses(values, true.truth)
+    turn = log_rotation(S[0, :3, :3] @ T[0, :3, :3].T)
+    away = np.hstack([S[0, :3, 3] - T[0, :3, 3], turn])
+    return float(away @ np.linalg.solve(J @ found.fitted.covariance @ J.T, away))
+
+
+@pytest.mark.slow
+def test_the_covariance_and_the_noise_are_what_they_are_said_to_be() -> None:
+    true = bench("ur5", ("origins",), "tool0", "base", poses=40)
+    metres, radians = 2e-4, 5e-4
+    seeds = range(20)
+    every = [
+        calibrate(true.robot, true.q, true.noisy(metres, radians, seed), tip="tool0", base="base")
+        for seed in seeds
+    ]
+    # chi^2 of 120 has the standard deviation 15.5; that of estimated noise is a little wider.
+    assert 75.0 < sum(whitened(true, found) for found in every) < 180.0
+    noise = np.array([(f.fitted.noise.metres, f.fitted.noise.radians) for f in every if f.fitted])
+    np.testing.assert_allclose(np.sqrt((noise**2).mean(axis=0)), [metres, radians], rtol=0.05)
+    # One campaign in a hundred has a pose that is called odd wrongly.
+    assert sum(bool(found.odd) for found in every) <= 2
+    T = true.noisy(1e-4, 1e-4, 0)
+    stated = calibrate(true.robot, true.q, T, tip="tool0", base="base", noise=(1e-4, 1e-4))
+    assert stated.fitted is not None
+    assert abs(stated.fitted.ratio - 1.0) < 4.0 * stated.fitted.spread
+    assert not doubts(stated)
+    wrong = calibrate(true.robot, true.q, T, tip="tool0", base="base", noise=(4e-5, 4e-5))
+    assert re.match(r"2\.[3-7]\d* times the noise that was stated is left", doubts(wrong)[0])
+
+
+@pytest.mark.slow
+def test_odd_poses_are_told_and_left_out_only_if_that_is_wanted() -> None:
+    true = bench("ur5", ("origins",), "tool0", "base", poses=60)
+    T = true.noisy(1e-4, 2e-4, 7)
+    T[17, :3, 3] += [5e-3, 0.0, 0.0]
+    T[40, 0, 3] -= 4e-3
+    found = calibrate(true.robot, true.q, T, tip="tool0", base="base")
+    assert found.odd == (17, 40)
+    assert "poses 17, 40 do not belong to the others" in doubts(found)[0]
+    assert found.fitted is not None
+    assert len(found.fitted.errors) == 60
+    clean = calibrate(true.robot, true.q, T, tip="tool0", base="base", drop_odd=True)
+    assert clean.fitted is not None
+    assert len(clean.fitted.errors) == 58
+    assert clean.fitted.noise.metres < 1.2e-4 < found.fitted.noise.metres
+    assert doubts(clean) == ["poses 17, 40 are left out"]
+
+
+def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
+    true = bench("ur5", ("origins",), "tool0", "base", poses=5)
+    T = true.noisy(1e-4, 1e-4, 0)
+    with pytest.raises(InputError, match="nothing is left to judge the fit by"):
+        calibrate(true.robot, true.q, T, tip="tool0", base="base")
+    found = calibrate(true.robot, true.q, T, tip="tool0", base="base", force=True)
+    assert found.identification.rank == 30
+    assert found.written_parameters == ()
+    out = io.StringIO()
+    print_calibration(found, Console(file=out, width=200))
+    assert "noise: unknown, no number is left to estimate it from" in out.getvalue()
+    assert not np.isfinite(found.deviations[list(found.identification.kept)]).any()
+    assert any("no number is left to judge by" in line for line in doubts(found))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"poses": np.zeros((3, 2))}, "positions (n, 3)"),
+        ({"poses": np.zeros((2, 4, 4))}, "a pose is a rotation"),
+        ({"poses": np.zeros((2, 3))}, "each pose needs its configuration"),
+        ({"q": np.zeros((0, 6)), "poses": np.zeros((0, 3))}, "no poses"),
+        ({"poses": None}, "q and poses are given together"),
+        ({"q": np.eye(3, 6), "poses": 1e3 * np.eye(3)}, "say --unit mm"),
+        ({"noise": (0.0, 1.0)}, "noise is more than nothing"),
+        ({"noise": 1.0}, "noise is two numbers"),
+        ({"fit": []}, "nothing is to be fitted"),
+        ({"fit": "origins"}, "are a list of names"),
+        ({"tip": 5}, "tip is a name"),
+    ],
+)
+def test_bad_input_is_told(change: dict[str, object], words: str) -> None:
+    arguments = {"q": np.zeros((3, 6)), "poses": np.eye(3), "tip": "tool0"} | change
+    with pytest.raises(InputError) as error:
+        calibrate(load("ur5", verify=False), **arguments)  # type: ignore[arg-type]
+    assert words in str(error.value)
+
+
+def test_an_unknown_set_of_parameters_offers_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="offsets"):
+        calibrate("ur5", fit=["offset"])

@@ -1,0 +1,233 @@
+"""A fit to wrong data is refused with the mistake that was made; a good one never is."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.calibration.arms import BRANCHED, Bench, bench, pose
+from tests.calibration.test_way import table
+from urdfkin.calibration.calibrate import Calibration, ImplausibleError, calibrate
+from urdfkin.calibration.parameters import table_model
+from urdfkin.dh.table import Convention
+from urdfkin.model.tree import FloatArray
+
+ALL = ["base", "tool", "origins"]
+#: Text or name, tip, base.
+ARMS = {
+    "ur5": ("ur5", "tool0", "base"),
+    "panda": ("panda", "panda_hand", "panda_link0"),
+    "z1": ("z1", "link06", "link00"),
+    "branched": (BRANCHED, "hand", "trunk"),
+    "through the trunk": (BRANCHED, "hand", "b"),
+}
+
+
+SLOW = [
+    name if name in ("ur5", "through the trunk") else pytest.param(name, marks=pytest.mark.slow)
+    for name in ARMS
+]
+
+
+@cache
+def arm(name: str) -> Bench:
+    """An arm whose every parameter is off by 2 mm or 2 mrad."""
+    text, tip, base = ARMS[name]
+    return bench(text, ("origins",), tip, base, poses=30)
+
+
+def fitted(
+    name: str, q: FloatArray, *, complete: bool = True, fit: list[str] | None = None, **how: object
+) -> Calibration:
+    true = arm(name)
+    T = pose(1, 2.0) @ true.noisy(1e-4, 2e-4, 3) @ pose(2, 0.2)
+    wanted = ALL if fit is None else fit
+    poses = T if "base" in wanted else true.noisy(1e-4, 2e-4, 3)
+    _, tip, base = ARMS[name]
+    return calibrate(
+        true.robot,
+        q,
+        poses if complete else poses[:, :3, 3],
+        tip=tip,
+        base=base,
+        fit=wanted,
+        **how,  # type: ignore[arg-type]
+    )
+
+
+def refused(name: str, q: FloatArray, *, complete: bool = True, fit: list[str] | None = None) -> str:
+    with pytest.raises(ImplausibleError) as error:
+        fitted(name, q, complete=complete, fit=fit)
+    return str(error.value)
+
+
+def reason(name: str, q: FloatArray, *, complete: bool = True, fit: list[str] | None = None) -> str:
+    return refused(name, q, complete=complete, fit=fit).split("likeliest reason: ")[1]
+
+
+@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize("fit", [ALL, ["origins"]], ids=["anywhere", "origins"])
+@pytest.mark.parametrize("name", SLOW)
+def test_joint_angles_in_degrees_are_named(name: str, fit: list[str], complete: bool) -> None:
+    true = arm(name)
+    slides = [joint == "two" for joint in true.robot.coordinate_names]
+    q = np.where(slides, true.q, np.degrees(true.q))
+    assert reason(name, q, fit=fit, complete=complete).startswith("joint angles are in degrees")
+
+
+def test_all_values_multiplied_by_57_are_named_where_one_of_them_slides() -> None:
+    name = "through the trunk"
+    assert "multiplied by 180/pi" in reason(name, np.degrees(arm(name).q))
+
+
+@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize("by", [1, -1, 2])
+@pytest.mark.parametrize("name", SLOW)
+def test_rows_of_q_that_are_shifted_are_named(name: str, by: int, complete: bool) -> None:
+    said = reason(name, np.roll(arm(name).q, by, axis=0), complete=complete)
+    rows = "one row" if abs(by) == 1 else "2 rows"
+    way = "later" if by > 0 else "earlier"
+    assert said.startswith(
+        f"q is shifted by {rows} against the poses; the q of each pose stands {rows} {way}"
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fit", [ALL, ["origins"]], ids=["anywhere", "origins"])
+@pytest.mark.parametrize("name", list(ARMS))
+def test_the_joint_whose_sign_is_wrong_is_named(name: str, fit: list[str]) -> None:
+    true = arm(name)
+    for joint, column in zip(
+        true.model.coupling.names, true.model.coupling.q_index(true.robot.tree), strict=True
+    ):
+        q = true.q.copy()
+        q[:, column] *= -1.0
+        said = refused(name, q, fit=fit)
+        if "base" in fit and joint in _ABSORBED.get(name, ()):
+            assert "the sign" in said
+        else:
+            assert f"likeliest reason: the sign of joint {joint!r} is wrong" in said, said
+
+
+#: Joints whose reversed sign the free base or tool does as well, together with another one's zero.
+_ABSORBED = {"branched": ("three", "four")}
+
+
+def test_two_wrong_signs_are_named() -> None:
+    q = arm("ur5").q * [1.0, -1.0, 1.0, 1.0, -1.0, 1.0]
+    said = reason("ur5", q, fit=["origins"])
+    assert said.startswith("the signs of joints 'shoulder_lift_joint', 'wrist_2_joint' are wrong")
+
+
+def test_a_gain_or_a_tilted_axis_does_not_hide_a_wrong_sign() -> None:
+    q = arm("ur5").q * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]
+    assert "'elbow_joint' is wrong" in reason("ur5", q, fit=["origins", "gains"])
+    q = arm("ur5").q
+    assert "degrees" in reason("ur5", np.degrees(q), fit=["origins", "gains"])
+    # Positions alone are met exactly by an axis that is turned about.
+    q = arm("through the trunk").q.copy()
+    q[:, arm("through the trunk").robot.coordinate_names.index("three")] *= -1.0
+    said = refused("through the trunk", q, complete=False, fit=["origins"])
+    assert "'three' is wrong" in said
+
+
+def test_sliding_joints_in_millimetres_are_named() -> None:
+    name = "through the trunk"
+    slides = [joint == "two" for joint in arm(name).robot.coordinate_names]
+    assert reason(name, np.where(slides, 1e3 * arm(name).q, arm(name).q)).startswith(
+        "sliding joints are in mill"
+    )
+
+
+def test_a_tables_data_are_judged_as_a_robots() -> None:
+    drawn = table(Convention.STANDARD)
+    model = table_model(drawn, ("origins",))
+    q = np.random.default_rng(5).uniform(-1.5, 1.5, (40, 4))
+    T = model.way.poses(q, model.way.start + 1e-3)
+    calibrate(drawn, q, T)
+    with pytest.raises(ImplausibleError, match="q is shifted by one row"):
+        calibrate(drawn, np.roll(q, 1, axis=0), T)
+    with pytest.raises(ImplausibleError, match="the sign of joint"):
+        calibrate(drawn, q * [1.0, -1.0, 1.0, 1.0], T)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize("name", list(ARMS))
+def test_good_data_are_never_refused(name: str, complete: bool) -> None:
+    text, tip, base = ARMS[name]
+    for error, noise, poses, seed in [
+        (2e-3, 0.0, 20, 0),
+        (0.0, 1e-3, 40, 1),  # calibrated already: nothing is left but noise
+        (1e-3, 5e-3, 60, 2),
+        (1e-2, 1e-4, 15, 3),
+        (3e-2, 1e-5, 30, 4),
+    ]:
+        true = bench(text, ("origins",), tip, base, poses=poses, error=error, seed=seed)
+        T = true.noisy(noise, noise, seed)
+        for fit in (["origins"], ALL):
+            found = calibrate(true.robot, true.q, T if complete else T[:, :3, 3], tip=tip, base=base, fit=fit)
+            assert not found.plausibility.objections
+
+
+def test_other_wrong_data_are_refused_without_a_reason() -> None:
+    q = np.random.default_rng(0).permutation(arm("ur5").q)
+    said = refused("ur5", q)
+    assert "of the reach" in said
+    assert "do not explain it" in said
+
+
+def test_few_distinct_configurations_are_refused() -> None:
+    q = arm("ur5").q
+    true = np.tile(np.arange(4), 8)[:30]
+    T = arm("ur5").noisy(1e-4, 1e-4, 0)[true]
+    with pytest.raises(
+        ImplausibleError, match="4 distinct configurations among 30 poses give 24 numbers for 24"
+    ):
+        calibrate(arm("ur5").robot, q[true], T, tip="tool0", base="base")
+    jittered = q[true] + 1e-8 * np.random.default_rng(0).standard_normal((30, 6))
+    with pytest.raises(ImplausibleError, match="distinct configurations among 30 poses"):
+        calibrate(arm("ur5").robot, jittered, T, tip="tool0", base="base")
+
+
+def test_values_beyond_a_turn_are_taken_for_degrees_unless_they_are_said_to_be_radians() -> None:
+    true = arm("branched")
+    q = true.q.copy()
+    q[:, true.robot.coordinate_names.index("four")] += 4.0 * np.pi  # a continuous joint, wound up
+    said = refused("branched", q, fit=["origins"])
+    assert "values beyond a turn look like degrees: joint 'four'" in said
+    found = fitted("branched", q, fit=["origins"], radians=True)
+    assert not found.plausibility.objections
+
+
+def test_a_refused_fit_is_had_by_force() -> None:
+    found = fitted("ur5", np.roll(arm("ur5").q, 1, axis=0), force=True)
+    assert found.plausibility.objections
+    assert found.plausibility.reason is not None
+
+
+def test_only_parameters_beyond_two_standard_deviations_are_written() -> None:
+    drawn = arm("ur5").robot
+    model = arm("ur5").model
+    names = [str(parameter) for parameter in model.way.parameters]
+    truth = np.zeros(len(names))
+    truth[names.index("elbow_joint y")] = 1e-3
+    values = model.coupling.values(model.coupling.select(drawn.tree, drawn.sample(60, 5)))
+    q, T = drawn.sample(60, 5), model.way.poses(values, truth)
+    T[:, :3, 3] += 5e-5 * np.random.default_rng(1).standard_normal((60, 3))
+    few = calibrate(drawn, q, T, tip="tool0", base="base")
+    every = calibrate(drawn, q, T, tip="tool0", base="base", every=True)
+    assert len(every.written_parameters) == every.identification.rank
+    assert len(few.written_parameters) <= 4
+    assert few.written_fit is not None
+    assert few.fitted is not None
+    assert every.fitted is not None
+    assert (every.fitted.at == few.fitted.at).all()
+    # What is written moves the tip as the truth does, within the noise.
+    assert (
+        np.abs(few.model.way.poses(values, few.written_fit.at) - model.way.poses(values, truth)).max() < 1e-4
+    )
+    moved = set(few.origins)
+    assert moved == {few.parameters[k].where for k in few.written_parameters}

@@ -1,0 +1,165 @@
+"""How the tip moves with each parameter, against difference quotients at fifty digits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.calibration.arms import BRANCHED
+from urdfkin.calibration.parameters import Model, table_model, urdf_model
+from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.kinematics import equations as eq
+from urdfkin.kinematics.rotation import axis_aligning
+from urdfkin.loading import load
+from urdfkin.model.pose import inverse
+from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.verify.exact.numbers import (
+    IDENTITY,
+    ZERO,
+    ExactJoint,
+    Matrix,
+    Number,
+    Vector,
+    about,
+    exact,
+    mp,
+    read_exact,
+)
+from urdfkin.verify.exact.recursion import move
+
+#: Small enough that its square is no digit of a double, large enough to keep twenty of fifty digits.
+STEP = mp.mpf(10) ** -20
+Pose = tuple[Matrix, Vector]
+
+
+def vector(x: FloatArray) -> Vector:
+    return exact(x[0]), exact(x[1]), exact(x[2])
+
+
+def matrix(R: FloatArray) -> Matrix:
+    return vector(R[0]), vector(R[1]), vector(R[2])
+
+
+def joined(T: Pose, S: Pose) -> Pose:
+    return eq.product(T[0], S[0]), eq.plus(T[1], eq.rotate(T[0], S[1]))
+
+
+def back(T: Pose) -> Pose:
+    R = eq.transposed(T[0])
+    return R, eq.times(-1, eq.rotate(R, T[1]))
+
+
+def elementary(turns: bool, axis: int, value: Number) -> Pose:
+    if turns:
+        return about(IDENTITY[axis], value, mp), ZERO
+    x, y, z = eq.times(value, IDENTITY[axis])
+    return IDENTITY, (x, y, z)
+
+
+def quotients(model: Model, tip: Callable[[dict[int, Number]], Pose]) -> FloatArray:
+    """(6, p) twists of the tip for each parameter, of poses at fifty digits."""
+    found = np.zeros((6, len(model.way.parameters)))
+    here = tip({})
+    for k in range(len(model.way.parameters)):
+        (R_1, p_1), (R_2, p_2) = tip({k: -STEP}), tip({k: STEP})
+        rate = [eq.times(1 / (2 * STEP), eq.minus(y, x)) for x, y in zip(R_1, R_2, strict=True)]
+        W = eq.product(tuple(rate), eq.transposed(here[0]))
+        found[:, k] = [
+            float(x) for x in (*eq.times(1 / (2 * STEP), eq.minus(p_2, p_1)), W[2][1], W[0][2], W[1][0])
+        ]
+    return found
+
+
+def six(model: Model, where: str, moved: dict[int, Number]) -> Pose:
+    """What the six of a place do."""
+    push: Pose = IDENTITY, ZERO
+    for k, parameter in enumerate(model.way.parameters):
+        if parameter.where == where and parameter.what != "gain":
+            axis = "xyz".index(parameter.what[-1])
+            push = joined(push, elementary(parameter.what[0] == "r", axis, moved.get(k, 0)))
+    return push
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("base", "tip"), [("trunk", "hand"), ("b", "hand"), ("hand", "b")])
+def test_a_urdfs_columns_are_the_difference_quotients_of_its_text_at_fifty_digits(
+    base: str, tip: str
+) -> None:
+    robot = load(BRANCHED, verify=False)
+    model = urdf_model(robot.tree, tip, base, ("base", "tool", "origins", "gains"))
+    q = robot.sample(1, 3)[0]
+    joints = read_exact(robot.urdf, robot.tree)
+    numbers = {(p.where, p.what): k for k, p in enumerate(model.way.parameters)}
+
+    def moved_joint(name: str, own: ExactJoint, moved: dict[int, Number]) -> ExactJoint:
+        joint = robot.tree.joints[robot.tree.joint_index(name)]
+        A = matrix(axis_aligning(joint.axis)) if joint.kind.has_axis else IDENTITY
+        turned: Pose = A, ZERO
+        R, p = joined((own.R, own.p), joined(joined(turned, six(model, name, moved)), back(turned)))
+        gain = 1 + moved.get(numbers.get((name, "gain"), -1), 0)
+        return replace(own, R=R, p=p, multiplier=own.multiplier * gain)
+
+    def place(moved: dict[int, Number]) -> Pose:
+        names = [robot.tree.joints[i].name for i in joints]
+        changed = {i: moved_joint(n, own, moved) for (i, own), n in zip(joints.items(), names, strict=True)}
+        states = move(robot.tree, changed, list(map(exact, q)), [0] * robot.nv, [0] * robot.nv).states
+        ends = [states[robot.tree.frame_link(name)] for name in (base, tip)]
+        way = joined(back((ends[0].R, ends[0].p)), (ends[1].R, ends[1].p))
+        return joined(joined(six(model, "base", moved), way), six(model, "tool", moved))
+
+    values = model.coupling.values(model.coupling.select(robot.tree, q[np.newaxis]))
+    columns = model.way.columns(values)[1][0]
+    bound = model.way.rounding(values)
+    difference = np.abs(columns - quotients(model, place))
+    assert difference[:3].max() < bound
+    assert difference[3:].max() < bound / model.way.size
+
+
+def table(convention: Convention) -> DHTable:
+    rows = (
+        DHRow(0.1, 1.2, 0.3, 0.4, JointKind.REVOLUTE, "one"),
+        DHRow(0.5, 1e-3, 0.0, -0.2, JointKind.REVOLUTE, "two", beta=2e-3),
+        DHRow(0.4, -1.5, 0.2, 0.7, JointKind.PRISMATIC, "three", sense=-1),
+        DHRow(0.0, 0.0, 0.1, 0.0, JointKind.CONTINUOUS, "four"),
+    )
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = axis_aligning([0.6, 0.0, 0.8]), (0.1, 0.2, 0.3)
+    return DHTable(convention, rows, base=T, tool=inverse(T))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("convention", list(Convention))
+def test_a_tables_columns_are_the_difference_quotients_of_its_product_at_fifty_digits(
+    convention: Convention,
+) -> None:
+    dh = table(convention)
+    model = table_model(dh, ("base", "tool", "origins", "gains"))
+    names = [(p.where, p.what) for p in model.way.parameters]
+    assert [where for where, what in names if what == "beta"] == ["two", "four"]
+    numbers, q = {name: k for k, name in enumerate(names)}, np.array([[0.3, -0.5, 0.2, 1.1]])
+
+    def place(moved: dict[int, Number]) -> Pose:
+        def at(where: str, what: str, value: float) -> Number:
+            return exact(value) + moved.get(numbers.get((where, what), -1), 0)
+
+        T = joined(six(model, "base", moved), (matrix(dh.base[:3, :3]), vector(dh.base[:3, 3])))
+        for i, row in enumerate(dh.rows):
+            value = row.sense * exact(q[0, i]) * (1 + moved.get(numbers[row.joint, "gain"], 0))
+            theta, d = at(row.joint, "theta", row.theta), at(row.joint, "d", row.d)
+            theta, d = (theta + value, d) if row.kind.turns else (theta, d + value)
+            S = joined(elementary(True, 2, theta), elementary(False, 2, d))
+            a, alpha = at(row.joint, "a", row.a), at(row.joint, "alpha", row.alpha)
+            X = joined(elementary(False, 0, a), elementary(True, 0, alpha))
+            X = joined(X, elementary(True, 1, at(row.joint, "beta", row.beta)))
+            T = joined(T, joined(S, X) if convention is Convention.STANDARD else joined(X, S))
+        T = joined(T, (matrix(dh.tool[:3, :3]), vector(dh.tool[:3, 3])))
+        return joined(T, six(model, "tool", moved))
+
+    values = dh.coupling.values(q)
+    poses, columns = model.way.columns(values)
+    np.testing.assert_allclose(poses, dh.placement(q), atol=1e-14)
+    difference = np.abs(columns[0] - quotients(model, place))
+    assert difference.max() < model.way.rounding(values)

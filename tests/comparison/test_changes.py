@@ -1,0 +1,95 @@
+"""`diff`: what a reviewer would say of two versions, and what each change moves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as run
+from urdfkin.comparison.diff import Change
+from urdfkin.report.diff import markdown_of
+
+OLD = """<robot name="arm">
+  <link name="base"/>
+  <link name="upper"><inertial><mass value="2"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+  <link name="lower"><visual><geometry><box size="1 1 1"/></geometry></visual></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+    <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/>
+    <origin xyz="0.4 0 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+</robot>"""
+FIXED = (
+    '<link name="{1}"/><joint name="{0}" type="fixed"><parent link="lower"/><child link="{1}"/>'
+    '<origin xyz="{2} 0 0"/></joint></robot>'
+)
+NEW = (
+    OLD.replace('xyz="0.4 0 0"', 'rpy="0 0 0" xyz="0.425 0 0"')
+    .replace('mass value="2"', 'mass value="2.5"')
+    .replace('upper="2"', 'upper="1.5"', 1)
+    .replace("</robot>", FIXED.format("flange", "tool", 0))
+)
+
+
+def test_each_attribute_is_told_and_what_means_the_same_is_not() -> None:
+    assert [str(change) for change in urdfkin.diff(OLD, NEW).changes] == [
+        "joint shoulder: limit upper 2 -> 1.5",
+        "joint elbow: origin x 0.4 -> 0.425",
+        "joint flange: new",
+        "link upper: inertial mass 2 -> 2.5",
+        "link tool: new",
+    ]
+    assert not urdfkin.diff(OLD, OLD.replace("0.4 0 0", "4e-1 0.0 -0"))
+
+
+def test_a_joints_effect_is_its_own_and_the_total_is_of_all() -> None:
+    found = urdfkin.diff(OLD, NEW)
+    [effect] = found.effects
+    assert effect.element == "joint elbow"
+    assert effect.interval.frame == "lower"
+    assert effect.interval.lower == pytest.approx(0.025, rel=1e-9)
+    # What is moved and not turned is as far off everywhere: the bound is the length itself.
+    assert effect.interval.lower <= effect.interval.upper == pytest.approx(0.025, rel=1e-9)
+    assert found.total is not None
+    assert found.total.lower == pytest.approx(0.025, rel=1e-9)
+
+
+def test_two_changes_that_undo_each_other_move_less_together() -> None:
+    three = OLD.replace("</robot>", FIXED.format("wrist", "tip", 0.3))
+    bent = three.replace('xyz="0.4 0 0"', 'xyz="0.4 0 0" rpy="0 0 0.5"')
+    bent = bent.replace('xyz="0.3 0 0"', 'xyz="0.3 0 0" rpy="0 0 -0.5"')
+    found = urdfkin.diff(three, bent)
+    assert str(found.effects[1]).startswith("alone turns tip by up to 500 mrad")
+    assert found.total is not None
+    assert found.total.lower == pytest.approx(2 * 0.3 * 0.24740395925452294, rel=1e-6)  # a chord of 0.5 rad
+
+
+def test_a_change_of_name_alone_is_told_and_moves_nothing() -> None:
+    found = urdfkin.diff(OLD, OLD.replace('name="arm"', 'name="leg"'))
+    assert found.changes == (Change("robot", "name", "arm", "leg"),)
+    assert (found.effects, found.total) == ((), None)
+
+
+def test_the_command_says_it_in_every_form(tmp_path: Path) -> None:
+    (tmp_path / "old.urdf").write_text(OLD)
+    (tmp_path / "new.urdf").write_text(NEW)
+    old, new, page = (str(tmp_path / name) for name in ("old.urdf", "new.urdf", "comment.md"))
+    done = run("diff", old, new, "--markdown", page)
+    assert done.code == 1
+    assert "joint elbow: origin x 0.4 -> 0.425\n    alone moves lower by up to 25 mm" in done.text
+    assert (
+        "| joint elbow | origin x | 0\\.4 | 0\\.425 | moves lower by up to 25 mm |" in Path(page).read_text()
+    )
+    assert "| link tool: new |" in Path(page).read_text()
+    assert run("diff", old, new, "--no-effects", "--format", "json").data["effects"] == []
+    assert run("diff", old, old).code == 0
+    assert run("diff", old, "nowhere.urdf").code == 2
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_strangers_names_stay_names_in_markdown() -> None:
+    found = urdfkin.diff(OLD, OLD.replace('"lower"', '"&lt;b&gt;|@all"'), effects=False)
+    assert "<b>" not in markdown_of(found)
+    assert "|@all" not in markdown_of(found)

@@ -1,0 +1,257 @@
+"""The headline, the exit status and the page of `same` answer the question that was asked."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as run
+from urdfkin.comparison.certificate import certificate, recheck
+from urdfkin.comparison.result import Question, Verdict
+from urdfkin.robot import Robot
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+LIMIT = '<limit lower="{}" upper="{}" effort="1" velocity="1"/>'
+
+
+def arm(
+    mount: str = '<origin xyz="0 0 0"/>',
+    tool: str = '<origin xyz="0 0 0.1"/>',
+    second: str = "revolute",
+    limits: tuple[float, float] = (-1.0, 1.0),
+    shoulder: str = "0 0 0",
+) -> str:
+    """A world, a base that is mounted in it, two joints and a tool."""
+    limit = LIMIT.format(*limits)
+    return (
+        '<robot name="arm"><link name="world"/><link name="base"/><link name="upper"/><link name="lower"/>'
+        '<link name="tcp"/>'
+        f'<joint name="mount" type="fixed"><parent link="world"/><child link="base"/>{mount}</joint>'
+        '<joint name="turn" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.1" '
+        f'rpy="{shoulder}"/><axis xyz="0 0 1"/>{limit}</joint>'
+        f'<joint name="bend" type="{second}"><parent link="upper"/><child link="lower"/>'
+        f'<origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>{LIMIT.format(-1, 1)}</joint>'
+        f'<joint name="hold" type="fixed"><parent link="lower"/><child link="tcp"/>{tool}</joint></robot>'
+    )
+
+
+def finger(multiplier: float) -> str:
+    """Two fingers with the same limits, of which the second mirrors the first."""
+    limit = LIMIT.format(-0.005, 0.055)
+    return (
+        '<robot name="finger"><link name="palm"/><link name="a"/><link name="b"/>'
+        '<joint name="ja" type="prismatic"><parent link="palm"/><child link="a"/><axis xyz="0 0 -1"/>'
+        f'{limit}</joint><joint name="jb" type="prismatic"><parent link="palm"/><child link="b"/>'
+        f'<axis xyz="0 0 1"/>{limit}<mimic joint="ja" multiplier="{multiplier}"/></joint></robot>'
+    )
+
+
+def headline(a: str | Robot, b: str | Robot, **asked: float) -> str:
+    from urdfkin.report.same import headline as of  # noqa: PLC0415
+
+    return of(urdfkin.same(a, b, **asked), Question(**asked))  # type: ignore[arg-type]
+
+
+def test_a_tool_that_moved_is_equivalent_up_to_tools_and_is_not_within_less() -> None:
+    a, b = arm(), arm(tool='<origin xyz="0 0 0.15"/>')
+    found = urdfkin.same(a, b)
+    assert (found.verdict, found.up_to) == (Verdict.SAME_AFTER, ("tools",))
+    assert headline(a, b).startswith("EQUIVALENT up to tools")
+    assert "as written, tcp is 50 mm off" in headline(a, b)
+    assert not found.within(1e-6)
+    assert not found.within(0.0499)
+    assert found.within(0.0501)
+    assert [found.exit_code(within=most) for most in (None, 1e-6, 0.0501)] == [0, 1, 0]
+    asked = headline(a, b, within=1e-6)
+    assert asked.startswith("NOT WITHIN 1e-06 m and rad: as written, tcp is 50 mm off")
+
+
+def test_a_turned_tool_is_told_in_radians() -> None:
+    a, b = arm(), arm(tool='<origin xyz="0 0 0.1" rpy="0 0 0.02"/>')
+    assert "as written, tcp is 20 mrad off" in headline(a, b)
+    assert not urdfkin.same(a, b).within(0.019)
+
+
+def test_zeros_senses_and_the_base_count_as_written() -> None:
+    a, b = arm(), arm(shoulder="0 0 0.001")
+    found = urdfkin.same(a, b)
+    assert found.up_to == ("zeros",)
+    assert headline(a, b).startswith("EQUIVALENT up to zeros")
+    assert found.written[1] == pytest.approx(1e-3, rel=1e-6)
+    assert not found.within(1e-4)
+    assert found.within(1.001e-3)
+
+
+def test_what_differs_in_orientation_alone_is_told_in_radians() -> None:
+    a, b = arm(), arm().replace('<axis xyz="0 1 0"/>', '<axis xyz="0.01 1 0"/>')
+    a, b = (text.replace('<origin xyz="0 0 0.1"/>', "") for text in (a, b))
+    said = headline(a, b)
+    assert " 0 m " not in said
+    assert said.startswith("DIFFERS by up to ")
+    assert "mrad" in said.split(";")[0]
+    worst = max(urdfkin.same(a, b).frames, key=lambda frame: frame.radians_seen)
+    assert worst.radians_seen > 0.005
+
+
+def test_a_joint_of_another_kind_is_searched() -> None:
+    a, b = arm(), arm(second="prismatic")
+    found = urdfkin.same(a, b)
+    worst = found.worst
+    assert worst is not None
+
+    far = math.hypot(1.0, 0.1 * math.sin(1.0), 0.1 * (1.0 - math.cos(1.0)))  # a bend of 1 rad, a slide of 1 m
+    assert worst.lower == pytest.approx(far, rel=1e-3)
+    assert math.isinf(worst.upper)
+    assert headline(a, b).startswith("DIFFERS by 1.005 m or more and 1 rad or more (no bound is proven)")
+    assert not found.within(10.0)
+    robots = urdfkin.load(a), urdfkin.load(b)
+    assert recheck(json.loads(json.dumps(certificate(found))), *robots) == []
+
+
+@pytest.mark.parametrize("below", ["", '<link name="table"/>'])
+def test_a_robot_that_is_mounted_elsewhere_is_equivalent_up_to_the_base(below: str) -> None:
+    a, b = arm(), arm(mount='<origin xyz="1 0 0.5"/>')
+    if below:
+        joint = '<joint name="under" type="fixed"><parent link="{}"/><child link="{}"/></joint>'
+        more = below + joint.format("table", "world") + "</robot>"
+        a, b = (text.replace("</robot>", more) for text in (a, b))
+    found = urdfkin.same(a, b)
+    assert (found.verdict, found.up_to) == (Verdict.SAME_AFTER, ("base",))
+    assert found.differences == ()
+    assert len(found.after) == 1
+    assert "as written, base is 1.118 m off" in headline(a, b)
+    assert found.exit_code() == 0
+    assert found.exit_code(within=1.0) == 1
+    robots = urdfkin.load(a), urdfkin.load(b)
+    assert recheck(json.loads(json.dumps(certificate(found))), *robots) == []
+
+
+def test_a_frame_between_two_joints_of_the_base_is_no_mount() -> None:
+    more = (
+        '<link name="arm2"/><joint name="other" type="revolute"><parent link="world"/><child link="arm2"/>'
+        f"{LIMIT.format(-1, 1)}</joint></robot>"
+    )
+    a, b = (arm(mount=f'<origin xyz="{x} 0 0"/>').replace("</robot>", more) for x in (0.0, 1.0))
+    assert urdfkin.same(a, b, bounds=False).verdict is Verdict.DIFFERS
+
+
+def test_limits_that_differ_stand_in_the_headline() -> None:
+    a, b = arm(), arm(limits=(-1.0, 2.0))
+    assert headline(a, b).endswith("; limits of 1 joint differ")
+    assert headline("ur5", "ur5_limited").endswith("; limits of 5 joints differ")
+
+
+def test_intervals_cover_the_files_limits_where_mimic_joints_leave_theirs() -> None:
+    a, b = finger(-1.0), finger(-1.01)
+    found = urdfkin.same(a, b)
+    assert found.worst is not None
+    assert found.worst.lower == pytest.approx(550e-6, rel=1e-3)
+    assert [found.exit_code(within=most) for most in (1e-4, 5.49e-4, 5.6e-4)] == [1, 1, 0]
+    assert headline(a, b, within=1e-4).startswith("NOT WITHIN 0.0001 m and rad: as written, b is 0.55 mm")
+    own = "joint ja ranges over -0.005 to 0.055 m; its mimic joints keep their limits from"
+    assert found.narrowed == (
+        f"A: {own} -0.005 to 0.005 only (jb)",
+        f"B: {own} -0.005 to 0.0049505 only (jb)",
+    )
+
+
+def test_nothing_is_within_anything_where_no_bound_was_asked_for() -> None:
+    a, b = arm(), arm().replace('<axis xyz="0 1 0"/>', '<axis xyz="0.01 1 0"/>')
+    assert not urdfkin.same(a, b, bounds=False).within(1.0)
+
+
+def test_the_command_answers_what_was_asked(tmp_path: Path) -> None:
+    for name, text in (("a", arm()), ("b", arm(tool='<origin xyz="0 0 0.15"/>')), ("f", finger(-1.0))):
+        (tmp_path / f"{name}.urdf").write_text(text)
+    (tmp_path / "g.urdf").write_text(finger(-1.01))
+    a, b, f, g = (str(tmp_path / f"{name}.urdf") for name in "abfg")
+    assert run("same", a, b).code == 0
+    refused = run("same", a, b, "--within", "1e-6")
+    assert refused.code == 1
+    assert "NOT WITHIN 1e-06 m and rad" in refused.text
+    done = run("same", f, g, "--within", "1e-3")
+    assert done.code == 0
+    assert "WITHIN 0.001 m and rad" in done.text
+    assert "keep their limits from -0.005 to 0.005 only" in done.text
+
+
+def test_the_page_follows_the_question_and_says_where_it_comes_from(tmp_path: Path) -> None:
+    for name, text in (("a", finger(-1.0)), ("b", finger(-1.01))):
+        (tmp_path / f"{name}.urdf").write_text(text)
+    a, b, page = (str(tmp_path / name) for name in ("a.urdf", "b.urdf", "page.html"))
+    assert run("same", a, b, "--within", "1e-3", "--html", page).code == 0
+    text = Path(page).read_text()
+    assert 'class="verdict good"' in text
+    assert "<h1>WITHIN 0.001 m and rad" in text
+    assert urdfkin.load(a).sha256 in text
+    assert f"urdfkin <b>{version('urdfkin')}</b>" in text
+    assert f"urdfkin same {a} {b} --within 0.001" in text
+    assert "<time datetime=" in text
+    assert "ja 0.055 m" in text
+    assert "mm</text>" in text or " m</text>" in text  # a scale
+    assert run("same", a, b, "--within", "1e-4", "--html", page).code == 1
+    assert 'class="verdict bad"' in Path(page).read_text()
+    assert run("same", a, a, "--strict", "--html", page).code == 0
+    other = tmp_path / "c.urdf"
+    other.write_text(arm(tool='<origin xyz="0 0 0.15"/>'))
+    (tmp_path / "d.urdf").write_text(arm())
+    both = str(other), str(tmp_path / "d.urdf")
+    assert run("same", *both, "--strict", "--html", page).code == 1
+    assert 'class="verdict bad"' in Path(page).read_text()
+    assert run("same", *both, "--within", "0.01", "--html", page).code == 1
+    text = Path(page).read_text()
+    assert "<h2>Where tcp is 50 mm off as written</h2>" in text
+    assert 'class="gap"' in text
+
+
+def test_a_table_is_held_to_the_frames_that_both_name() -> None:
+    found = urdfkin.same("ur5", urdfkin.load("ur5").dh("tool0", "base"), within=1e-9)
+    assert found.within(1e-9)
+    moved = urdfkin.load("ur5").dh("tool0", "base")
+    tool = moved.tool.copy()
+    tool[2, 3] += 0.05
+    found = urdfkin.same("ur5", replace(moved, tool=tool))
+    assert found
+    assert not found.within(1e-3)
+
+
+def test_what_is_renamed_is_held_to_what_is_asked_too() -> None:
+    b = arm(shoulder="0 0 0.001")
+    for name in ("world", "base", "upper", "lower", "tcp", "turn", "bend", "hold", "mount"):
+        b = b.replace(f'"{name}"', f'"other_{name}"')
+    found = urdfkin.same(arm(), b)
+    assert found
+    assert len(found.links) == 5
+    assert not found.within(1e-4)
+    assert found.within(1.001e-3)
+
+
+def test_diff_says_radians_where_nothing_is_moved() -> None:
+    from urdfkin.report.diff import headline as of  # noqa: PLC0415
+
+    a, b = arm(), arm(tool='<origin xyz="0 0 0.1" rpy="0 0 0.02"/>')
+    assert of(urdfkin.diff(a, b)) == "1 change; together they turn tcp by up to 20 mrad"
+
+
+def test_what_is_printed_of_it_is_in_standard_words() -> None:
+    found = urdfkin.same(arm(), arm(tool='<origin xyz="0 0 0.15"/>', shoulder="0 0 0.5"), bounds=False)
+    assert repr(found) == "<Sameness arm, arm: equivalent up to zeros, tools>"
+
+
+def test_a_link_that_moved_on_a_body_without_joints_is_a_difference() -> None:
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><joint name="ab" type="fixed">'
+        '<parent link="a"/><child link="b"/><origin xyz="{} 0 0"/></joint><joint name="bc" type="fixed">'
+        '<parent link="b"/><child link="c"/><origin xyz="{} 0 0"/></joint></robot>'
+    )
+    found = urdfkin.same(text.format(0, 1), text.format(0.5, 0.5))
+    assert found.verdict is Verdict.DIFFERS
+    assert found.worst is not None
+    assert found.worst.lower == pytest.approx(0.5)

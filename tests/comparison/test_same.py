@@ -1,0 +1,404 @@
+"""`same`: verdicts, what has to be done, what is only remarked upon, and certificates."""
+
+from __future__ import annotations
+
+import copy
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as run
+from tests.comparison import pairs
+from tests.comparison.pairs import changed, robot
+from urdfkin.comparison.certificate import certificate, recheck
+from urdfkin.comparison.result import Verdict
+from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism
+from urdfkin.model.tree import JointKind
+from urdfkin.report.same import read_certificate
+from urdfkin.robot import Robot
+from urdfkin.urdf.writer import to_urdf
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+
+def other(name: str, what: str) -> Robot:
+    found = changed(name, what)
+    assert found is not None
+    return found
+
+
+def test_a_robot_is_itself_and_pinocchio_sees_no_distance() -> None:
+    found = urdfkin.same("panda", "panda")
+    assert found.verdict is Verdict.SAME
+    assert (found.after, found.differences, found.remarks) == ((), (), ())
+    assert found.checked.endswith("finds at most 0 m at 8 configurations, within the bounds")
+    assert found.worst is None
+
+
+def test_it_can_be_taken_for_the_answer() -> None:
+    assert urdfkin.same("panda", "panda_collision")
+    assert not urdfkin.same("ur5", "ur3", bounds=False)
+
+
+def test_limits_are_told_apart_from_motion() -> None:
+    found = urdfkin.same("ur5", "ur5_limited")
+    assert found.verdict is Verdict.SAME
+    assert {one.what for one in found.remarks} == {"limits"}
+    assert (found.exit_code(), found.exit_code(strict=True)) == (0, 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", ["all of it", "axes flipped", "zeros shifted", "all renamed"])
+@pytest.mark.parametrize("name", ["panda", "talos", "polar"])
+def test_what_has_to_be_done_makes_them_move_alike(name: str, what: str) -> None:
+    a, b = robot(name), other(name, what)
+    found = urdfkin.same(a, b, bounds=False)
+    assert found
+    q = a.sample(5, 1)
+    T_a = a.placement(q, [f"link:{ours}" for ours, _ in found.links])
+    T_b = b.placement(found.to_b(q), [f"link:{theirs}" for _, theirs in found.links])
+    assert np.abs(T_a - found.base @ T_b).max() <= 1e-12
+
+
+@pytest.mark.slow
+def test_two_models_differ_whichever_is_called_a() -> None:
+    a, b = robot("elbow"), other("elbow", "tilted by 0.001")
+    there, back = urdfkin.same(a, b).worst, urdfkin.same(b, a).worst
+    assert there is not None
+    assert back is not None
+    assert (there.lower, there.upper) == pytest.approx((back.lower, back.upper), rel=5e-3)
+
+
+def test_a_follower_that_was_dropped_is_found() -> None:
+    a, b = robot("panda"), urdfkin.load(robot("panda").urdf, mimic=False, verify=False)
+    found = urdfkin.same(a, b)
+    assert [one.words for one in found.differences] == [
+        "joint panda_finger_joint2 follows in A and is free in B: 1.0 panda_finger_joint1 +0"
+    ]
+    assert found.worst is not None
+    assert found.worst.lower == pytest.approx(0.04)  # one finger open, the other closed
+
+
+@pytest.mark.slow
+def test_a_joint_that_is_fixed_in_one_model_is_named_and_its_effect_bounded() -> None:
+    found = urdfkin.same("icub", "icub_reduced")
+    assert {one.place for one in found.differences} == {
+        f"joint neck_{way}" for way in ("pitch", "roll", "yaw")
+    }
+    assert found.worst is not None
+    assert found.worst.lower <= found.worst.upper <= 1.05 * found.worst.lower
+
+
+def test_another_tool_is_something_to_be_done_not_a_difference() -> None:
+    tree = urdfkin.load("panda").tree
+    at = tree.joint_index("panda_hand_tcp_joint")
+    T = tree.joints[at].T_parent_joint @ pairs.pose([0.0, 0.0, 0.0], [0.0, 0.0, 0.125])
+    b = urdfkin.load(to_urdf(pairs.with_joint(tree, at, replace(tree.joints[at], T_parent_joint=T))))
+    found = urdfkin.same(robot("panda"), b)
+    assert found.verdict is Verdict.SAME_AFTER
+    assert found.after == (
+        'frame panda_hand_tcp is A\'s panda_hand_tcp moved by xyz="0.0 0.0 0.125" rpy="0.0 0.0 0.0"',
+    )
+    assert found.as_written is not None
+    assert found.as_written.frame == "panda_hand_tcp"
+    assert found.as_written.lower == pytest.approx(0.125)
+    assert (found.exit_code(), found.exit_code(strict=True)) == (0, 1)
+
+
+@pytest.mark.slow
+def test_a_table_is_the_robot_that_it_was_made_of() -> None:
+    found = urdfkin.same("ur5", urdfkin.load("ur5").dh("tool0", "base"))
+    assert found.differences == ()
+    assert len(found.joints) == 6
+
+
+def test_joints_can_be_paired_by_hand() -> None:
+    a, b = robot("panda"), other("panda", "all renamed")
+    name = next(one.b for one in urdfkin.same(a, b, bounds=False).joints if one.a == "panda_joint1")
+    assert urdfkin.same(a, b, map={"panda_joint1": name}, bounds=False)
+    with pytest.raises(urdfkin.UnknownNameError, match="unknown joint 'panda_jointl'; did you mean"):
+        urdfkin.same(a, b, map={"panda_jointl": name})
+    with pytest.raises(urdfkin.InputError, match=r"cannot be each other's.*'panda_joint1' of A"):
+        urdfkin.same(a, a, map={"panda_joint1": "panda_joint2"})
+    with pytest.raises(urdfkin.InputError, match="joints of A and their names in B"):
+        urdfkin.same(a, a, map=["panda_joint1"])  # type: ignore[arg-type]
+    with pytest.raises(urdfkin.InputError, match="given twice"):
+        urdfkin.same(a, b, map={"panda_joint1": name, "panda_joint2": name})
+
+
+@pytest.mark.parametrize(("name", "seconds"), [("panda", 1.0), ("talos", 5.0)])
+def test_it_is_quick(name: str, seconds: float) -> None:
+    a, b = urdfkin.load(name), urdfkin.load(name)
+    began = time.process_time()
+    assert urdfkin.same(a, b)
+    assert time.process_time() - began <= seconds
+
+
+FINGERS = (
+    "<robot name='g'><link name='{0[0]}'/><link name='{0[1]}'/><link name='{0[2]}'/>"
+    "<joint name='{1[0]}' type='revolute'><parent link='{0[0]}'/><child link='{0[1]}'/>"
+    "<origin xyz='-0.03 0 0.05' rpy='0 {2} 0'/><axis xyz='0 -1 0'/>"
+    "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint>"
+    "<joint name='{1[1]}' type='revolute'><parent link='{0[0]}'/><child link='{0[2]}'/>"
+    "<origin xyz='0.03 0 0.05'/><axis xyz='0 1 0'/><limit lower='-1' upper='1' effort='1' velocity='1'/>"
+    "<mimic joint='{1[0]}' multiplier='{3}' offset='{4}'/></joint></robot>"
+)
+
+
+def test_a_mimic_rule_gives_the_zero_of_a_joint_on_whose_link_nothing_hangs() -> None:
+    a = urdfkin.load(FINGERS.format(("palm", "a", "b"), ("ja", "jb"), 0, 1, 0), verify=False)
+    shifted = FINGERS.format(("L0", "L1", "L2"), ("k1", "k2"), -0.5, 1, 0.5)
+    found = urdfkin.same(a, urdfkin.load(shifted, verify=False))
+    assert found.verdict is Verdict.SAME_AFTER, found.differences
+    assert found.after == ("q[k1] = q[ja] - 0.5",)
+
+
+@pytest.mark.parametrize(("multiplier", "offset"), [(1.001, 0.0), (1, 0.001)])
+def test_links_of_one_name_fix_the_zero_that_a_mimic_rule_could_give(
+    multiplier: float, offset: float
+) -> None:
+    names = ("palm", "a", "b"), ("ja", "jb")
+    a, b = (
+        urdfkin.load(FINGERS.format(*names, 0, *rule), verify=False)
+        for rule in ((1, 0), (multiplier, offset))
+    )
+    found = urdfkin.same(a, b, bounds=False)
+    assert [one.what for one in found.differences] == ["mimic rule"]
+
+
+def telescope(names: str, x: float) -> Robot:
+    """Four slides along one axis; x: metres that the third one is off."""
+    joints = "".join(
+        f"<link name='l{i + 1}'/><joint name='{name}' type='prismatic'><parent link='l{i}'/>"
+        f"<child link='l{i + 1}'/><origin xyz='{x if i == 2 else 0} 0 0.2'/><axis xyz='0 0 1'/>"
+        f"<limit lower='0' upper='0.3' effort='1' velocity='1'/></joint>"
+        for i, name in enumerate(names)
+    )
+    return urdfkin.load(f"<robot name='t'><link name='l0'/>{joints}</robot>", verify=False)
+
+
+def test_slides_whose_names_agree_are_tried_in_no_other_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = list[tuple[str, ...]]()
+    taken = Mechanism.in_order
+
+    def in_order(mechanism: Mechanism, names: Sequence[str]) -> Mechanism:
+        tried.append(tuple(names))
+        return taken(mechanism, names)
+
+    monkeypatch.setattr(Mechanism, "in_order", in_order)
+    found = urdfkin.same(telescope("abcd", 0.0), telescope("abcd", 0.001), bounds=False)
+    assert found.verdict is Verdict.DIFFERS
+    assert tried == []
+    urdfkin.same(telescope("abcd", 0.0), telescope("badc", 0.001), bounds=False)
+    assert tried == [tuple("abcd"), tuple("dcba")]  # as A has them, from its root or from its tip
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+@pytest.mark.parametrize("compared", [urdfkin.same, urdfkin.diff])
+def test_a_robot_longer_than_a_double_can_square_is_refused(compared: Any) -> None:
+    near, far = (
+        f"<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='fixed'><parent link='a'/>"
+        f"<child link='b'/><origin xyz='0 0 {z}'/></joint></robot>"
+        for z in ("1", "1e308")
+    )
+    robots = [urdfkin.load(text, verify=False) for text in (near, far)]
+    with pytest.raises(urdfkin.InputError, match=r"model B, r: .*found 1e\+308 m"):
+        compared(*robots)
+
+
+# -- certificates ------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def compared() -> tuple[Robot, Robot, dict[str, Any]]:
+    a, b = robot("elbow"), other("elbow", "tilted by 0.001")
+    return a, b, json.loads(json.dumps(certificate(urdfkin.same(a, b))))
+
+
+def test_a_certificate_of_what_is_the_same_holds() -> None:
+    a = robot("elbow")
+    assert recheck(json.loads(json.dumps(certificate(urdfkin.same(a, a)))), a, a) == []
+
+
+def test_a_certificate_holds(compared: tuple[Robot, Robot, dict[str, Any]], tmp_path: Path) -> None:
+    a, b, document = compared
+    (tmp_path / "c.json").write_text(json.dumps(document))
+    assert recheck(read_certificate(tmp_path / "c.json"), a, b) == []
+
+
+@pytest.mark.slow
+def test_a_certificate_of_what_was_turned_round_holds() -> None:
+    a, b = robot("panda"), other("panda", "all of it")
+    assert recheck(certificate(urdfkin.same(a, b)), a, b) == []
+
+
+FORGED: dict[str, Any] = {
+    "is not proven": lambda d: d["frames"][-1].update(upper=0.99 * d["frames"][-1]["lower"]),
+    "finds": lambda d: d["frames"][-1].update(lower=1.01 * d["frames"][-1]["lower"]),
+    "do not belong together": lambda d: d["frames"][-1]["q_b"].__setitem__(0, 0.123),
+    "leave the limits": lambda d: [d["frames"][-1][q].__setitem__(1, 50.0) for q in ("q_a", "q_b")],
+    "the verdict is differs": lambda d: d.update(verdict="same"),
+    "not named as a difference": lambda d: d.update(differences=[]),
+    "no difference": lambda d: d["differences"].append({**d["differences"][0], "words": "joint x"}),
+    "has no interval": lambda d: d["frames"].pop(),
+    "a frame has two intervals": lambda d: d["frames"].append(d["frames"][-1]),
+    "rad there, not": lambda d: d["frames"][-1].update(radians_seen=0.1),
+    "remarks: the models say otherwise": lambda d: d["remarks"].append(d["differences"][0]),
+    "after: the models say otherwise": lambda d: d["after"].append("q[joint_1] = -q[joint_1]"),
+    "links: the models say otherwise": lambda d: d["links"].pop(),
+    "joints: the models say otherwise": lambda d: d["joints"].pop(),
+    "rounding: the models say otherwise": lambda d: d["rounding"].update(metres=1.0),
+    "base_links: the models say otherwise": lambda d: d.update(base_links=["tool"] * 2),
+    "base: no rigid motion": lambda d: d["base"][2].__setitem__(2, -1.0),
+    "model A: its name is": lambda d: d["a"].update(name="another"),
+    "otherwise of the size": lambda d: d["differences"][0].update(radians=1e-6),
+    "the size of": lambda d: d["differences"][0].update(metres=0.5),
+    "one is named twice": lambda d: d["differences"].append(d["differences"][0]),
+    "no confirmation": lambda d: d.update(checked="Pinocchio finds nothing"),
+    "checked: Pinocchio finds at most": lambda d: d.update(
+        checked="Pinocchio 4.1.0 finds at most 1e-19 m at 8 configurations, within the bounds"
+    ),
+    "orders: axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("said", FORGED)
+def test_a_forged_certificate_does_not(compared: tuple[Robot, Robot, dict[str, Any]], said: str) -> None:
+    a, b, document = compared
+    forged = copy.deepcopy(document)
+    FORGED[said](forged)
+    assert any(said in line for line in recheck(forged, a, b))
+
+
+def test_a_certificate_that_does_not_hold_costs_no_search_in_boxes(
+    compared: tuple[Robot, Robot, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a, b, document = compared
+    asked = list[str]()
+    monkeypatch.setattr("urdfkin.comparison.certificate.tightened", lambda *_: asked.append("boxes"))
+    forged = copy.deepcopy(document)
+    forged["base"][0][3] += 0.25
+    assert recheck(forged, a, b)
+    forged = copy.deepcopy(document)
+    for frame in forged["frames"]:  # less than some configurations attain, and a lower bound to match
+        frame["lower"], frame["upper"] = 0.1 * frame["lower"], 0.5 * frame["upper"]
+    assert any("is not proven" in line for line in recheck(forged, a, b))
+    assert asked == []
+
+
+def test_a_certificate_that_names_what_is_not_there_is_refused(
+    compared: tuple[Robot, Robot, dict[str, Any]],
+) -> None:
+    a, b, document = compared
+    forged = copy.deepcopy(document)
+    forged["joints"][0]["b"] = "elsewhere"
+    with pytest.raises(urdfkin.InputError, match=r"names what a model does not have: .*'elsewhere'"):
+        recheck(forged, a, b)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("end", ["upper", "lower"])
+def test_what_is_said_of_the_models_as_written_is_proven_again_too(end: str) -> None:
+    a, b = robot("elbow"), other("elbow", "axes flipped")
+    document = json.loads(json.dumps(certificate(urdfkin.same(a, b))))
+    assert recheck(document, a, b) == []
+    document["as_written"][end] *= 0.9 if end == "upper" else 1.1
+    assert any(line.startswith("as written: frame ") for line in recheck(document, a, b))
+
+
+@pytest.mark.parametrize("kind", ["planar", "floating"])
+def test_a_free_joint_goes_only_where_a_rigid_motion_takes_it(kind: str) -> None:
+    kinds = JointKind(kind)
+    lift, lower, mirror = np.eye(4), np.eye(4), np.diag([1.0, 1.0, -1.0, 1.0])
+    lift[2, 3], lower[2, 3] = 0.1, -0.1
+    assert JointTransform(lift, lower).holds_for(kinds)
+    assert JointTransform(lift, np.eye(4)).holds_for(kinds) is (kind == "floating")
+    assert not JointTransform(mirror, mirror).holds_for(kinds)
+
+
+def test_a_certificate_of_other_texts_is_refused(compared: tuple[Robot, Robot, dict[str, Any]]) -> None:
+    a, _, document = compared
+    with pytest.raises(urdfkin.InputError, match=r"model B: the certificate was made of another text"):
+        recheck(document, a, a)
+
+
+# -- the command -------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_the_commands_exit_says_whether(tmp_path: Path) -> None:
+    files = {}
+    for what in ("axes flipped", "tilted by 0.01"):
+        files[what] = tmp_path / f"{what}.urdf"
+        files[what].write_text(other("elbow", what).urdf)
+    base = tmp_path / "elbow.urdf"
+    base.write_text(robot("elbow").urdf)
+    flipped, tilted = map(str, files.values())
+    assert [
+        run("same", str(base), *words).code for words in ([str(base)], [flipped], [flipped, "--strict"])
+    ] == [0, 0, 1]
+    assert run("same", str(base), tilted, "--within", "0.011").code == 0  # 6 mm and 10 mrad
+    assert run("same", str(base), tilted, "--within", "0.009").code == 1
+    forms = [f for name in ("certificate", "markdown", "html") for f in (f"--{name}", str(tmp_path / name))]
+    done = run("same", str(base), tilted, *forms)
+    assert done.code == 1
+    assert "; first here: joint joint_4: its axis is tilted by 10 mrad" in done.text
+    assert (tmp_path / "html").read_text().count('<svg viewBox="-150') == 3
+    assert "| tool |" in (tmp_path / "markdown").read_text()
+    again = run("same", str(base), tilted, "--recheck", str(tmp_path / "certificate"))
+    assert again.code == 1
+    assert again.text.startswith("the certificate holds: differs; first here: joint joint_4")
+    refused = run("same", str(base), flipped, "--recheck", str(tmp_path / "certificate"))
+    assert refused.code == 2
+    assert "another text" in refused.err
+
+
+def test_arguments_of_a_xacro_file_go_to_the_one_that_is_one(tmp_path: Path) -> None:
+    text = robot("elbow").urdf
+    (tmp_path / "elbow.urdf").write_text(text)
+    named = (
+        text.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1)
+        .replace('name="tool"', 'name="$(arg tool)"')
+        .replace('link="tool"', 'link="$(arg tool)"')
+    )
+    at = named.index(">", named.index("<robot")) + 1
+    (tmp_path / "elbow.xacro").write_text(f'{named[:at]}<xacro:arg name="tool" default="hand"/>{named[at:]}')
+    both = [str(tmp_path / name) for name in ("elbow.xacro", "elbow.urdf")]
+    assert "link hand is tool" in run("same", *both).text
+    assert "link hand is tool" not in run("same", *both, "--xacro-arg", "tool:=tool").text
+    assert run("same", *both[1:], *both[1:], "--xacro-arg", "tool:=tool").code == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "name two models: urdfkin same A B"),
+        (["panda"], "name two models"),
+        (["panda", "pandaa"], "did you mean"),
+        (["panda", "panda", "--map", "x"], "a pair of joints is JOINT_OF_A=JOINT_OF_B"),
+        (["panda", "panda", "--map", "x=y"], "unknown joint 'x'"),
+        (["-", "-"], "standard input can be one of the two"),
+        (["panda", "panda", "--recheck", "/dev/null"], "not a JSON file"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused_in_a_line(words: list[str], said: str) -> None:
+    done = run("same", *words)
+    assert done.code == 2
+    assert said in done.err
+
+
+def test_the_schema_is_printed_and_is_one() -> None:
+    from jsonschema import Draft202012Validator  # noqa: PLC0415
+
+    done = run("same", "--schema")
+    Draft202012Validator.check_schema(done.data)
+    made = run("same", "elbow", "elbow", "--format", "json").data
+    Draft202012Validator(done.data).validate(made)

@@ -1,0 +1,52 @@
+"""Text that people read avoids the words that readers did not understand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scripts import plain_words
+from scripts.plain_words import PLAIN, ROOT, complaints, long_sentences
+
+
+def test_pages_docstrings_comments_and_messages_avoid_the_words_of_the_list() -> None:
+    assert complaints([ROOT / "urdfkin", ROOT / "docs", ROOT / "README.md", ROOT / "CONTRIBUTING.md"]) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "line"),
+    [
+        ("page.md", "First.\n\nMuJoCo is a second witness.\n", 3),
+        ("module.py", '"""The house has rooms."""\n', 1),
+        ("module.py", "x = 1\n# Held against Pinocchio.\n", 2),
+        ("module.py", 'raise ValueError("a follower has no coordinate")\n', 1),
+    ],
+)
+def test_a_word_of_the_list_is_reported_with_its_place_and_its_plain_form(
+    name: str, text: str, line: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(plain_words, "ROOT", tmp_path)
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    found = complaints([tmp_path])
+    assert found
+    assert all(one.startswith(f"{name}:{line}: ") and "; write: " in one for one in found)
+
+
+def test_code_in_a_page_is_no_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plain_words, "ROOT", tmp_path)
+    (tmp_path / "page.md").write_text("```python\nfollower = 1  # witness\n```\nSee `follower`.\n")
+    assert complaints([tmp_path]) == []
+
+
+def test_a_long_sentence_is_listed_and_a_short_one_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(plain_words, "ROOT", tmp_path)
+    (tmp_path / "page.md").write_text("Word " * 31 + ".\n" + "Word " * 20 + ".\n")
+    (found,) = long_sentences([tmp_path])
+    assert found.startswith("page.md:1: 32 words")
+
+
+def test_every_pattern_has_a_plain_form() -> None:
+    assert all(PLAIN.values())

@@ -1,0 +1,370 @@
+"""Whether a fit is plausible, and the likeliest mistake in the measured data where it is not.
+
+A fit always ends somewhere, also with joint angles in degrees, rows of q that belong to other poses, or the
+sign of a joint reversed. A fit is refused when it leaves a large share of the robot's reach, hardly improves
+on the model as it was, turns a joint's axis about, or has nothing left to judge it by. Each common mistake is
+then corrected on trial: the one whose fit is plausible is the likeliest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from urdfkin.calibration.fit import (
+    Fit,
+    Identification,
+    Measured,
+    Noise,
+    best_fit,
+    errors,
+    identify,
+    starting,
+)
+from urdfkin.calibration.parameters import Model, Parameter
+from urdfkin.comparison.result import angle, length
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
+
+#: Shares of the reach that a fit leaves (rms): more than the first is refused; the others as said below.
+_MISSED, _CLOSE_BY, _NO_BETTER, _SUSPECT = 0.05, 0.01, 0.03, 0.002
+#: Of the spread of the measured positions: more is refused beyond `_CLOSE_BY` of the reach.
+_UNEXPLAINED = 0.25
+#: Of what was left before the fit: more is refused beyond `_NO_BETTER` of the reach.
+_HARDLY_BELOW = 0.7
+#: Radians (rms) that a fit leaves: more is refused; from how many on mistakes are tried.
+_MISTURNED, _SUSPECT_TURN = 0.2, 0.005
+#: Radians: more than a turn, with what industrial wrists turn farther (400 degrees).
+_TURN = 2.5 * math.pi
+#: Beyond a joint's limits: radians or metres at least, and of their range.
+_OUTSIDE, _OF_RANGE = 0.5, 0.25
+#: Radians that a joint's axis may be off, and by what share a joint may go farther than it says.
+_TILTED, _GAINED = 0.5, 0.5
+#: Joint values (rad, m) that differ by less are one configuration.
+_ONE_CONFIGURATION = 1e-6
+#: Standard deviations that are taken off first: a target near an axis hardly shows how that is tilted.
+_UNCERTAIN = 5.0
+#: Of what the fit leaves: a correction that leaves less is the reason; one for a refused fit.
+_BETTER, _NOT_WORSE = 0.25, 1.5
+#: How many corrections are fitted in full, the most promising first; rows that q may be shifted by.
+_FITTED, _SHIFTS = 4, (1, -1, 2, -2)
+#: Joints that an objection names.
+_NAMED = 4
+
+
+@dataclass(frozen=True)
+class Plausibility:
+    """The judgement of a fit.
+
+    Attributes:
+        objections: Why the fit is refused; empty for a plausible one.
+        reason: The likeliest mistake and its remedy; None where no correction makes the fit plausible.
+    """
+
+    objections: tuple[str, ...] = ()
+    reason: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Ended:
+    """A fit with its data.
+
+    Attributes:
+        q: (s, c) coordinates of the path.
+        measured: The poses there.
+        identification: Which parameters are identifiable.
+        before: The fit of base and tool alone.
+        fitted: The fit.
+    """
+
+    q: FloatArray
+    measured: Measured
+    identification: Identification
+    before: Fit
+    fitted: Fit
+
+
+def judge(model: Model, ended: Ended, *, radians: bool) -> Plausibility:
+    """Judge a fit, and find the likeliest mistake where it is refused.
+
+    Args:
+        model: What was fitted.
+        ended: The fit with its data.
+        radians: Whether large joint angles are known to be radians.
+    """
+    few = _too_few(ended)
+    misfits = [*_misfits(model, ended), *_strained(model, ended)]
+    ranges = [*_out_of_range(model, ended.q, radians=radians, misfit=bool(misfits or few))]
+    objections = [*ranges, *misfits, *few]
+    reach, fitted = _reach(model, ended), ended.fitted
+    metres, turn = fitted.rms()
+    zeros = _turned_zeros(model, ended)
+    is_suspect = metres > _SUSPECT * reach or (turn or 0.0) > _SUSPECT_TURN
+    if few or not (objections or is_suspect or zeros):
+        return Plausibility(tuple(objections))
+    limit = (_NOT_WORSE if objections or zeros else _BETTER) * _left(ended, reach)
+    better = _likeliest(model, ended, limit, reach)
+    if better is None:
+        return Plausibility(tuple(objections))
+    if not objections:
+        turned = f"the fit turns the zero of joint {_listed(zeros)}; " if zeros else ""
+        objections = [f"{turned}{_rms(fitted)} (rms) are left, and {_rms(better.ended.fitted)} otherwise"]
+    return Plausibility(
+        tuple(objections), f"{better.correction.reason} ({_rms(better.ended.fitted)} are left then)"
+    )
+
+
+# -- objections --------------------------------------------------------------------------------------
+
+
+def _too_few(ended: Ended) -> list[str]:
+    steps = np.round(ended.measured.values / _ONE_CONFIGURATION)
+    distinct, each = len(np.unique(steps, axis=0)), ended.fitted.errors.shape[1]
+    rank = ended.identification.rank
+    if distinct * each > rank:
+        return []
+    among = f" among {len(steps)} poses" if distinct < len(steps) else ""
+    return [
+        f"{distinct} distinct configuration{'s' * (distinct != 1)}{among} give {distinct * each} numbers "
+        f"for {rank} parameters: nothing is left to judge the fit by"
+    ]
+
+
+def _reach(model: Model, ended: Ended) -> float:
+    """Metres: how far the tip is from the base or from a joint's axis at most, in the model as it is."""
+    T, columns = model.way.columns(ended.measured.values)
+    turning = [k for k, p in enumerate(model.way.parameters) if p.what in ("rz", "theta")]
+    levers = np.linalg.norm(columns[:, :3, turning], axis=1).max(initial=0.0)
+    away = np.linalg.norm(T[:, :3, 3], axis=1).max(initial=0.0)
+    return min(model.way.size, float(max(levers, away))) or model.way.size
+
+
+def _misfits(model: Model, ended: Ended) -> Iterator[str]:
+    """Why what is left is too much."""
+    reach = _reach(model, ended)
+    (metres, turn), (metres_before, _) = ended.fitted.rms(), ended.before.rms()
+    p = ended.measured.p
+    spread = float(np.sqrt(((p - p.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    no_better = metres > _NO_BETTER * reach and metres > _HARDLY_BELOW * metres_before
+    unexplained = metres > _CLOSE_BY * reach and metres > _UNEXPLAINED * spread
+    if metres > _MISSED * reach or no_better or unexplained:
+        yield (
+            f"{length(metres)} (rms) are left, {metres / reach:.0%} of the reach of {length(reach)}, "
+            f"and {length(metres_before)} before the fit"
+        )
+    if turn is not None and turn > _MISTURNED:
+        yield f"{angle(turn)} (rms) of the orientations are left"
+
+
+def _strained(model: Model, ended: Ended) -> Iterator[str]:
+    """Parameters that went where no built robot is."""
+    tilted, gained = dict[str, str](), dict[str, str]()
+    for parameter, moved, surely in _moved(model, ended):
+        if parameter.what in ("rx", "ry", "alpha", "beta") and surely > _TILTED:
+            tilted.setdefault(parameter.where, f"{parameter.where!r} by {angle(abs(moved))}")
+        if parameter.what == "gain" and surely > _GAINED:
+            gained[parameter.where] = f"{parameter.where!r} {1.0 + moved:.3g} times"
+    if tilted:
+        yield f"the fit tilts the axis of joint {_listed(tilted.values())}"
+    if gained:
+        yield f"the fit moves joint {_listed(gained.values())} as far as its values say"
+
+
+def _turned_zeros(model: Model, ended: Ended) -> list[str]:
+    """Joints whose zero is half a turn off, which does what a reversed sign of the joint beside it does."""
+    return [
+        f"{parameter.where!r} by {angle(abs(moved))}"
+        for parameter, moved, surely in _moved(model, ended)
+        if parameter.what in ("rz", "theta") and surely > _TILTED and abs(abs(moved) - math.pi) < _TILTED
+    ]
+
+
+def _moved(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
+    """Each fitted parameter of a joint that moves, by how much it moved, and by how much surely.
+
+    Of positions alone nothing is sure of a joint whose axis passes near the tip of the model as it is.
+    """
+    kept, fitted = ended.identification.kept, ended.fitted
+    near = set[str]()
+    if not ended.measured.complete:
+        _, columns = model.way.columns(ended.measured.values)
+        levers = np.linalg.norm(columns[:, :3], axis=1).max(axis=0, initial=0.0)
+        least = _MISSED * _reach(model, ended)
+        parameters = zip(model.way.parameters, levers.tolist(), strict=True)
+        near = {p.where for p, lever in parameters if p.what in ("rz", "theta") and lever < least}
+    deviations = np.sqrt(np.diag(fitted.covariance))
+    for k, deviation in zip(kept, deviations.tolist(), strict=True):
+        parameter = model.way.parameters[k]
+        if not parameter.end and parameter.where in model.coupling.joints and parameter.where not in near:
+            moved = float(fitted.at[k] - model.way.start[k])
+            yield parameter, moved, abs(moved) - _UNCERTAIN * deviation
+
+
+def _out_of_range(model: Model, q: FloatArray, *, radians: bool, misfit: bool) -> Iterator[str]:
+    """Values that look like degrees or millimetres."""
+    largest = dict(zip(model.coupling.names, np.abs(q).max(axis=0, initial=0.0).tolist(), strict=True))
+    turned, outside = dict[str, str](), dict[str, str]()
+    for name, is_turning, lower, upper in _coordinates(model):
+        column = q[:, model.coupling.names.index(name)]
+        over = max(float(column.max()) - upper, lower - float(column.min()))
+        far = over > max(_OUTSIDE, _OF_RANGE * (upper - lower) if math.isfinite(upper - lower) else 0.0)
+        is_limited = math.isfinite(lower) and math.isfinite(upper)
+        if is_turning and largest[name] > _TURN and (far or not is_limited):
+            turned[name] = f"{name!r} ({largest[name]:.4g})"
+        elif far:
+            outside[name] = f"{name!r} ({largest[name]:.4g}, limits {lower:.4g} to {upper:.4g})"
+    if turned and not radians:
+        yield f"values beyond a turn look like degrees: joint {_listed(turned.values())}"
+    if outside and misfit:
+        yield f"values far outside the limits: joint {_listed(outside.values())}"
+
+
+def _coordinates(model: Model) -> Iterator[tuple[str, bool, float, float]]:
+    """Name, whether it turns, lower and upper limit of each coordinate of the path."""
+    kinds = dict(zip(model.coupling.joints, model.coupling.kinds, strict=True))
+    for name in model.coupling.names:
+        lower, upper = -math.inf, math.inf
+        kind = kinds.get(name)
+        if isinstance(model.source, KinematicTree):
+            joint = model.source.joints[model.source.joint_index(name)]
+            kind = joint.kind
+            if joint.limit is not None and kind is not JointKind.CONTINUOUS:
+                lower, upper = joint.limit.lower, joint.limit.upper
+        yield name, kind is None or kind.turns, lower, upper
+
+
+# -- mistakes ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Correction:
+    """Data without one supposed mistake."""
+
+    reason: str
+    q: FloatArray
+    first: int = 0
+    last: int | None = None
+
+
+def _corrections(model: Model, q: FloatArray) -> Iterator[_Correction]:
+    turning = np.array([turns for _, turns, *_ in _coordinates(model)], dtype=bool)
+    if turning.any():
+        yield _Correction(
+            "joint angles are in degrees; convert them to radians", np.where(turning, np.radians(q), q)
+        )
+    if not turning.all():
+        if turning.any():
+            yield _Correction("all joint values are multiplied by 180/pi; undo it", np.radians(q))
+        yield _Correction(
+            "sliding joints are in millimetres; convert them to metres", np.where(turning, q, 1e-3 * q)
+        )
+    for by in _SHIFTS:
+        if len(q) > abs(by) + 1:
+            rows = "one row" if abs(by) == 1 else f"{abs(by)} rows"
+            way = "later" if by > 0 else "earlier"
+            reason = f"q is shifted by {rows} against the poses; the q of each pose stands {rows} {way}"
+            if by > 0:
+                yield _Correction(reason, q[by:], 0, len(q) - by)
+            else:
+                yield _Correction(reason, q[:by], -by, None)
+    for j, name in enumerate(model.coupling.names):
+        yield _Correction(_sign((name,)), q * np.where(np.arange(q.shape[1]) == j, -1.0, 1.0))
+
+
+def _sign(names: Sequence[str]) -> str:
+    if len(names) == 1:
+        return f"the sign of joint {names[0]!r} is wrong; negate its values or its axis"
+    return f"the signs of joints {_listed(map(repr, names))} are wrong; negate their values or their axes"
+
+
+def _likeliest(model: Model, ended: Ended, limit: float, reach: float) -> _Trial | None:
+    """The correction whose fit is plausible and leaves less than the limit."""
+    trials = [_Trial(model, ended, correction, reach) for correction in _corrections(model, ended.q)]
+    trials.sort(key=lambda trial: trial.left_before)
+    for trial in trials[:_FITTED]:
+        if trial.is_plausible(limit):
+            return trial
+    several = _several_signs(model, ended, reach)
+    return several if several is not None and several.is_plausible(limit) else None
+
+
+def _several_signs(model: Model, ended: Ended, reach: float) -> _Trial | None:
+    """Two or more reversed signs: each reversal that leaves less before the fit, the best one first."""
+    names, signs = model.coupling.names, np.ones(ended.q.shape[1])
+    best, least = None, math.inf
+    for _ in names:
+        trials = []
+        for j in range(len(names)):
+            flipped = np.where(np.arange(len(names)) == j, -signs, signs)
+            reversed_ = [name for name, sign in zip(names, flipped, strict=True) if sign < 0.0]
+            trials.append(
+                (_Trial(model, ended, _Correction(_sign(reversed_), ended.q * flipped), reach), flipped)
+            )
+        trial, flipped = min(trials, key=lambda one: one[0].left_before)
+        if trial.left_before >= least:
+            break
+        best, least, signs = trial, trial.left_before, flipped
+    return best if np.count_nonzero(signs < 0.0) > 1 else None
+
+
+class _Trial:
+    """A correction, and what a fit leaves of it."""
+
+    def __init__(self, model: Model, ended: Ended, correction: _Correction, reach: float) -> None:
+        self.model, self.correction, self.reach = model, correction, reach
+        chosen = slice(correction.first, correction.last)
+        old = ended.measured
+        self.measured = Measured(
+            model.coupling.values(correction.q), old.p[chosen], None if old.R is None else old.R[chosen]
+        )
+        self.weights = Noise(1.0, 1.0 / reach)
+        self.start = starting(model, self.measured)
+        #: What is left of a number where base and tool alone are found, m.
+        self.left_before = _size(errors(model, self.measured, self.start), reach) / math.sqrt(
+            len(self.measured)
+        )
+        self.told = ended.identification
+
+    @cached_property
+    def ended(self) -> Ended:
+        """The fit of all identifiable parameters."""
+        model, measured = self.model, self.measured
+        ends = [k for k in self.told.kept if model.way.parameters[k].end]
+        before = best_fit(model, measured, ends, self.weights, self.start)
+        told = identify(model, measured.values, complete=measured.complete, at=self.start)
+        fit = best_fit(model, measured, told.kept, self.weights, before.at)
+        return Ended(self.correction.q, measured, told, before, fit)
+
+    def is_plausible(self, limit: float) -> bool:
+        """Whether the fit is plausible and leaves less than the limit."""
+        try:
+            ended = self.ended
+        except np.linalg.LinAlgError:
+            return False
+        if not ended.fitted.is_judged or _left(ended, self.reach) > limit:
+            return False
+        strange = [*_misfits(self.model, ended), *_strained(self.model, ended)]
+        return not strange and not _turned_zeros(self.model, ended)
+
+
+def _size(left: FloatArray, reach: float) -> float:
+    """What is left (s, 6) or (s, 3) of all numbers, metres; turns count at the reach."""
+    return float(np.linalg.norm(left * ([1.0] * 3 + [reach] * (left.shape[1] - 3))))
+
+
+def _left(ended: Ended, reach: float) -> float:
+    """What is left of a number, metres, for each that is left to judge by."""
+    return _size(ended.fitted.errors, reach) / math.sqrt(max(ended.fitted.freedom, 1.0))
+
+
+def _rms(fit: Fit) -> str:
+    metres, turn = fit.rms()
+    return length(metres) if turn is None else f"{length(metres)}, {angle(turn)}"
+
+
+def _listed(names: Iterable[str]) -> str:
+    every = list(names)
+    return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")

@@ -1,0 +1,141 @@
+"""Measured poses from files: CSV with named columns, or the arrays of an .npz file.
+
+In a CSV file a coordinate's name holds q; x, y, z hold the position; qx, qy, qz, qw the orientation, which
+may be missing; or T00 ... T33, T23 at least, hold the matrix, as `urdfkin placement --format csv` writes it.
+In an .npz file these are q (n, nq), p (n, 3) and quat (n, 4), scalar last, or T (n, 4, 4).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.errors import InputError
+from urdfkin.kinematics.inputs import scalars
+from urdfkin.kinematics.rotation import rotation_of
+from urdfkin.model.tree import FloatArray
+from urdfkin.motion.columns import read_columns
+from urdfkin.motion.trajectory import read_arrays
+from urdfkin.system.files import MOST_DATA, read_text
+
+#: By how much written digits may leave a matrix, or a quaternion's length, off what it should be.
+_WRITTEN = 1e-3
+_POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
+_MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
+_LAST_ROW = tuple(f"T3{j}" for j in range(4))
+#: Metres.
+UNITS = {"m": 1.0, "mm": 1e-3}
+
+
+def read_poses(
+    path: Path, coordinates: tuple[str, ...], needed: tuple[str, ...], unit: str = "m"
+) -> tuple[FloatArray, FloatArray]:
+    """(s, nq) configurations, and (s, 4, 4) poses or (s, 3) positions, m.
+
+    Args:
+        path: The file; its ending says which of the two it is.
+        coordinates: Names of the numbers of q.
+        needed: Those that must be there; what others are is neutral.
+        unit: Of the positions: "m" or "mm".
+
+    Raises:
+        SourceError: the file cannot be read.
+        InputError: a column or array that is missing or unknown, a number that is none, no orientation.
+    """
+    found = (
+        _archive(path, len(coordinates))
+        if path.suffix.lower() == ".npz"
+        else _table(path, coordinates, needed)
+    )
+    q, T = found
+    T = T.copy()
+    positions = T if T.ndim == 2 else T[:, :3, 3]
+    positions *= UNITS[unit]
+    return q, T
+
+
+def _table(
+    path: Path, coordinates: tuple[str, ...], needed: tuple[str, ...]
+) -> tuple[FloatArray, FloatArray]:
+    text, where = read_text(path, MOST_DATA, pipes=True), str(path)
+    first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+    names = {cell.strip() for cell in first.split(",")}
+    kind = _MATRIX if "T00" in names else _POSITION
+    others = [name for name in coordinates if name not in needed]
+    optional = [*others, "sample", "t", *(_QUATERNION if kind is _POSITION else _LAST_ROW)]
+    data = read_columns(text, where, "measured poses", [*needed, *kind], optional, named=True)
+    s = len(data[kind[0]])
+    q = (
+        np.stack([data.get(name, np.zeros(s)) for name in coordinates], axis=-1)
+        if coordinates
+        else np.empty((s, 0))
+    )
+    part = [name for name in _QUATERNION if name in data]
+    if 0 < len(part) < len(_QUATERNION):
+        missing = ", ".join(name for name in _QUATERNION if name not in part)
+        raise InputError("a quaternion has four numbers", where=where, found=f"no {missing}")
+    if kind is _MATRIX:
+        rows = np.stack([data[name] for name in _MATRIX], axis=-1).reshape(s, 3, 4)
+        T = np.concatenate([rows, np.broadcast_to([[0.0, 0.0, 0.0, 1.0]], (s, 1, 4))], axis=1)
+        return q, _posed(T, where)
+    p = np.stack([data[name] for name in _POSITION], axis=-1)
+    return q, p if not part else _with_quaternions(
+        p, np.stack([data[n] for n in _QUATERNION], axis=-1), where
+    )
+
+
+def _archive(path: Path, nq: int) -> tuple[FloatArray, FloatArray]:
+    data = read_arrays(path, {"q": (nq,), "T": (4, 4), "p": (3,), "quat": (4,)}, ["q"])
+    if ("T" in data) == ("p" in data) or ("quat" in data and "p" not in data):
+        found = ", ".join(data)
+        raise InputError(
+            "measured poses are q with T, with p, or with p and quat", where=str(path), found=found
+        )
+    if "T" in data:
+        return data["q"], _posed(data["T"], str(path))
+    return data["q"], data["p"] if "quat" not in data else _with_quaternions(
+        data["p"], data["quat"], str(path)
+    )
+
+
+def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray:
+    lengths = np.linalg.norm(quat, axis=-1, keepdims=True)
+    off = np.abs(lengths - 1.0)
+    if off.size and off.max() > _WRITTEN:
+        raise InputError(
+            "an orientation is a quaternion of length 1, scalar last",
+            where=f"{where}, pose {int(off.argmax())}",
+            found=f"length {float(lengths[off.argmax(), 0]):.6g}",
+        )
+    T = np.broadcast_to(np.eye(4), (len(p), 4, 4)).copy()
+    T[:, :3, :3], T[:, :3, 3] = rotation_of(quat / lengths), p
+    return T
+
+
+def _posed(T: FloatArray, where: str) -> FloatArray:
+    """Poses whose rotations are as good as the digits they were written with, made good."""
+    R = T[:, :3, :3]
+    off = np.abs(R.swapaxes(-1, -2) @ R - np.eye(3)).max(axis=(-2, -1), initial=0.0)
+    bad = (off > _WRITTEN) | (np.linalg.det(R) < 0.0)
+    if bad.any():
+        raise InputError(
+            "a pose is a rotation and a translation",
+            where=f"{where}, pose {int(bad.argmax())}",
+            found=str(T[bad.argmax()].tolist()),
+        )
+    U, _, Vt = np.linalg.svd(R)
+    good = T.copy()
+    good[:, :3, :3] = U @ Vt
+    return good
+
+
+def checked_poses(poses: ArrayLike) -> FloatArray:
+    """(s, 4, 4) or (s, 3) as numbers; raises InputError for anything else."""
+    array = scalars(poses, "poses")
+    if array.ndim == 2 and array.shape[1] == 3:
+        return array
+    if array.ndim == 3 and array.shape[1:] == (4, 4):
+        return _posed(array, "poses")
+    raise InputError("poses are (n, 4, 4), or positions (n, 3)", found=f"shape {array.shape}")

@@ -1,0 +1,146 @@
+"""New origins written into the URDF's own text: names, meshes, comments and formatting stay byte for byte.
+
+A robot whose joints stand elsewhere: its own text with their origins in it, and how far they moved.
+"""
+
+from __future__ import annotations
+
+import codecs
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from urdfkin.comparison.diff import Changes, diff
+from urdfkin.errors import InputError
+from urdfkin.kinematics.rotation import log_rotation, quaternion_of, rpy_of
+from urdfkin.kinematics.roundings import ANGLE, EPS
+from urdfkin.lint.finding import Severity
+from urdfkin.lint.reporter import Reporter
+from urdfkin.lint.runner import read_urdf
+from urdfkin.loading import load
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+from urdfkin.system.files import Edit, edited
+from urdfkin.urdf.records import JointRecord, Vector
+from urdfkin.urdf.writer import before, numbers, with_attributes
+from urdfkin.verify.certificate import Certificate
+
+#: Decimals of a metre and of a radian that are written: what a double of a robot's size has.
+_DECIMALS = 15
+_SAME = 10.0**-_DECIMALS
+
+
+def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
+    """The URDF's bytes with these (4, 4) origins of joints, by name, in place of what they were.
+
+    A number that stays the same to rounding keeps its digits. Of the angles that make one rotation those are
+    taken which are nearest to the old ones.
+
+    Raises:
+        InputError: the text has errors, or no such joint.
+    """
+    report = Reporter("<text>", data)
+    urdf = read_urdf(report, mimic=False)  # who follows whom is no matter here
+    if urdf is None or report.failed:
+        errors = [one for one in report.findings() if one.severity is Severity.ERROR]
+        raise InputError("a text with errors is not edited", found=str(errors[0]))
+    mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
+    edits = list[Edit]()
+    for name, T in origins.items():
+        if (joint := urdf.by_name.get(name)) is None:
+            raise InputError("the text has no such joint", found=repr(name))
+        edits += _edits(report.data, joint, T)
+    return mark + edited(report.data, edits)
+
+
+def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
+    values = {"xyz": _kept(joint, "xyz", T[:3, 3], joint.xyz)}
+    if joint.quaternion is None:
+        values["rpy"] = _kept(joint, "rpy", nearest_rpy(T[:3, :3], joint.rpy), joint.rpy)
+    else:
+        quaternion = quaternion_of(T[:3, :3])
+        sign = math.copysign(1.0, float(quaternion @ np.asarray(joint.quaternion)))
+        values["quat_xyzw"] = numbers((sign * quaternion).round(_DECIMALS))
+    if joint.origin_element is not None:
+        return list(with_attributes(data, joint.origin_element, values))
+    written = " ".join(f'{name}="{value}"' for name, value in values.items())
+    # A joint without errors has a parent and a child at least.
+    return [before(data, joint.element.children[0], f"<origin {written}/>")]
+
+
+def _kept(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
+    """Three numbers as text; those that differ from the old ones by rounding as they were written."""
+    origin = joint.origin_element
+    words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
+    return " ".join(
+        word if abs(x - was) <= max(_SAME, ANGLE * EPS * abs(was)) else numbers([round(x, _DECIMALS)])
+        for word, x, was in zip(words, new.tolist(), old, strict=True)
+    )
+
+
+def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
+    """(3,) roll, pitch and yaw of a rotation, of all that make it those nearest to the old ones.
+
+    >>> from urdfkin.kinematics.rotation import rotation_from_rpy
+    >>> nearest_rpy(rotation_from_rpy([3.1, 3.0, 3.1]), (3.1, 3.0, 3.1)).round(12).tolist()
+    [3.1, 3.0, 3.1]
+    """
+    roll, pitch, yaw = rpy_of(R).tolist()
+    if math.cos(pitch) <= ANGLE * EPS:  # roll and yaw turn about one axis: only their sum has a meaning
+        roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
+    turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
+    wrapped = [
+        [x + 2.0 * math.pi * round((was - x) / (2.0 * math.pi)) for x, was in zip(rpy, old, strict=True)]
+        for rpy in turns
+    ]
+    return np.array(min(wrapped, key=lambda rpy: sum(abs(x - was) for x, was in zip(rpy, old, strict=True))))
+
+
+@dataclass(frozen=True, eq=False)
+class Rewritten:
+    """A robot with other origins.
+
+    Attributes:
+        robot: As it was.
+        origins: (4, 4) by joint, of those that moved.
+        certificate: What Pinocchio said of the text with them.
+    """
+
+    robot: Robot
+    origins: Mapping[str, FloatArray]
+    certificate: Certificate | None = None
+
+    @cached_property
+    def text(self) -> bytes:
+        """The URDF's own text with the new origins in it; every other byte is as it was."""
+        return with_origins(self.robot.urdf.encode(), self.origins)
+
+    @cached_property
+    def loaded(self) -> Robot:
+        """The robot of that text, loaded as the first one was."""
+        mimic = self.robot.verifier.mimic
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what there is to warn of was warned of when it was loaded
+            return load(self.text, mimic=mimic, root_joint=self.robot.root_joint)
+
+    @cached_property
+    def changes(self) -> Changes:
+        """What changed, in the words of `urdfkin.diff`, and how far each joint's changes move which frame."""
+        return diff(self.robot, self.loaded)
+
+    @cached_property
+    def moved(self) -> dict[str, tuple[float, float]]:
+        """By how much (m, rad) each joint's origin moved."""
+        tree = self.robot.tree
+        old = {name: tree.joints[tree.joint_index(name)].T_parent_joint for name in self.origins}
+        return {
+            name: (
+                float(np.linalg.norm(T[:3, 3] - old[name][:3, 3])),
+                float(np.linalg.norm(log_rotation(old[name][:3, :3].T @ T[:3, :3]))),
+            )
+            for name, T in self.origins.items()
+        }

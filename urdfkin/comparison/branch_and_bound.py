@@ -1,0 +1,275 @@
+"""How fast the distance of a frame of two models bends: second derivatives, bounded everywhere.
+
+With D = p_B - p_A, what a joint does to D it does again to a derivative of D: a turn's derivative is the
+turn, and then u x. So y, where B's frame is, and d, how far it is from A's, give way to
+
+    y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
+
+with Y = e(S' t') y, and these pass the joints in front as vectors that have no place
+(`urdfkin.model.mechanisms.upper_bound`).
+
+
+A sharper bound where many things differ: branch and bound on boxes of configurations.
+
+`urdfkin.model.mechanisms.upper_bound` adds up what each difference does at its own worst configuration. Here
+D(q), how far B's frame is from A's, is looked at in boxes of all variables together. In one with middle c,
+half widths h,
+
+    |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i,
+
+with M_ij the most that second derivatives are anywhere (`urdfkin.comparison.branch_and_bound`). Boxes that
+cannot hold a distance of interest are dropped, the others halved.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from urdfkin.comparison.lower_bound import Search, urdfkins
+from urdfkin.kinematics.roundings import NOT_ZERO
+from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step
+from urdfkin.model.mechanisms.mechanism import Screw
+from urdfkin.model.mechanisms.upper_bound import (
+    COARSE,
+    Support,
+    at_the_frame,
+    before_it,
+    behind_first,
+    difference,
+    passed,
+    point,
+)
+from urdfkin.model.mechanisms.variables import Line, Pair, Variables
+from urdfkin.model.pose import inverse, pose
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+
+_ORIGIN = np.zeros(3)
+_Vectors = tuple[Support, Support]
+
+
+def curvature(
+    steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
+) -> tuple[list[str], FloatArray]:
+    """Names of variables, and (variables, variables) what second derivatives of D are at most, metres.
+
+    inf where a joint's values are moved by two variables, or by one at two rates.
+    """
+    names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
+    found = np.zeros((len(names), len(names)))
+    for i, j, most in _bends(steps, pairs, variables, frame):
+        if not most:
+            continue
+        if not all(pairs[k].a.slope and pairs[k].a.slope == pairs[k].b.slope for k in (i, j)):
+            return names, np.full_like(found, math.inf)
+        bend = most * abs(pairs[i].a.slope * pairs[j].a.slope)
+        at, to = (names.index(pairs[k].a.variable) for k in (i, j))
+        found[at, to] += bend
+        if i != j:
+            found[to, at] += bend
+    return names, found
+
+
+def _bends(
+    steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
+) -> Iterator[tuple[int, int, float]]:
+    """For two steps, i not in front of j, the largest second derivative by the joints' values."""
+    free = [_without_place(step) for step in steps]
+    d, y = at_the_frame(frame, COARSE)
+    for i in reversed(range(len(steps))):
+        first = _derived(steps[i], pairs[i], variables, d, y)
+        if steps[i].kind == "turns":
+            yield i, i, _in_front(_crossed(free[i], *first), free[: i + 1], pairs, variables)
+        vectors = before_it(free[i], *first)
+        for j in reversed(range(i)):
+            if steps[j].kind == "turns":
+                second = _derived(free[j], pairs[j], variables, *vectors)
+                yield i, j, _in_front(second, free[: j + 1], pairs, variables)
+                vectors = passed(free[j], pairs[j], variables, *vectors)
+            else:
+                vectors = before_it(free[j], *vectors)
+        d, y = passed(steps[i], pairs[i], variables, d, y)
+
+
+def _in_front(vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables) -> float:
+    """The largest d in front of all steps, of vectors behind the last one's L."""
+    vectors = before_it(steps[-1], *vectors)
+    for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
+        slides = step.kind != "turns"
+        vectors = before_it(step, *vectors) if slides else passed(step, pair, variables, *vectors)
+    return vectors[0].largest()
+
+
+def _derived(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
+    """The derivatives of both by a joint's value, behind its L."""
+    if step.kind != "turns":
+        u, other = step.axis.direction, step.other.direction
+        return point(d.grid, other - u), point(d.grid, other)
+    d, y = difference(step, pair, variables, y, d), y.turned(step.other, *variables.range(pair.b))
+    return _crossed(step, d, y)
+
+
+def _crossed(step: Step, d: Support, y: Support) -> _Vectors:
+    """U x both."""
+    G, axis, other = d.grid.points, step.axis, step.other
+    most = 0.0
+    if other is not axis:
+        reach = Support(d.grid, y.values - G @ other.point).largest()
+        most = float(np.linalg.norm(other.direction - axis.direction)) * reach
+        most += float(np.linalg.norm(np.cross(axis.direction, axis.point - other.point)))
+    across, there = np.cross(G, axis.direction), np.cross(G, other.direction)
+    bent = Support(d.grid, d.at(across) + most * d.grid.lengths)
+    return bent, Support(d.grid, y.at(there) - there @ other.point)
+
+
+def _without_place(step: Step) -> Step:
+    """What a step does to vectors."""
+    axis = Screw(step.axis.direction, _ORIGIN)
+    other = axis if step.other is step.axis else Screw(step.other.direction, _ORIGIN)
+    before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
+    return replace(step, axis=axis, other=other, before=before)
+
+
+#: How many boxes there may be at a time: a second or two of a processor for a frame.
+MOST = 2**17
+#: So many are computed at a time: Jacobians of more would take gigabytes.
+TOGETHER = 2**16
+
+
+class Boxes:
+    """One frame's distance, looked at in boxes.
+
+    Args:
+        search: Both robots.
+        frame: The frame.
+        names: Of the variables that move it: see `moved_together`.
+    """
+
+    def __init__(self, search: Search, frame: FramePair, names: Sequence[str]) -> None:
+        self.search = search
+        self.at = [search.names.index(name) for name in names]
+        self.middle = search.ends.mean(axis=1)
+        trees = [robot.tree for robot in search.robots]
+        self.frames = trees[0].link_frames[frame.a], trees[1].link_frames[frame.b]
+        # B's frame is seen from A's root, where it is another tool.
+        q = search.configurations(self.middle[np.newaxis])[1]
+        base = trees[1].link_frames[search.found.base[1]]
+        self.seen = search.hold @ inverse(urdfkins(search.robots[1], q, [base])[0, 0])
+        self.tool = inverse(frame.tool)[:3, 3]
+        #: (nv, variables) rates of either robot by the variables'.
+        self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
+        lines = {joint.name: Line(f"a:{joint.name}", 1.0, 0.0) for joint in trees[0].joints if joint.nv == 1}
+        for rates, tree, own in zip(self.rates, trees, (lines, search.variables.leaders), strict=True):
+            for joint, line in own.items():
+                if line.variable in names:
+                    rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope
+
+    def bounds(self, c: FloatArray, h: FloatArray) -> FloatArray:
+        """(n,) the largest |D + sum_i D_i x_i| over |x_i| <= h_i, at middles (n, variables)."""
+        D, G = self.at_middles(c)
+        size = np.sqrt((D * D).sum(axis=1))
+        along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, NOT_ZERO)[:, np.newaxis]
+        across = np.sqrt(np.maximum((G * G).sum(axis=1) - along * along, 0.0))
+        return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
+
+    def at_middles(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(n, 3) D and (n, 3, variables) its derivatives at values (n, variables)."""
+        z = np.tile(self.middle, (len(c), 1))
+        z[:, self.at] = c
+        (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
+        p_a, J_a = self._origin(a, q_a, self.frames[0], np.zeros(3))
+        p_b, J_b = self._origin(b, q_b, self.frames[1], self.tool)
+        R, p = self.seen[:3, :3], self.seen[:3, 3]
+        return p_b @ R.T + p - p_a, R @ (J_b @ self.rates[1]) - J_a @ self.rates[0]
+
+    def _origin(
+        self, robot: Robot, q: FloatArray, frame: str, tool: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """(n, 3) where a point of a frame is, and (n, 3, nv) its Jacobian."""
+        T, J = urdfkins(robot, q, [frame])[:, 0], robot.jacobian(q, frame, verify=False)
+        if not tool.any():
+            return T[:, :3, 3], J[:, :3]
+        lever = T[:, :3, :3] @ tool
+        return T[:, :3, 3] + lever, J[:, :3] + np.cross(J[:, 3:], lever[:, :, np.newaxis], axis=1)
+
+
+def tightened(search: Search, frame: FramePair, target: float, upper: float, most: int = MOST) -> float:
+    """A bound on a frame's distance, metres: `target` where that can be proven, else one of up to `upper`.
+
+    Args:
+        search: Both robots.
+        frame: The frame.
+        target: What would be enough.
+        upper: What is proven already.
+        most: How many boxes there may be at a time.
+    """
+    variables = search.variables
+    steps, pairs = moved_together(search.found, variables, frame)
+    some = [pair for pair in pairs if pair is not None]
+    all_round = all(
+        step.kind == "turns" and abs(line.slope) == 1.0
+        for step, pair in zip(steps, some, strict=False)
+        for line in (pair.a, pair.b)
+        if line.slope and math.inf in np.abs(variables.ranges[line.variable])
+    )
+    if not target < upper < math.inf or len(some) < len(pairs) or not (all(search.stands) and all_round):
+        return upper
+    names, M = curvature(steps, some, variables, frame)
+    boxes = Boxes(search, frame, names)
+    ends = search.ends[boxes.at]
+    c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
+    if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
+        return upper
+    if not names:  # nothing on the way moves one against the other
+        return min(upper, float(boxes.bounds(c, h)[0]))
+    while len(c) and 2 * len(c) <= most:
+        i = _longest(h, M)
+        h[i] /= 2.0
+        c, proven = np.repeat(c, 2, axis=0), np.repeat(proven, 2)
+        c[::2, i] -= h[i]
+        c[1::2, i] += h[i]
+        if (rest := 0.5 * float(h @ M @ h)) < upper:
+            bounds = [boxes.bounds(c[k : k + TOGETHER], h) for k in range(0, len(c), TOGETHER)]
+            proven = np.minimum(proven, np.concatenate(bounds) + rest)
+            keep = proven > target
+            c, proven = c[keep], proven[keep]
+    return float(proven.max(initial=target))
+
+
+def moved_together(
+    found: Alignment, variables: Variables, frame: FramePair
+) -> tuple[list[Step], list[Pair | None]]:
+    """The steps on the way to a frame from the first that differs, or that moves with one that does.
+
+    What stands in front turns D and leaves its length, but a variable that moves a joint there, as the one
+    that a mimic joint behind it follows, bends D by that turn too.
+    """
+    steps, pairs = found.path(frame.previous), [variables.pairs[i] for i in found.indices(frame.previous)]
+    first = len(steps) - len(behind_first(found, variables, frame)[0])
+    for i in reversed(range(first)):
+        if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
+            first = i  # what stands between brings its own variables
+    return steps[first:], pairs[first:]
+
+
+def _variables(pairs: Sequence[Pair | None]) -> set[str]:
+    lines = (line for pair in pairs if pair is not None for line in (pair.a, pair.b))
+    return {line.variable for line in lines if line.slope}
+
+
+def _longest(h: FloatArray, M: FloatArray) -> int:
+    """The variable whose half width leaves most open."""
+    return int((h * (M @ h)).argmax())
+
+
+def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
+    """How often a box has to be halved before it can tell anything."""
+    h, count = h.copy(), 0
+    while 0.5 * h @ M @ h >= upper:
+        h[_longest(h, M)] /= 2.0
+        count += 1
+    return count

@@ -1,0 +1,320 @@
+"""What `same` found as data that another can check again without searching."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from urdfkin.comparison.branch_and_bound import tightened
+from urdfkin.comparison.lower_bound import Search, pinocchios, urdfkins
+from urdfkin.comparison.result import Difference, Interval, JointMap, Sameness
+from urdfkin.comparison.verdict import CONFIRMED, Comparator, digest
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.mechanisms.alignment import Alignment, FramePair, Gauge
+from urdfkin.model.mechanisms.matcher import align
+from urdfkin.model.mechanisms.mechanism import JointTransform, apart, is_pose
+from urdfkin.model.mechanisms.upper_bound import COARSE, FINE, upper_bounds
+from urdfkin.model.mechanisms.variables import Variables, variables_of
+from urdfkin.model.tree import JointKind
+from urdfkin.robot import Robot
+
+#: How many boxes there may be at a time to prove a bound that is claimed.
+MOST_AGAIN = 2**22
+#: Up to what share numbers of a document are the same on any machine; m or rad that are 0 beside 0.
+_ALIKE, _ZERO = 1e-9, 1e-15
+#: By how many eps of it a bound that is proven again may be larger: its sums may round otherwise elsewhere.
+_LAST_BITS = 64.0
+#: What is said of Pinocchio, and up to what share its two digits tell a number.
+_CONFIRMATION = (
+    r"Pinocchio \S+ finds at most (?P<metres>\d+(\.\d+)?(e[+-]?\d+)?) m at (?P<count>\d+) configurations, "
+    "within the bounds"
+)
+_TWO_DIGITS = 0.06
+#: The layout of the document, and its version.
+LAYOUT = "urdfkin-same-1"
+#: Parts that follow from how the models are laid on each other.
+DERIVED = ("after", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
+
+
+def certificate(found: Sameness) -> dict[str, Any]:
+    """The document: map, verdict, differences, and of each frame its interval; null is "no bound"."""
+    models = zip(found.names, found.sources, found.digests, strict=True)
+    return {
+        "schema": LAYOUT,
+        **{
+            k: dict(zip(("name", "source", "sha256"), model, strict=True))
+            for k, model in zip("ab", models, strict=True)
+        },
+        "verdict": found.verdict.value,
+        "after": list(found.after),
+        "differences": [_difference(one) for one in found.differences],
+        "remarks": [_difference(one) for one in found.remarks],
+        "joints": [_joint(one) for one in found.joints],
+        "orders": [list(names) for names in found.orders],
+        "links": [list(pair) for pair in found.links],
+        "base": found.base.tolist(),
+        "base_links": list(found.base_links),
+        "rounding": {"metres": found.rounding[0], "radians": found.rounding[1]},
+        "frames": [_interval(frame) for frame in found.frames],
+        "as_written": None if found.as_written is None else _interval(found.as_written),
+        "checked": found.checked,
+    }
+
+
+def _joint(one: JointMap) -> dict[str, Any]:
+    said = {"a": one.a, "b": one.b, "sense": one.sense, "offset": one.offset, "conversion": None}
+    if (made := one.conversion) is not None:
+        pair = {"before": made.before.tolist(), "behind": made.behind.tolist(), "back": made.back}
+        said["conversion"] = pair
+    return said
+
+
+def _difference(one: Difference) -> dict[str, Any]:
+    return {name: getattr(one, name) for name in ("place", "what", "words", "radians", "metres")}
+
+
+def _interval(frame: Interval) -> dict[str, Any]:
+    return {
+        "a": frame.frame,
+        "b": frame.frame_b,
+        "lower": frame.lower,
+        "upper": None if math.isinf(frame.upper) else frame.upper,
+        "radians": None if math.isinf(frame.radians) else frame.radians,
+        "radians_seen": frame.radians_seen,
+        "q_a": list(frame.q_a),
+        "q_b": list(frame.q_b),
+    }
+
+
+def recheck(document: Mapping[str, Any], a: Robot, b: Robot) -> list[str]:
+    """What of a certificate does not hold for two models; nothing where all of it does.
+
+    The models are laid on each other as the certificate says, so that nothing is searched. That has to be
+    something that two models of one robot may differ in: rigid motions, joints that there are, orders that
+    axes allow. What follows must be what it says, to the last remark; each lower bound is computed at its
+    configuration, by urdfkin and Pinocchio, each upper bound is proven again.
+
+    Args:
+        document: What `certificate` made, checked against its schema.
+        a: The first model.
+        b: The second.
+
+    Raises:
+        InputError: it was made of other texts, or names what these models do not have.
+    """
+    for which, robot in (("a", a), ("b", b)):
+        if document[which]["sha256"] != digest(robot):
+            raise InputError(
+                "the certificate was made of another text",
+                where=f"model {which.upper()}",
+                found=f"SHA-256 {digest(robot)[:12]}..., not {document[which]['sha256'][:12]}...",
+                remedy="compare the models anew: urdfkin same A B",
+            )
+    try:
+        return list(_against(document, Comparator((a, b), {}, bounds=True)))
+    except UnknownNameError as error:
+        raise InputError("the certificate names what a model does not have", found=str(error)) from error
+
+
+def _against(document: Mapping[str, Any], judge: Comparator) -> Iterator[str]:
+    gauge = _gauge(document)
+    if (why := _not_a_gauge(document, gauge, judge)) is not None:
+        yield why
+        return
+    found = align(*judge.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, gauge)
+    variables = variables_of(found, judge.tolerance)
+    said = judge.said(found, variables)
+    wrong = list(_said_against(document, judge, said))
+    yield from wrong
+    claims = {(frame["a"], frame["b"]): frame for frame in document["frames"]}
+    if len(claims) < len(document["frames"]):
+        yield "a frame has two intervals"
+    search = judge.search(found, variables)
+    for frame, names in zip(found.frames, said.links, strict=True):
+        if (claim := claims.pop(names, None)) is None:
+            yield f"frame {names[0]} has no interval"
+        else:
+            yield from _interval_against(search, frame, claim, said.rounding, sharply=not wrong)
+    yield from (f"frame {names[0]} is not one of both models" for names in claims)
+    if document["as_written"] is not None:
+        yield from _as_written_against(document["as_written"], judge, found, sharply=not wrong)
+    yield from _confirmation_against(document["checked"], judge, found, variables)
+
+
+def _said_against(document: Mapping[str, Any], judge: Comparator, said: Sameness) -> Iterator[str]:
+    """What does not hold of names, verdict, differences and all else that costs nothing to compute."""
+    for which, robot in zip("ab", judge.robots, strict=True):
+        if document[which]["name"] != robot.name:
+            yield f"model {which.upper()}: its name is {robot.name}, not {document[which]['name']}"
+    again = certificate(said)
+    wrong = {one["words"]: one for one in again["differences"]}
+    claimed = {one["words"]: one for one in document["differences"]}
+    yield from (f"not named as a difference: {words}" for words in wrong if words not in claimed)
+    yield from (f"no difference: {words}" for words in claimed if words not in wrong)
+    if len(claimed) < len(document["differences"]):
+        yield "differences: one is named twice"
+    for words, one in claimed.items():
+        if words in wrong and not _same_difference(one, wrong[words], said.rounding):
+            yield f"differences: the models say otherwise of the size of: {words}"
+    if document["verdict"] != said.verdict.value:
+        yield f"the verdict is {said.verdict.value}, not {document['verdict']}"
+    yield from (
+        f"{part}: the models say otherwise" for part in DERIVED if not _alike(document[part], again[part])
+    )
+
+
+def _same_difference(
+    claimed: Mapping[str, Any], said: Mapping[str, Any], rounding: tuple[float, float]
+) -> bool:
+    """Whether place, parameter and sizes of a difference are the same, these but for rounding."""
+    sizes = zip(("metres", "radians"), rounding, strict=True)
+    return all(claimed[part] == said[part] for part in ("place", "what")) and all(
+        math.isclose(claimed[part], said[part], rel_tol=_ALIKE, abs_tol=most) for part, most in sizes
+    )
+
+
+def _confirmation_against(
+    claimed: str, judge: Comparator, found: Alignment, variables: Variables
+) -> Iterator[str]:
+    """What does not hold of Pinocchio's confirmation; one that says that it was not asked claims nothing."""
+    if claimed.startswith(("not asked of Pinocchio: ", "not verified by Pinocchio: ")):
+        return
+    said = re.fullmatch(_CONFIRMATION, claimed)
+    if said is None or int(said["count"]) != CONFIRMED:
+        yield "checked: no confirmation that urdfkin writes"
+        return
+    off, rounding = float(judge.asked(found, variables).max(initial=0.0)), judge.rounding(found, variables)[0]
+    if not math.isclose(float(said["metres"]), off, rel_tol=_TWO_DIGITS, abs_tol=rounding):
+        yield f"checked: Pinocchio finds at most {off:.2g} m, not {said['metres']} m"
+
+
+def _gauge(document: Mapping[str, Any]) -> Gauge:
+    """What is free, as the document has it."""
+    joints, base = document["joints"], document["base_links"]
+    return Gauge(
+        (base[0], base[1]),
+        np.array(document["base"]),
+        {one["a"]: (one["sense"], one["offset"]) for one in joints},
+        {
+            one["a"]: JointTransform(np.array(made["before"]), np.array(made["behind"]), made["back"])
+            for one in joints
+            if (made := one["conversion"]) is not None
+        },
+        tuple(tuple(names) for names in document["orders"]),
+    )
+
+
+def _not_a_gauge(document: Mapping[str, Any], gauge: Gauge, judge: Comparator) -> str | None:
+    """Why what is said to be free is nothing that a model may differ in; None where it is."""
+    a, b = judge.mechanisms
+    for joint in document["joints"]:
+        a.tree.joint_index(joint["a"])
+        b.tree.joint_index(joint["b"])
+    if not is_pose(JointKind.FLOATING, gauge.X):
+        return "base: no rigid motion"
+    for name, made in gauge.conversions.items():
+        if not made.holds_for(a.tree.joints[a.tree.joint_index(name)].kind):
+            return f"joint {name}: B's joint cannot be where its conversion says"
+    for names in gauge.orders:
+        if not b.may_be_taken(names, judge.tolerance):
+            return f"orders: axes do not allow {', '.join(names)}"
+        b = b.in_order(names)
+    return None
+
+
+def _alike(claimed: Any, said: Any) -> bool:
+    """Whether two parts of a document are the same, numbers but for the last digits."""
+    if isinstance(said, dict):
+        return claimed.keys() == said.keys() and all(_alike(claimed[key], said[key]) for key in said)
+    if isinstance(said, list):
+        return len(claimed) == len(said) and all(map(_alike, claimed, said))
+    if isinstance(said, float) and isinstance(claimed, float | int):
+        return math.isclose(claimed, said, rel_tol=_ALIKE, abs_tol=_ZERO)
+    return bool(claimed == said)
+
+
+def _as_written_against(
+    claim: Mapping[str, Any], judge: Comparator, found: Alignment, *, sharply: bool
+) -> Iterator[str]:
+    """What does not hold of how far a frame is off with nothing put right."""
+    written = judge.as_written(found)
+    variables = variables_of(written, judge.tolerance)
+    names = [(judge.trees[0].links[frame.a], judge.trees[1].links[frame.b]) for frame in written.frames]
+    if (claim["a"], claim["b"]) not in names:
+        yield f"as written: frame {claim['a']} is not one of both models"
+        return
+    frame = written.frames[names.index((claim["a"], claim["b"]))]
+    search, rounding = judge.search(written, variables), judge.rounding(written, variables)
+    against = _interval_against(search, frame, claim, rounding, sharply=sharply)
+    yield from (f"as written: {line}" for line in against)
+
+
+def _interval_against(
+    search: Search,
+    frame: FramePair,
+    claim: Mapping[str, Any],
+    rounding: tuple[float, float],
+    *,
+    sharply: bool,
+) -> Iterator[str]:
+    """What does not hold of an interval: its lower bound is computed, its upper ones are proven again.
+
+    Args:
+        search: Both robots.
+        frame: The frame.
+        claim: What the document says of it.
+        rounding: (m, rad) that is taken for none.
+        sharply: Whether an upper bound that costs boxes is proven; in vain where another part is wrong.
+    """
+    against = list[str]()
+    if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
+        against += _not_attained(search, frame, claim, rounding)
+    yield from against
+    metres = (math.inf if claim["upper"] is None else claim["upper"]) - rounding[0]
+    radians = (math.inf if claim["radians"] is None else claim["radians"]) - rounding[1]
+    for grid in (COARSE, FINE):
+        proven = upper_bounds(search.found, search.variables, frame, grid)
+        if holds := _within(proven[0], metres, rounding[0]) and _within(proven[1], radians, rounding[1]):
+            break
+    if holds:
+        return
+    place = f"frame {claim['a']}"
+    if _within(proven[1], radians, rounding[1]):
+        if against or not sharply:
+            return
+        # A claim below what is attained is not searched for: no search could prove it.
+        attained = max(claim["lower"], float(search.seen([frame])[0].max()))
+        if metres < attained - 2.0 * rounding[0]:
+            yield f"{place}: its upper bound is not proven, it is {attained:.6g} m off somewhere"
+            return
+        proven = tightened(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
+        if _within(proven[0], metres, rounding[0]):
+            return
+    yield f"{place}: its upper bound is not proven, {proven[0]:.6g} m and {proven[1]:.6g} rad are"
+
+
+def _not_attained(
+    search: Search, frame: FramePair, claim: Mapping[str, Any], rounding: tuple[float, float]
+) -> Iterator[str]:
+    """Why a lower bound is none: its configurations, or what either library finds there."""
+    place = f"frame {claim['a']}"
+    q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
+    if not search.belong_together(q_a, q_b):
+        yield f"{place}: its configurations do not belong together, or leave the limits"
+        return
+    for computed, by in ((urdfkins, "urdfkin"), (pinocchios, "Pinocchio")):
+        turned, off = apart(*(Ts[0, 0] for Ts in search.poses_at(q_a, q_b, [frame], computed)))
+        if off < claim["lower"] - rounding[0]:
+            yield f"{place}: {by} finds {off:.6g} m at its configuration, not {claim['lower']:.6g} m"
+        if turned < claim["radians_seen"] - rounding[1]:
+            yield f"{place}: {by} finds {turned:.6g} rad there, not {claim['radians_seen']:.6g} rad"
+
+
+def _within(proven: float, claimed: float, rounding: float) -> bool:
+    """Whether a bound that is proven allows the one that is claimed: both round, the same way or not."""
+    return proven <= claimed + rounding + _LAST_BITS * EPS * abs(claimed) if math.isfinite(claimed) else True

@@ -1,0 +1,218 @@
+"""What changed between two versions of one description, and how far each change moves a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from xml.etree.ElementTree import Element
+
+from urdfkin.comparison.result import Interval, angle, length, up_to
+from urdfkin.comparison.verdict import same
+from urdfkin.dh.table import DHTable
+from urdfkin.errors import InputError
+from urdfkin.errors.escape import log_line
+from urdfkin.errors.numbers import parse_float
+from urdfkin.loading import load
+from urdfkin.model.tree import Joint, KinematicTree
+from urdfkin.robot import Robot
+from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.urdf.sources import Source
+from urdfkin.urdf.writer import to_urdf
+
+#: Attributes that are several numbers, and what each is called.
+_PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
+#: What holds of a joint where its file says nothing.
+_DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in parts}
+_AXIS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
+_RULE = {"mimic multiplier": 1.0, "mimic offset": 0.0}
+#: What of a joint moves links.
+_MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child")
+
+Value = float | str
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One attribute that is another, or an element that only one version has.
+
+    Attributes:
+        element: "joint elbow", "link tool".
+        what: "origin x", "mass", ...; "" where the element itself came or went.
+        old: None where there was nothing.
+        new: None where there is nothing any more.
+    """
+
+    element: str
+    what: str
+    old: Value | None
+    new: Value | None
+
+    @property
+    def moves(self) -> bool:
+        """Whether links may move otherwise for it."""
+        return self.element.startswith("joint ") and self.what.split(" ")[0] in _MOVING
+
+    def __str__(self) -> str:
+        if not self.what:
+            return log_line(f"{self.element}: {'new' if self.old is None else 'gone'}")
+        return log_line(f"{self.element}: {self.what} {word(self.old)} -> {word(self.new)}")
+
+
+def word(value: Value | None) -> str:
+    """As a reviewer would write it."""
+    if isinstance(value, float):
+        return next(text for text in (f"{value:.15g}", repr(value)) if float(text) == value)
+    return "none" if value is None else value
+
+
+def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
+    """How far changes move a frame; where they do not, how far they turn it."""
+    if frame.lower == 0.0:
+        return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
+    return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """The frame that one joint's changes alone move most, and the interval of its distance."""
+
+    element: str
+    interval: Interval
+
+    @property
+    def words(self) -> str:
+        """What they do."""
+        return motion_words(self.interval, "moves", "turns")
+
+    def __str__(self) -> str:
+        return log_line(f"alone {self.words}")
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """What changed between two versions of a description; make one with `urdfkin.diff`.
+
+    Attributes:
+        sources: What was given.
+        changes: In the order of the file: joints, links, then the robot itself.
+        effects: Of joints whose changes move links, each alone.
+        total: Of all changes together, the farthest frame; None where nothing moves.
+    """
+
+    sources: tuple[str, str]
+    changes: tuple[Change, ...]
+    effects: tuple[Effect, ...]
+    total: Interval | None
+
+    def __bool__(self) -> bool:
+        """Whether anything changed."""
+        return bool(self.changes)
+
+    @property
+    def effect_of(self) -> dict[str, Effect]:
+        """By element."""
+        return {effect.element: effect for effect in self.effects}
+
+
+def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: bool = True) -> Changes:
+    """What changed from one version of a description to another, as a reviewer would say it.
+
+    Args:
+        a: The old version: a robot, or what `load` takes.
+        b: The new one.
+        effects: Whether to bound how far each joint's changes move the frames behind it.
+
+    Raises:
+        UrdfError: a version with errors; SourceError, UnknownNameError, InputError: as `load`.
+
+    Example:
+        >>> import urdfkin
+        >>> found = urdfkin.diff("ur5", "ur5_limited")
+        >>> print(found.changes[0])
+        joint shoulder_pan_joint: limit lower -6.28318530718 -> -3.14159265359
+    """
+    old, new = (source if isinstance(source, Robot) else load(source) for source in (a, b))
+    changes = tuple(_changes(old.urdf, new.urdf))
+    moving = list(dict.fromkeys(change.element for change in changes if change.moves)) if effects else []
+    some = (_effect(old, new, element) for element in moving)
+    total = same(old, new).worst_as_written if moving else None
+    return Changes((old.source, new.source), changes, tuple(one for one in some if one is not None), total)
+
+
+def _changes(old: str, new: str) -> Iterator[Change]:
+    before, after = plain_xml(old), plain_xml(new)
+    if before.get("name") != after.get("name"):
+        yield Change("robot", "name", before.get("name"), after.get("name"))
+    for tag in ("joint", "link"):
+        was, now = ({str(e.get("name")): e for e in root.findall(tag)} for root in (before, after))
+        for name in dict.fromkeys([*was, *now]):
+            element = f"{tag} {name}"
+            if name not in was or name not in now:
+                yield Change(element, "", *(tag if name in there else None for there in (was, now)))
+                continue
+            facts, others = (_facts(e, tag) for e in (was[name], now[name]))
+            for what in dict.fromkeys([*facts, *others]):
+                if facts.get(what) != others.get(what):
+                    yield Change(element, what, facts.get(what), others.get(what))
+
+
+def _facts(element: Element, tag: str) -> dict[str, Value]:
+    """Everything that an element says: the way to it in words, and the value."""
+    found = dict(_said(element, ""))
+    found.pop("name", None)
+    if tag == "joint":
+        defaults: dict[str, Value] = dict(_DEFAULTS)
+        defaults |= _AXIS if found.get("type") not in ("fixed", "floating") else {}
+        defaults |= _RULE if "mimic joint" in found else {}
+        found = defaults | found
+    return found
+
+
+def _said(element: Element, way: str) -> Iterator[tuple[str, Value]]:
+    for name, text in element.attrib.items():
+        if (parts := _PARTS.get(name)) and len(words := text.split()) == len(parts):
+            yield from (
+                (f"{way} {part}".strip(), _value(word)) for part, word in zip(parts, words, strict=True)
+            )
+        else:
+            named = way if name in ("value", "link") and way else f"{way} {name}".strip()
+            yield named, _value(text)
+    tags = [child.tag for child in element]
+    for k, child in enumerate(element):
+        if isinstance(child.tag, str):
+            count = f" {tags[: k + 1].count(child.tag)}" if tags.count(child.tag) > 1 else ""
+            yield from _said(child, f"{way} {child.tag}{count}".strip())
+
+
+def _value(text: str) -> Value:
+    found = parse_float(text)
+    return text if found is None else found
+
+
+def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
+    """What one joint's changes do alone: the old robot with that joint of the new one."""
+    name = element.removeprefix("joint ")
+    trees = old.tree, new.tree
+    if any(name not in {joint.name for joint in tree.joints} for tree in trees):
+        return None
+    at, there = (tree.joint_index(name) for tree in trees)
+    ends = [
+        (tree.links[tree.joints[i].parent], tree.links[i + 1])
+        for tree, i in zip(trees, (at, there), strict=True)
+    ]
+    joint = trees[1].joints[there]
+    if ends[0] != ends[1] or (joint.mimic and joint.mimic.leader not in {j.name for j in trees[0].joints}):
+        return None
+    try:
+        changed = load(to_urdf(_exchanged(trees[0], at, joint)), verify=False)
+        plain = load(to_urdf(trees[0]), verify=False)
+    except InputError:  # what a URDF cannot say once more has no effect that could be computed so
+        return None
+    worst = same(plain, changed).worst_as_written
+    return None if worst is None else Effect(element, worst)
+
+
+def _exchanged(tree: KinematicTree, at: int, joint: Joint) -> KinematicTree:
+    joints = list(tree.joints)
+    joints[at] = replace(joint, parent=joints[at].parent)
+    return KinematicTree(tree.name, tree.links, tuple(joints))

@@ -1,0 +1,405 @@
+"""`same`: are these two models the same robot? The verdict, and what it rests on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+
+from urdfkin.comparison.branch_and_bound import MOST, tightened
+from urdfkin.comparison.lower_bound import Search, pinocchios
+from urdfkin.comparison.result import FREE, Interval, JointMap, Sameness, Verdict, demand_joint_names
+from urdfkin.comparison.wording import differences, put_right, remarks
+from urdfkin.dh.table import DHTable
+from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.errors.validators import real_number, whole_number
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.loading import load
+from urdfkin.model.mechanisms.alignment import AS_WRITTEN, IDENTITY, Alignment, FramePair
+from urdfkin.model.mechanisms.matcher import align
+from urdfkin.model.mechanisms.mechanism import Mechanism, Tolerance, apart, tolerance_of
+from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
+from urdfkin.model.mechanisms.variables import Variables, variables_of
+from urdfkin.model.pose import inverse
+from urdfkin.model.ranges import WIDEST, narrowed_ranges
+from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.robot import Robot
+from urdfkin.urdf.sources import Source
+from urdfkin.verify.pinocchio_module import version
+from urdfkin.verify.sampling import checked_choice
+
+#: Configurations at which Pinocchio confirms both robots.
+CONFIRMED = 8
+#: Frames that are far off at random configurations, one of which is the farthest.
+FARTHEST = 4
+#: Metres: squares of longer ways overflow.
+LONGEST = 1e150
+#: How near to what a search finds a bound is near enough.
+NEAR = 1.05
+
+
+def same(
+    a: Robot | Source | DHTable,
+    b: Robot | Source | DHTable,
+    *,
+    map: Mapping[str, str] | None = None,
+    bounds: bool = True,
+    boxes: int = MOST,
+    within: float | None = None,
+) -> Sameness:
+    """Whether two models move alike in every configuration, proven.
+
+    By the product of exponentials T(q) = exp(S_1 q_1) ... exp(S_n q_n) H, a link's motion is fixed by the
+    joints' screws S_i and its pose H at home. Two models move alike for all q if these agree, up to what may
+    differ: where the base stands, which fixed links there are, each joint's zero and sense, names, the order
+    of coordinates, frames that only are there to be looked at.
+
+    Args:
+        a: A robot, or what `load` takes.
+        b: Likewise.
+        map: Joints of `a` and what they are called in `b`, where names and places do not tell.
+        bounds: Whether the largest distances are bounded, which takes longest where models differ.
+        boxes: How many boxes of configurations may be looked at at a time, for sharper bounds where many
+            things differ; 0: none.
+        within: Metres and radians that `Sameness.within` will be asked for: `boxes` are then spent on it.
+
+    Returns:
+        The verdict with the map that it found, the first difference, and for every frame an interval in
+        which its largest distance over all configurations within limits lies.
+
+    Raises:
+        UrdfError: a model with errors; SourceError, UnknownNameError, InputError: as `load`.
+
+    Example:
+        >>> import urdfkin
+        >>> found = urdfkin.same("ur5", "ur5_limited")
+        >>> found.verdict.value, len(found.remarks)
+        ('same', 5)
+        >>> found = urdfkin.same("talos", "talos_reduced_corrected")
+        >>> bool(found)
+        False
+    """
+    robots = _robot(a), _robot(b)
+    given = _demand_map(map)
+    whole_number(boxes, "boxes", 0)
+    if within is not None:
+        within = real_number(within, "within")
+    for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
+        demand_joint_names(robot.tree, names, which)
+    # Copies, whose accounts are their own: what is computed here nobody was handed.
+    return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
+
+
+def _demand_map(given: Mapping[str, str] | None) -> dict[str, str]:
+    """Names and names, or InputError."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping) or any(
+        not isinstance(name, str) for pair in given.items() for name in pair
+    ):
+        raise InputError("joints of A and their names in B", where="map", found=repr(given))
+    return dict(given)
+
+
+def _robot(source: Robot | Source | DHTable) -> Robot:
+    return source if isinstance(source, Robot) else load(source)
+
+
+class Comparator:
+    """Two robots on their way to a verdict."""
+
+    def __init__(
+        self,
+        robots: tuple[Robot, Robot],
+        given: dict[str, str],
+        bounds: bool,
+        boxes: int = MOST,
+        within: float | None = None,
+    ) -> None:
+        self.robots, self.given, self.bounds, self.boxes = robots, given, bounds, boxes
+        self.within = within
+        trees = robots[0].tree, robots[1].tree
+        parting = _fixed_here(trees[0], trees[1]), _fixed_here(trees[1], trees[0])
+        self.mechanisms = Mechanism(trees[0], parting[0]), Mechanism(trees[1], parting[1])
+        self.trees = trees
+        for which, mechanism, robot in zip("AB", self.mechanisms, robots, strict=True):
+            if not mechanism.size <= LONGEST:
+                raise InputError(
+                    f"a way from the root to a link is longer than {LONGEST:g} m: its square is no double",
+                    where=f"model {which}, {robot.name}",
+                    found=f"{mechanism.size:.6g} m",
+                    remedy="write origins in metres",
+                )
+        self.tolerance: Tolerance = tolerance_of(*self.mechanisms)
+
+    def judged(self) -> Sameness:
+        """The verdict."""
+        found = align(*self.mechanisms, self.given)
+        self._demand_the_map(found)
+        variables = variables_of(found, self.tolerance)
+        said = self.said(found, variables)
+        frames = self._intervals(found, variables)
+        as_written, most = None, said.written
+        if self.bounds:
+            most = _largest([(frame.upper, frame.radians) for frame in frames])
+        if said.after and self.bounds:
+            written = self.as_written(found)
+            moving = variables_of(written, self.tolerance)
+            as_written = self._farthest(written, moving)
+            most = self._most(written, moving, as_written)
+            if len(written.frames) < len(self._counted(found)):
+                most = (math.inf, math.inf)
+        checked = self._confirmed(found, variables, frames)
+        return replace(said, frames=frames, as_written=as_written, written=most, checked=checked)
+
+    def said(self, found: Alignment, variables: Variables) -> Sameness:
+        """What follows from how the models are laid on each other; intervals and Pinocchio do not.
+
+        Frames that are tools, set elsewhere, are put right in `found`.
+        """
+        names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
+        links = self.trees[0].links, self.trees[1].links
+        tables = any(robot.origin.table for robot in self.robots)
+        after = put_right(found, self.tolerance, tables=tables)
+        free = {what for what, _ in after}
+        wrong = differences(found, variables)
+        return Sameness(
+            names=(self.robots[0].name, self.robots[1].name),
+            sources=(self.robots[0].source, self.robots[1].source),
+            digests=(digest(self.robots[0]), digest(self.robots[1])),
+            verdict=Verdict.DIFFERS if wrong else Verdict.SAME_AFTER if after else Verdict.SAME,
+            after=tuple(dict.fromkeys(words for _, words in after)),
+            up_to=tuple(what for what in FREE if what in free),
+            differences=wrong,
+            remarks=remarks(found, variables, self.tolerance),
+            joints=tuple(
+                JointMap(names[0][s.a], names[1][s.b], s.sense, s.offset, s.conversion) for s in found.steps
+            ),
+            links=tuple((links[0][f.a], links[1][f.b]) for f in found.frames),
+            orders=found.b.orders,
+            base=found.X,
+            base_links=(links[0][found.base[0]], links[1][found.base[1]]),
+            rounding=self.rounding(found, variables),
+            frames=(),
+            as_written=None,
+            written=(math.inf, math.inf),
+            narrowed=tuple(
+                f"{which}: {one}"
+                for which, tree in zip("AB", self.trees, strict=True)
+                for one in narrowed_ranges(tree)
+            ),
+            checked="",
+            trees=self.trees,
+        )
+
+    def as_written(self, found: Alignment) -> Alignment:
+        """The same joints and links laid on each other with nothing put right: root on root.
+
+        Where only one model has the other's root, the two links of that name are laid on each other. Of a
+        table, whose other frames are its convention's, only links of one name count.
+        """
+        a, b = self.mechanisms
+        gauge = replace(AS_WRITTEN, X=base_as_written(a, b), orders=found.b.orders)
+        written = align(a, b, found.names, gauge)
+        written.frames = written.frames_of(self._counted(found))
+        return written
+
+    def _counted(self, found: Alignment) -> list[tuple[int, int]]:
+        """The links of both that count as written."""
+        tables = any(robot.origin.table for robot in self.robots)
+        links = self.trees[0].links, self.trees[1].links
+        pairs = ((frame.a, frame.b) for frame in found.frames)
+        return [(a, b) for a, b in pairs if not tables or links[0][a] == links[1][b]]
+
+    def _demand_the_map(self, found: Alignment) -> None:
+        """Raise InputError for a pair that was given and cannot be."""
+        made = found.names
+        for ours, theirs in self.given.items():
+            if made.get(ours) != theirs:
+                raise InputError(
+                    "these joints cannot be each other's: the links that carry them are not",
+                    where="map",
+                    found=f"{ours!r} of A, {theirs!r} of B",
+                    remedy="pair the joints before them, too, or leave these out",
+                )
+
+    def search(self, found: Alignment, variables: Variables) -> Search:
+        """What looks for the largest distances."""
+        return Search(self.robots, found, variables)
+
+    def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
+        """What everything that was taken for rounding can do together: each step's share, in turn.
+
+        A joint that goes anywhere counts as if it went no further than it is tried.
+        """
+        ways = [
+            max(abs(end) for end in ends)
+            for step, pair in zip(found.steps, variables.pairs, strict=True)
+            if pair is not None and step.kind == "prismatic"
+            if math.isfinite(sum(ends := variables.range(pair.a)))
+        ]
+        ways += [WIDEST for step in found.steps if step.kind in ("planar", "floating")]
+        reach = max(self.mechanisms[0].size, self.mechanisms[1].size) + sum(ways)
+        deepest = 1 + max((len(found.path(i)) for i in range(len(found.steps))), default=0)
+        return deepest * (self.tolerance.way + self.tolerance.angle * reach), deepest * self.tolerance.angle
+
+    def _intervals(self, found: Alignment, variables: Variables) -> tuple[Interval, ...]:
+        frames = found.frames
+        metres, radians = self.rounding(found, variables)
+        if not self.bounds:
+            return ()
+        uppers = self._uppers(found, variables)
+        off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
+        search = self.search(found, variables)
+        seen = dict(zip(off, search.worst([frames[k] for k in off]), strict=True)) if off else {}
+        self._sharpen(uppers, frames, search, NEAR * max((way for way, _ in seen.values()), default=0.0))
+        return tuple(
+            self._interval(found, frame, search, seen.get(k), (uppers[k][0] + metres, uppers[k][1] + radians))
+            for k, frame in enumerate(frames)
+        )
+
+    def _most(
+        self, written: Alignment, variables: Variables, farthest: Interval | None
+    ) -> tuple[float, float]:
+        """(m, rad) that any frame is off at most; sharper only if that is needed for what was asked."""
+        metres, radians = self.rounding(written, variables)
+        uppers = self._uppers(written, variables)
+        target = 0.0 if self.within is None else self.within - metres
+        if farthest is not None and farthest.lower <= target:
+            self._sharpen(uppers, written.frames, self.search(written, variables), target)
+        most = _largest(uppers)
+        return most[0] + metres, most[1] + radians
+
+    def _uppers(self, found: Alignment, variables: Variables) -> list[tuple[float, float]]:
+        """(m, rad) that each frame is off at most, more closely where it is most."""
+        frames = found.frames
+        uppers = [upper_bounds(found, variables, frame) for frame in frames]
+        off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
+        fine = set[int]()
+        while len(fine) < FARTHEST and off and (widest := max(off, key=lambda k: uppers[k])) not in fine:
+            uppers[widest] = upper_bounds(found, variables, frames[widest], FINE)
+            fine.add(widest)
+        return uppers
+
+    def _sharpen(
+        self, uppers: list[tuple[float, float]], frames: Sequence[FramePair], search: Search, target: float
+    ) -> None:
+        """Prove that no frame is off by more than a target (m), the widest first, as far as boxes go."""
+        for _ in uppers:
+            widest = max(range(len(uppers)), key=lambda k: uppers[k])
+            if uppers[widest][0] <= target:
+                break
+            sharper = tightened(search, frames[widest], target, uppers[widest][0], self.boxes)
+            uppers[widest] = sharper, uppers[widest][1]
+            if sharper > target:
+                break
+
+    def _farthest(self, found: Alignment, variables: Variables) -> Interval | None:
+        """The interval of the frame that a search finds farthest."""
+        if not found.frames:
+            return None
+        metres, radians = self.rounding(found, variables)
+        search = self.search(found, variables)
+        off = search.seen(found.frames)[0].max(axis=0)
+        far = [found.frames[k] for k in np.argsort(-off, kind="stable")[:FARTHEST]]
+        if off.max() <= metres:  # nothing is moved: the one that is turned most
+            far = [max(found.frames, key=lambda frame: upper_bounds(found, variables, frame)[1])]
+        climbed = zip(search.worst(far), far, strict=True)
+        seen, frame = max(climbed, key=lambda both: both[0][0])
+        upper = upper_bounds(found, variables, frame, FINE)
+        return self._interval(found, frame, search, seen, (upper[0] + metres, upper[1] + radians))
+
+    def _interval(
+        self,
+        found: Alignment,
+        frame: FramePair,
+        search: Search,
+        seen: tuple[float, FloatArray] | None,
+        upper: tuple[float, float],
+    ) -> Interval:
+        names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
+        if seen is None:
+            return Interval(*names, 0.0, *upper, 0.0, (), ())
+        metres, z = seen
+        rounding = self.rounding(found, search.variables)
+        if metres <= rounding[0] and upper[1] > rounding[1]:
+            z = search.most_turned(frame)
+        poses = search.poses(z[np.newaxis], [frame])
+        turned = apart(poses[0][0, 0], poses[1][0, 0])[0]
+        q_a, q_b = search.configurations(z[np.newaxis])
+        lower = max(0.0, metres - rounding[0])
+        return Interval(*names, lower, *upper, turned, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
+
+    def _confirmed(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> str:
+        """Pinocchio, which reads both texts itself, at some configurations: no frame may break its bound."""
+        if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
+            return "not asked of Pinocchio: loaded with verify=False"
+        for robot in self.robots:
+            if (reason := robot.verifier.cannot()) is not None:
+                return f"not verified by Pinocchio: {reason}"
+        off = self.asked(found, variables)
+        for interval, metres in zip(frames, off, strict=False):
+            if metres > interval.upper * (1.0 + EPS):
+                raise UrdfkinError(
+                    "Pinocchio finds a distance beyond its proven bound",
+                    where=f"frame {interval.frame}",
+                    found=f"{metres:.6g} m, bound {interval.upper:.6g} m",
+                    remedy="please report this as an error of urdfkin, with both robots",
+                )
+        seen = f"{off.max(initial=0.0):.2g} m"
+        return f"Pinocchio {version()} finds at most {seen} at {CONFIRMED} configurations, within the bounds"
+
+    def asked(self, found: Alignment, variables: Variables) -> FloatArray:
+        """(frames,) how far off (m) Pinocchio finds each frame at most at the configurations that confirm."""
+        search = self.search(found, variables)
+        q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
+        return np.asarray(search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0))
+
+
+def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """The largest of metres and of radians."""
+    return max((way for way, _ in bounds), default=0.0), max((turn for _, turn in bounds), default=0.0)
+
+
+def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
+    """Fixed joints of a tree whose namesakes, or whose child link's joints, move in the other."""
+    moving = {joint.name for joint in other.joints if joint.kind.nv}
+    ours = {joint.name for joint in tree.joints if joint.kind.nv}
+    children = {
+        other.links[i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv and joint.name not in ours
+    }
+    return {
+        i
+        for i, joint in enumerate(tree.joints)
+        if not joint.kind.nv and (joint.name in moving or tree.links[i + 1] in children)
+    }
+
+
+def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
+    """(4, 4) B's root in A's root frame: on it, or so that links are one of which either is a root."""
+    if (root := a.tree.links[0]) in b.tree.links and not b.body_of[link := b.tree.link_index(root)]:
+        return inverse(b.homes[link])
+    if (root := b.tree.links[0]) in a.tree.links and not a.body_of[link := a.tree.link_index(root)]:
+        return a.homes[link]
+    return IDENTITY
+
+
+def digest(robot: Robot) -> str:
+    """SHA-256 of the file that a robot comes from: a URDF's text, or MJCF."""
+    return robot.sha256
+
+
+def parse_map(words: tuple[str, ...]) -> dict[str, str]:
+    """NAME=NAME, several; raises InputError for what is none."""
+    return dict(_pairs(words))
+
+
+def _pairs(words: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+    for word in words:
+        ours, equals, theirs = word.partition("=")
+        if not equals or not ours or not theirs:
+            raise InputError("a pair of joints is JOINT_OF_A=JOINT_OF_B", where="--map", found=repr(word))
+        yield ours, theirs

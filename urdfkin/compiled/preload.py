@@ -1,0 +1,50 @@
+"""Have kernels compiled before they are needed, by two processors."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Sequence
+
+from urdfkin.compiled.compiling import cache_folder
+from urdfkin.system.processes import own_python
+
+#: The cores: half of the work each.
+_ONE_HALF = "accelerations", "local_accelerations", "velocities"
+_OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
+
+
+def load_kernels() -> None:
+    """Compile every core, or read it from disk: before processes start that would all compile.
+
+    Compiling takes one processor; a second process does half of it, and this one then reads it from disk.
+    """
+    helper = None if all(map(_on_disk, _OTHER_HALF)) else _compile_elsewhere(_OTHER_HALF)
+    try:
+        _compile(_ONE_HALF)
+    finally:
+        if helper is not None:
+            helper.wait()
+    _compile(_OTHER_HALF)
+
+
+def _compile(names: Sequence[str]) -> None:
+    from urdfkin.compiled import kernels  # noqa: PLC0415
+
+    for name in names:
+        _ = getattr(kernels, name).compiled
+
+
+def _on_disk(name: str) -> bool:
+    folder = cache_folder()
+    return folder is None or any(folder.glob(f"cores.{name}.*.kernel"))
+
+
+def _compile_elsewhere(names: Sequence[str]) -> subprocess.Popen[bytes]:
+    """Another interpreter that does nothing but compile; what it fails to do is done here after all."""
+    code = f"from urdfkin.compiled import ahead; ahead._compile({tuple(names)!r})"
+    return subprocess.Popen(
+        own_python(code),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )

@@ -1,0 +1,393 @@
+"""The walk from the base outwards: section 7.7's recursion, link by link, for a block of configurations.
+
+The state of a link is the rotation R and the origin p of its frame in the world's axes, its angular velocity
+w, its origin's velocity vel, its angular acceleration alpha and its origin's acceleration acc. These four are
+seen in the axes in which they are asked for, the world's or the link's own (`axes`): results that are turned
+at the end have the rounding of two rotations. The equations are those of `urdfkin.kinematics.equations`, and
+the same in either axes.
+
+What an output does not follow is nothing (`numbers.nothing`), and what is computed from it costs nothing.
+"""
+
+from __future__ import annotations
+
+from urdfkin.compiled import compiled_equations as eq
+from urdfkin.compiled.axes import seen, seen_after
+from urdfkin.compiled.compiling import compiled
+from urdfkin.compiled.kernel_args import KernelArgs
+from urdfkin.compiled.memory import (
+    LANES,
+    all_written,
+    constant,
+    fetch,
+    number,
+    number_if,
+    numbers_at,
+    ordinary,
+    put,
+    read_rows,
+    same,
+    stream,
+    whole_numbers_at,
+)
+from urdfkin.compiled.numbers import one, rounded, zero
+from urdfkin.compiled.program import ANGLE_ROW, ANGLE_WIDTH, ONE_ROW, STATE_ROWS, WIDTH, ZERO_ROW, Head, Op
+from urdfkin.compiled.sine import sine_cosine
+
+# Enumerations are Python's; compiled code takes plain numbers.
+_PROGRAM, _CONSTANTS, _SCRATCH, _OUT = map(
+    int, (KernelArgs.PROGRAM, KernelArgs.CONSTANTS, KernelArgs.SCRATCH, KernelArgs.OUT)
+)
+_N, _Q, _V, _A, _BASE = map(int, (KernelArgs.N, KernelArgs.Q, KernelArgs.V, KernelArgs.A, KernelArgs.BASE))
+_STRIDE_Q, _STRIDE_V, _STRIDE_A, _STRIDE_BASE = map(
+    int, (KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A, KernelArgs.STRIDE_BASE)
+)
+_REFERENCE, _WIDTH, _STAGE = map(int, (KernelArgs.REFERENCE, KernelArgs.WIDTH, KernelArgs.STAGE))
+_CODE, _NQ, _NV, _ROW_Q, _ROW_V, _ROW_A, _ROW_BASE = map(
+    int, (Head.CODE, Head.NQ, Head.NV, Head.Q, Head.V, Head.A, Head.BASE)
+)
+_BLOCKS_Q, _BLOCKS_V, _BLOCKS_END = int(Head.BLOCKS_Q), int(Head.BLOCKS_V), int(Head.BLOCKS_END)
+_ANGLES, _ANGLES_END = int(Head.ANGLES), int(Head.ANGLES_END)
+_END, _CARRY_X, _CARRY_Y, _CARRY_Z, _CARRY = map(int, (Op.END, Op.CARRY_X, Op.CARRY_Y, Op.CARRY_Z, Op.CARRY))
+_TURN_X, _TURN_Y, _TURN_Z, _TURN = map(int, (Op.TURN_X, Op.TURN_Y, Op.TURN_Z, Op.TURN))
+_REVOLUTE, _PRISMATIC, _PLANAR, _FLOATING = map(int, (Op.REVOLUTE, Op.PRISMATIC, Op.PLANAR, Op.FLOATING))
+_SAVE, _RESUME, _KEEP, _COLUMN = map(int, (Op.SAVE, Op.RESUME, Op.KEEP, Op.COLUMN))
+
+# -- a link and the next ------------------------------------------------------------------------------
+
+
+@compiled
+def carried(axes, state, d):
+    """Along the rigid link, by d in its axes: 7.58, 7.128, 7.130."""
+    R, p, w, vel, alpha, acc = state
+    lever = seen(axes, R, d)
+    return (
+        R,
+        eq.point_position(p, R, d),
+        w,
+        eq.point_velocity(vel, w, lever),
+        alpha,
+        eq.point_acceleration(acc, alpha, w, lever),
+    )
+
+
+@compiled
+def turned(axes, state, S):
+    """To a frame that is turned by S: the same motion, seen from there."""
+    R, p, w, vel, alpha, acc = state
+    return (
+        eq.product(R, S),
+        p,
+        seen_after(axes, S, w),
+        seen_after(axes, S, vel),
+        seen_after(axes, S, alpha),
+        seen_after(axes, S, acc),
+    )
+
+
+@compiled
+def _turned_about_z(axes, state, s, row):
+    """By a joint's angle (7.5), whose sine and cosine stand in a row and the one after it."""
+    return turned(axes, state, eq.about_z(number(s, row), number(s, row + 1), zero(), one()))
+
+
+@compiled
+def revolute(axes, state, s, row, v, a):
+    """7.129, then 7.127, then the turn itself."""
+    R, p, w, vel, alpha, acc = state
+    z = seen(axes, R, (zero(), zero(), one()))
+    alpha = eq.angular_acceleration(alpha, w, z, v, a)
+    return _turned_about_z(axes, (R, p, eq.angular_velocity(w, z, v), vel, alpha, acc), s, row)
+
+
+@compiled
+def prismatic(axes, state, slide, v, a):
+    """The slide is a part of the interorigin vector (7.64); then 7.130 and 7.128."""
+    R, p, w, vel, alpha, acc = carried(axes, state, (zero(), zero(), slide))
+    z = seen(axes, R, (zero(), zero(), one()))
+    return R, p, w, eq.sliding_velocity(vel, z, v), alpha, eq.sliding_acceleration(acc, w, z, v, a)
+
+
+@compiled
+def free(axes, state, o, u, o_rate, u_rate):
+    """A planar or floating joint that has been carried and turned: its rates are in the moved axes."""
+    R, p, w, vel, alpha, acc = state
+    o, u, o_rate, u_rate = seen(axes, R, o), seen(axes, R, u), seen(axes, R, o_rate), seen(axes, R, u_rate)
+    return (
+        R,
+        p,
+        eq.plus(w, o),
+        eq.plus(vel, u),
+        eq.free_angular_acceleration(alpha, w, o, o_rate),
+        eq.free_acceleration(acc, w, o, u, u_rate),
+    )
+
+
+@compiled
+def _coordinate(s, row, g, c, follows):
+    """A joint's coordinate. A follower's is rounded as Pinocchio's is, in two steps."""
+    x = number(s, row)
+    if follows:
+        x = rounded(constant(g, c) * x) + constant(g, c + 1)
+    return x
+
+
+@compiled
+def _rate(wanted, s, row, g, c, follows):
+    x = number_if(wanted, s, row)
+    if follows:
+        x = rounded(constant(g, c) * x)
+    return x
+
+
+@compiled
+def _vector_if(wanted, s, row):
+    """Three numbers in rows that follow on one another; nothing where `wanted` is nothing."""
+    return number_if(wanted[0], s, row), number_if(wanted[1], s, row + 1), number_if(wanted[2], s, row + 2)
+
+
+@compiled
+def _planar(axes, state, s, q, row, v, a):
+    """Slides along x and y and turns about z."""
+    state = carried(axes, state, (number(s, q), number(s, q + 1), zero()))
+    state = _turned_about_z(axes, state, s, row)
+    w, alpha = state[2][0], state[4][0]
+    o, u = (zero(), zero(), number_if(w, s, v + 2)), (number_if(w, s, v), number_if(w, s, v + 1), zero())
+    o_rate = zero(), zero(), number_if(alpha, s, a + 2)
+    return free(axes, state, o, u, o_rate, (number_if(alpha, s, a), number_if(alpha, s, a + 1), zero()))
+
+
+@compiled
+def _floating(axes, state, s, q, v, a):
+    """Slides along and turns about all three axes."""
+    state = carried(axes, state, (number(s, q), number(s, q + 1), number(s, q + 2)))
+    x, y, z, w = number(s, q + 3), number(s, q + 4), number(s, q + 5), number(s, q + 6)
+    state = turned(axes, state, eq.rotation_of_quaternion(x, y, z, w))
+    w, alpha = state[2], state[4]
+    u, o = _vector_if(w, s, v), _vector_if(w, s, v + 3)
+    return free(axes, state, o, u, _vector_if(alpha, s, a + 3), _vector_if(alpha, s, a))
+
+
+# -- constants -----------------------------------------------------------------------------------------
+
+
+@compiled
+def _vector(g, i):
+    return constant(g, i), constant(g, i + 1), constant(g, i + 2)
+
+
+@compiled
+def _rotation(g, i):
+    return _vector(g, i), _vector(g, i + 3), _vector(g, i + 6)
+
+
+# -- states in scratch ---------------------------------------------------------------------------------
+
+
+@compiled
+def put_vector(s, row, x):
+    """Write a vector to three rows."""
+    put(s, row, x[0])
+    put(s, row + 1, x[1])
+    put(s, row + 2, x[2])
+
+
+@compiled
+def vector(s, row):
+    """The vector in three rows."""
+    return number(s, row), number(s, row + 1), number(s, row + 2)
+
+
+@compiled
+def _save(s, row, state):
+    R, p, w, vel, alpha, acc = state
+    put_vector(s, row, R[0])
+    put_vector(s, row + 3, R[1])
+    put_vector(s, row + 6, R[2])
+    put_vector(s, row + 9, p)
+    put_vector(s, row + 12, w)
+    put_vector(s, row + 15, vel)
+    put_vector(s, row + 18, alpha)
+    put_vector(s, row + 21, acc)
+
+
+@compiled
+def _resumed(s, row, state):
+    """The state that was saved, as far as this walk follows it."""
+    R, p, w, vel, alpha, acc = state
+    return (
+        (_vector_if(R[0], s, row), _vector_if(R[1], s, row + 3), _vector_if(R[2], s, row + 6)),
+        _vector_if(p, s, row + 9),
+        _vector_if(w, s, row + 12),
+        _vector_if(vel, s, row + 15),
+        _vector_if(alpha, s, row + 18),
+        _vector_if(acc, s, row + 21),
+    )
+
+
+# -- inputs --------------------------------------------------------------------------------------------
+
+
+@compiled
+def _read(m, x, b, width, stride, blocks, begin, end, s, row):
+    """The blocks of eight numbers that the walk needs of rows `b` to `b + m` of x, or of the only one."""
+    for i in range(begin, end):
+        at = blocks[i]
+        wide = width - at
+        read_rows(m if stride else 1, x, b * stride + at, stride, 8 if wide > 8 else wide, s, row + at)
+    fetch(x, (b + m) * stride, m * stride)
+
+
+@compiled
+def _start(axes, m, s, task, row, b):
+    """The initial conditions: the state of the base (the text's frame -1 to frame 0)."""
+    nil, unit = same(0.0), same(1.0)
+    R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
+    p = w = vel = alpha = acc = nil, nil, nil
+    if task[_BASE] != 0:
+        base, stride = numbers_at(task[_BASE]), task[_STRIDE_BASE]
+        read_rows(m if stride else 1, base, b * stride, stride, STATE_ROWS, s, row)
+        R, p = (vector(s, row), vector(s, row + 3), vector(s, row + 6)), vector(s, row + 9)
+        w, vel = seen_after(axes, R, vector(s, row + 12)), seen_after(axes, R, vector(s, row + 15))
+        alpha, acc = seen_after(axes, R, vector(s, row + 18)), seen_after(axes, R, vector(s, row + 21))
+    return R, p, w, vel, alpha, acc
+
+
+@compiled
+def _sines_and_cosines(s, program, g):
+    """Of every angle that the walk turns by, before it begins: the walk's state fills the registers."""
+    for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
+        angle = _coordinate(s, program[i], g, program[i + 2], program[i + 3])
+        sine, cosine = sine_cosine(s, ANGLE_ROW, angle)
+        put(s, program[i + 1], sine)
+        put(s, program[i + 1] + 1, cosine)
+
+
+# -- the walk ------------------------------------------------------------------------------------------
+
+
+@compiled
+def _along_link(axes, op, state, g, c):
+    """Carried or turned by what is constant."""
+    if op == _CARRY_X:
+        state = carried(axes, state, (constant(g, c), zero(), zero()))
+    elif op == _CARRY_Y:
+        state = carried(axes, state, (zero(), constant(g, c + 1), zero()))
+    elif op == _CARRY_Z:
+        state = carried(axes, state, (zero(), zero(), constant(g, c + 2)))
+    elif op == _CARRY:
+        state = carried(axes, state, _vector(g, c))
+    elif op == _TURN_X:
+        state = turned(axes, state, eq.about_x(constant(g, c + 7), constant(g, c + 4), zero(), one()))
+    elif op == _TURN_Y:
+        state = turned(axes, state, eq.about_y(constant(g, c + 2), constant(g, c), zero(), one()))
+    elif op == _TURN_Z:
+        state = turned(axes, state, eq.about_z(constant(g, c + 3), constant(g, c), zero(), one()))
+    else:
+        state = turned(axes, state, _rotation(g, c))
+    return state
+
+
+@compiled
+def _over_joint(axes, op, state, s, x, v, a, z, g, c):
+    """Over a joint; x, z and c are its operands, v and a the rows of its rates."""
+    if op == _REVOLUTE:
+        rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
+        state = revolute(axes, state, s, x, rate, rate_2)
+    elif op == _PRISMATIC:
+        rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
+        state = prismatic(axes, state, _coordinate(s, x, g, c, z), rate, rate_2)
+    elif op == _PLANAR:
+        state = _planar(axes, state, s, x, z, v, a)
+    else:
+        state = _floating(axes, state, s, x, v, a)
+    return state
+
+
+@compiled
+def _read_inputs(m, task, program, s, b, orders):
+    """Coordinates, and as many of their rates as are wanted."""
+    q, nq, nv = numbers_at(task[_Q]), program[_NQ], program[_NV]
+    edge, end = program[_BLOCKS_V], program[_BLOCKS_END]
+    _read(m, q, b, nq, task[_STRIDE_Q], program, program[_BLOCKS_Q], edge, s, program[_ROW_Q])
+    if orders > 1:
+        v = numbers_at(task[_V])
+        _read(m, v, b, nv, task[_STRIDE_V], program, edge, end, s, program[_ROW_V])
+    if orders > 2:
+        a = numbers_at(task[_A])
+        _read(m, a, b, nv, task[_STRIDE_A], program, edge, end, s, program[_ROW_A])
+
+
+@compiled
+def _ordinary(m, task, program, b, orders):
+    """Whether all inputs of a block are, those that the walk does not need as well."""
+    good = _rows_are_ordinary(m, numbers_at(task[_Q]), b, program[_NQ], task[_STRIDE_Q])
+    if orders > 1:
+        good = good and _rows_are_ordinary(m, numbers_at(task[_V]), b, program[_NV], task[_STRIDE_V])
+    if orders > 2:
+        good = good and _rows_are_ordinary(m, numbers_at(task[_A]), b, program[_NV], task[_STRIDE_A])
+    return good
+
+
+@compiled
+def _rows_are_ordinary(m, x, b, width, stride):
+    return ordinary(x, b * stride, (m if stride else 1) * width)
+
+
+@compiled
+def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, column, emit):
+    """The walk for `m` configurations from `b` on."""
+    _read_inputs(m, task, program, s, b, orders)
+    _sines_and_cosines(s, program, g)
+    state = follow(_start(axes, m, s, task, program[_ROW_BASE], b))
+    at, stage = program[_CODE], task[_STAGE]
+    to, first = (numbers_at(stage), 0) if stage else (numbers_at(task[_OUT]), b)
+    while program[at] != _END:
+        op, x, y, z, c = program[at], program[at + 1], program[at + 2], program[at + 3], program[at + 4]
+        at += WIDTH
+        if op <= _TURN:
+            state = _along_link(axes, op, state, g, c)
+        elif op <= _FLOATING:
+            state = _over_joint(axes, op, state, s, x, program[_ROW_V] + y, program[_ROW_A] + y, z, g, c)
+        elif op == _SAVE:
+            _save(s, x, state)
+        elif op == _RESUME:
+            state = _resumed(s, x, state)
+        elif op == _KEEP:
+            keep(s, x, y, state)
+        elif op == _COLUMN:
+            column(s, x, y, z, g, c, reference, state)
+        else:
+            emit(m, s, program, x, y, first, reference, state, to)
+    if stage:
+        width = task[_WIDTH]
+        stream(to, m * width, numbers_at(task[_OUT]), b * width, task[_OUT])
+
+
+@compiled
+def forward_recursion(address, axes, orders, follow, keep, column, emit):
+    """Carry out a program for every block of configurations; 0, or 1 where an input is not ordinary.
+
+    Args:
+        address: Of a task.
+        axes: The motion's (`axes`).
+        orders: How many of q, v, a are read.
+        follow: Makes nothing of what the output does not need of a state.
+        keep: Keeps what a column needs of its joint.
+        column: Computes a column.
+        emit: Hands out a frame's result.
+    """
+    task = whole_numbers_at(address)
+    program, g, s = whole_numbers_at(task[_PROGRAM]), numbers_at(task[_CONSTANTS]), numbers_at(task[_SCRATCH])
+    put(s, ZERO_ROW, zero())
+    put(s, ONE_ROW, one())
+    n = task[_N]
+    m = LANES if n >= LANES else 1
+    good = True
+    for first in range(0, n, m):
+        b = min(first, n - m)  # the last block reaches back into the one before
+        _block(axes, m, task, program, g, s, b, task[_REFERENCE], orders, follow, keep, column, emit)
+        good &= _ordinary(m, task, program, b, orders)
+    if task[_STAGE]:
+        all_written()
+    return 0 if good else 1

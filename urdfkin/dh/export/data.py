@@ -1,0 +1,124 @@
+"""A table as plain data, in the form that `urdfkin.dh.rows.table_from_mapping` reads; numbers to the bit.
+
+The table as JSON, read back by `urdfkin.dh.read_table` to the bit.
+
+The table as TOML, read back by `urdfkin.dh.read_table` to the bit; the form of the shipped references.
+
+The table as comma-separated values, for spreadsheets; read back by `urdfkin.dh.read_table` to the bit.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from urdfkin.dh.table import DHRow, DHTable
+from urdfkin.dh.units import Units
+from urdfkin.errors.escape import csv_cell, escape
+
+
+def to_mapping(table: DHTable) -> dict[str, Any]:
+    """Strings, numbers, lists and mappings only; metres and radians. What was snapped is told in `snap`."""
+    data: dict[str, Any] = {
+        "convention": str(table.convention),
+        "angles": "radians",
+        "lengths": "metres",
+        "robot": table.robot,
+        "base_frame": table.base_frame,
+        "tip_frame": table.tip_frame,
+        "base": table.base.tolist(),
+        "tool": table.tool.tolist(),
+    }
+    if (snap := table.snap) is not None:
+        data["snap"] = {
+            "tolerance_rad": snap.tolerance,
+            "tip_moves_at_most_m": snap.metres,
+            "tip_turns_at_most_rad": snap.radians,
+            "changes": [
+                {"row": change.row + 1, "what": change.what, "angle_rad": change.angle}
+                for change in snap.changes
+            ],
+        }
+    elsewhere = [name for name in table.joint_names if name not in {row.joint for row in table.rows}]
+    if elsewhere:
+        data["coordinates"] = elsewhere
+    data["rows"] = [_row(row) for row in table.rows]
+    return data
+
+
+def _row(row: DHRow) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "joint": row.joint,
+        "kind": row.kind.value,
+        "a": row.a,
+        "alpha": row.alpha,
+        "d": row.d,
+        "theta": row.theta,
+    }
+    if row.beta:
+        data["beta"] = row.beta
+    if row.sense != 1:
+        data["sense"] = row.sense
+    if row.mimic is not None:
+        data["mimic"] = asdict(row.mimic)
+    if row.limit is not None:
+        names = ("lower", "upper", "velocity", "effort")
+        # Infinity has no place in JSON; a bound that is not written is infinite.
+        limits = {name: getattr(row.limit, name) for name in names}
+        data["limit"] = {name: value for name, value in limits.items() if math.isfinite(value)}
+    return data
+
+
+def write_json(table: DHTable, units: Units) -> str:
+    """JSON in metres and radians, whatever the units for people are."""
+    del units
+    return json.dumps(to_mapping(table), indent=2, allow_nan=False) + "\n"
+
+
+def write_toml(table: DHTable, units: Units) -> str:
+    """TOML in metres and radians, one row a line."""
+    del units
+    data = to_mapping(table)
+    rows = data.pop("rows")
+    lines = [f"{key} = {_value(value)}" for key, value in data.items()]
+    lines += ["rows = [", *(f"  {_value(row)}," for row in rows), "]"]
+    return "\n".join(lines) + "\n"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    # A TOML basic string takes JSON's escapes, but no pairs of surrogates, and both write numbers alike.
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    return "".join(c if c.isprintable() else escape(c) for c in text)
+
+
+COLUMNS = (
+    *("joint", "kind", "sense", "a", "alpha", "d", "theta", "beta"),
+    *("leader", "multiplier", "offset", "lower", "upper", "velocity", "effort"),
+)
+
+
+def write_csv(table: DHTable, units: Units) -> str:
+    """Comment lines `# key: value` for what is said once, then a line of column names, then the rows."""
+    del units
+    data = to_mapping(table)
+    rows = data.pop("rows")
+    data.pop("snap", None)
+    out = io.StringIO()
+    for key, value in data.items():
+        out.write(f"# {key}: {json.dumps(value)}\n".replace("##", "#\\u0023"))
+    writer = csv.DictWriter(out, COLUMNS, restval="", lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        flat = {**row, **row.pop("mimic", {}), **row.pop("limit", {})}
+        named = {key: csv_cell(flat[key]) for key in ("joint", "leader") if key in flat}
+        writer.writerow({key: value for key, value in (flat | named).items() if key in COLUMNS})
+    return out.getvalue()

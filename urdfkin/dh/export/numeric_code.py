@@ -1,0 +1,262 @@
+"""What the code writers share: exact numbers, identifiers, one header comment, the rows as numbers.
+
+Python code on NumPy alone: the rows as an array and a function of ten lines.
+
+C99 code without dependencies: constant rows and one function.
+
+MATLAB code of plain matrices; runs in Octave as well.
+"""
+
+from __future__ import annotations
+
+import keyword
+import math
+import re
+
+from urdfkin.dh.export.text import formula
+from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.units import Units
+from urdfkin.errors import InputError
+from urdfkin.model.tree import FloatArray
+
+
+def identifier(name: str) -> str:
+    """A name that C, Python and MATLAB all accept.
+
+    Example:
+        >>> identifier("ur5 robot"), identifier("2dof"), identifier("for")
+        ('ur5_robot', 'robot_2dof', 'for_')
+    """
+    word = re.sub(r"[^A-Za-z0-9_]", "_", name) or "robot"
+    if not word[0].isalpha():
+        word = f"robot_{word.lstrip('_')}"
+    return f"{word}_" if keyword.iskeyword(word) else word
+
+
+def docstring(table: DHTable) -> list[str]:
+    """The same as the docstring of a Python module, with a blank line."""
+    first, *others = (f"{line}." for line in header(table))
+    return ['"""' + first, "", *others, '"""', ""]
+
+
+def header(table: DHTable) -> list[str]:
+    """What a reader of the code must know, without comment marks; names cannot end a comment early."""
+    lines = [
+        f"{table.robot}: {table.base_frame} to {table.tip_frame}",
+        f"{table.convention} Denavit-Hartenberg parameters, metres and radians",
+        formula(table),
+        f"q = ({', '.join(table.joint_names)})",
+    ]
+    if table.snap is not None and table.snap.changes:
+        lines.append(f"angles snapped: the tip moves at most {table.snap.metres:.3g} m")
+    return [plain(line) for line in lines]
+
+
+def plain(text: str) -> str:
+    """Printable ASCII without the marks that could end a comment or a string."""
+    return re.sub(r"[^ -~]|[\"'\\*%]", "_", text)
+
+
+def numbers(values: FloatArray | list[float]) -> str:
+    """Numbers that read back to the same bits."""
+    return ", ".join(repr(float(value)) for value in values)
+
+
+def row_numbers(table: DHTable) -> list[list[float]]:
+    """a, alpha, d, theta, beta, 1 for turning and 0 for sliding, sense."""
+    return [[*row.cells, float(row.kind.turns), float(row.sense)] for row in table.rows]
+
+
+def demand_free(table: DHTable, what: str) -> None:
+    """Refuse a table with followers where `what` knows none."""
+    if any(row.mimic is not None for row in table.rows):
+        raise InputError(
+            f"{what} has no joint that follows another",
+            where=f"table of {table.robot}",
+            remedy="load with mimic off, or use a form in plain code, such as numpy or matlab",
+        )
+
+
+def bounds(row: DHRow) -> str:
+    """Lower and upper, with a comma between them; "" where a side is open."""
+    limit = row.limit
+    if limit is None or not (math.isfinite(limit.lower) and math.isfinite(limit.upper)):
+        return ""
+    return numbers([limit.lower, limit.upper])
+
+
+_NUMPY_BODY = '''
+
+def placement(q):
+    """(..., 4, 4) pose of the tip in the base for q (..., {n}), rad and m."""
+    q = np.asarray(q, dtype=float) @ COUPLING.T + COUPLING_OFFSET
+    T = np.broadcast_to(BASE, (*q.shape[:-1], 4, 4))
+    for i, (a, alpha, d, theta, beta, turns, sense) in enumerate(ROWS):
+        moved = sense * q[..., i]
+        S = along_axis(theta + turns * moved, d + (1 - turns) * moved)
+        X = between_axes(a, alpha, beta)
+        T = T @ {product}
+    return T @ TOOL
+
+
+def along_axis(theta, d):
+    """Rz(theta) Tz(d)."""
+    S = np.zeros((*theta.shape, 4, 4))
+    S[..., 0, 0] = S[..., 1, 1] = np.cos(theta)
+    S[..., 1, 0] = np.sin(theta)
+    S[..., 0, 1] = -S[..., 1, 0]
+    S[..., 2, 2] = S[..., 3, 3] = 1.0
+    S[..., 2, 3] = d
+    return S
+
+
+def between_axes(a, alpha, beta):
+    """Tx(a) Rx(alpha) Ry(beta)."""
+    ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
+    return np.array([[cb, 0, sb, a], [sa * sb, ca, -sa * cb, 0], [-ca * sb, sa, ca * cb, 0], [0, 0, 0, 1.0]])
+'''
+
+
+def write_numpy(table: DHTable, units: Units) -> str:
+    """A module with `placement(q)`."""
+    del units
+    coupling = table.coupling
+    lines = [
+        '"""' + header(table)[0] + ".",
+        "",
+        *(f"{line}." for line in header(table)[1:]),
+        '"""',
+        "",
+        "import numpy as np",
+        "",
+    ]
+    lines += ["# a, alpha, d, theta, beta, 1 for turning and 0 for sliding, sense", "ROWS = np.array("]
+    lines += [
+        "    [",
+        *(f"        [{numbers(row)}]," for row in row_numbers(table)),
+        "    ]",
+        ").reshape(-1, 7)",
+    ]
+    lines.append(
+        f"COUPLING = np.array([{numbers(coupling.matrix.ravel())}]).reshape({coupling.matrix.shape})"
+    )
+    lines.append(f"COUPLING_OFFSET = np.array([{numbers(coupling.offset)}])")
+    for name, T in (("BASE", table.base), ("TOOL", table.tool)):
+        lines += [f"{name} = np.array(", "    [", *(f"        [{numbers(row)}]," for row in T), "    ]", ")"]
+    product = "S @ X" if table.convention is Convention.STANDARD else "X @ S"
+    return "\n".join(lines) + "\n" + _NUMPY_BODY.format(n=len(table.joint_names), product=product)
+
+
+_C_BODY = """
+static void {name}_multiply(double T[16], const double M[16])
+{{
+    double P[16];
+    for (int r = 0; r < 4; ++r)
+        for (int c = 0; c < 4; ++c) {{
+            P[4 * r + c] = 0.0;
+            for (int k = 0; k < 4; ++k)
+                P[4 * r + c] += T[4 * r + k] * M[4 * k + c];
+        }}
+    for (int i = 0; i < 16; ++i)
+        T[i] = P[i];
+}}
+
+/* T: pose of the tip in the base, row by row; q: {n} numbers, rad and m. */
+void {name}_placement(const double *q, double T[16])
+{{
+    for (int i = 0; i < 16; ++i)
+        T[i] = {name}_base[i];
+    for (int i = 0; i < {rows}; ++i) {{
+        const double *row = {name}_rows[i];
+        double value = {name}_coupling_offset[i];
+        for (int k = 0; k < {n}; ++k)
+            value += {name}_coupling[i][k] * q[k];
+        const double turned = row[3] + (row[5] != 0.0 ? row[6] * value : 0.0);
+        const double slid = row[2] + (row[5] != 0.0 ? 0.0 : row[6] * value);
+        const double ct = cos(turned), st = sin(turned);
+        const double ca = cos(row[1]), sa = sin(row[1]), cb = cos(row[4]), sb = sin(row[4]);
+        const double S[16] = {{ct, -st, 0, 0, st, ct, 0, 0, 0, 0, 1, slid, 0, 0, 0, 1}};
+        const double X[16] = {{cb, 0, sb, row[0], sa * sb, ca, -sa * cb, 0,
+                              -ca * sb, sa, ca * cb, 0, 0, 0, 0, 1}};
+        {name}_multiply(T, {first});
+        {name}_multiply(T, {second});
+    }}
+    {name}_multiply(T, {name}_tool);
+}}
+"""
+
+
+def write_c(table: DHTable, units: Units) -> str:
+    """A translation unit with `ROBOT_placement`."""
+    del units
+    name, n, rows = identifier(table.robot), len(table.joint_names), row_numbers(table)
+    lines = [
+        "/* " + "\n * ".join(line.replace("/", "_") for line in header(table)) + " */",
+        "#include <math.h>",
+        "",
+    ]
+    # C has no empty arrays: a table without rows keeps one that the loop never reaches.
+    lines += ["/* a, alpha, d, theta, beta, 1 for turning and 0 for sliding, sense */"]
+    lines += [f"static const double {name}_rows[{max(len(rows), 1)}][7] = {{"]
+    lines += [f"    {{{numbers(row)}}}," for row in rows or [[0.0] * 7]]
+    lines += ["};", f"static const double {name}_coupling[{max(len(rows), 1)}][{max(n, 1)}] = {{"]
+    lines += [f"    {{{numbers(row)}}}," for row in (table.coupling.matrix if rows else [[0.0]])]
+    lines += ["};", f"static const double {name}_coupling_offset[{max(len(rows), 1)}] = {{"]
+    lines += [f"    {numbers(table.coupling.offset) if rows else '0.0'}", "};"]
+    for what, T in (("base", table.base), ("tool", table.tool)):
+        lines += [f"static const double {name}_{what}[16] = {{", *(f"    {numbers(row)}," for row in T), "};"]
+    order = ("S", "X") if table.convention is Convention.STANDARD else ("X", "S")
+    return (
+        "\n".join(lines)
+        + "\n"
+        + _C_BODY.format(name=name, n=n, rows=len(rows), first=order[0], second=order[1])
+    )
+
+
+_VALUES = """
+one = eye(4);
+T = base;
+for i = 1:size(rows, 1)
+    a = rows(i, 1); alpha = rows(i, 2); d = rows(i, 3); theta = rows(i, 4); beta = rows(i, 5);
+    if rows(i, 6)
+        theta = theta + rows(i, 7) * values(i);
+    else
+        d = d + rows(i, 7) * values(i);
+    end
+"""
+_FRAMES = """\
+    S = one; S(1:2, 1:2) = [cos(theta), -sin(theta); sin(theta), cos(theta)]; S(3, 4) = d;
+    X = one; X(2:3, 2:3) = [cos(alpha), -sin(alpha); sin(alpha), cos(alpha)]; X(1, 4) = a;
+    Y = one; Y([1, 3], [1, 3]) = [cos(beta), sin(beta); -sin(beta), cos(beta)];
+    T = T * {product};
+end
+T = T * tool;
+end
+"""
+
+
+def write_matlab(table: DHTable, units: Units) -> str:
+    """A function file `ROBOT_placement.m`."""
+    del units
+    lines = [f"function T = {identifier(table.robot)}_placement(q)"]
+    lines += [f"% {line}" for line in header(table)]
+    lines += ["% columns: a, alpha, d, theta, beta, 1 for turning and 0 for sliding, sense"]
+    lines += matrix("rows", row_numbers(table), 7)
+    lines += matrix("coupling", table.coupling.matrix.tolist(), len(table.joint_names))
+    lines += [f"values = coupling * q(:) + [{'; '.join(numbers([x]) for x in table.coupling.offset)}];"]
+    for what, T in (("base", table.base), ("tool", table.tool)):
+        lines += matrix(what, T.tolist(), 4)
+    return "\n".join(lines) + _VALUES + frames(table)
+
+
+def frames(table: DHTable) -> str:
+    """The end of a loop over rows, from a, alpha, d, theta and beta to T."""
+    product = "S * (X * Y)" if table.convention is Convention.STANDARD else "(X * Y) * S"
+    return _FRAMES.format(product=product)
+
+
+def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> list[str]:
+    """Lines that assign a matrix, also one without rows."""
+    if not len(rows):
+        return [f"{name} = zeros(0, {columns});"]
+    return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]

@@ -1,0 +1,321 @@
+"""What the written forms share: headings, cells with their variable, transforms, the formula.
+
+Nothing here knows a format; each form passes its own way to write pi, products and names.
+
+
+The table as aligned text, with its convention, formula, base and tool said.
+
+The table in Markdown, for a README or an issue.
+
+The table in HTML, to stand in a page or a notebook's cell.
+
+The table for a paper: booktabs, the convention in the caption, pi as a fraction, as wide as fits.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.units import Angles, Units
+from urdfkin.errors.display import Table, TextDocument
+from urdfkin.errors.escape import latex_text, markdown_code, markdown_text, printable
+from urdfkin.model.tree import FloatArray
+
+FORMULA = {
+    Convention.STANDARD: "T(i-1, i) = Rz(theta) Tz(d) Tx(a) Rx(alpha)",
+    Convention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Rz(theta) Tz(d)",
+}
+HAYATI_FORMULA = {
+    Convention.STANDARD: "T(i-1, i) = Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)",
+    Convention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Ry(beta(i-1)) Rz(theta) Tz(d)",
+}
+
+#: Of a bound's last digit: what is beyond it by no more is rounding, and not rounded up.
+_ON_THE_DIGIT = 1.0 - 1e-12
+
+
+def formula(table: DHTable) -> str:
+    """The product that a row stands for."""
+    return (HAYATI_FORMULA if table.has_hayati_rows else FORMULA)[table.convention]
+
+
+def variable(
+    table: DHTable,
+    row: DHRow,
+    times: str = " ",
+    name: str = "q{}",
+    number: Callable[[float], str] = "{:.10g}".format,
+) -> str:
+    """The joint's value in terms of the table's coordinates: q1, -q2, 2 q1 + 0.1."""
+    leader = row.mimic.leader if row.mimic else row.joint
+    q = name.format(table.joint_names.index(leader) + 1)
+    multiplier = row.sense * (row.mimic.multiplier if row.mimic else 1.0)
+    return {1.0: q, -1.0: f"-{q}"}.get(multiplier, f"{number(multiplier)}{times}{q}")
+
+
+def coordinate_names(table: DHTable, shown: Callable[[str], str] = str) -> str:
+    """Which coordinate is whose, where that is not row by row."""
+    if [row.joint for row in table.rows] == list(table.joint_names):
+        return ""
+    return "with " + ", ".join(f"q{i} = {shown(name)}" for i, name in enumerate(table.joint_names, 1))
+
+
+def constant_of(row: DHRow) -> float:
+    """What is added to the variable: the cell and the follower's own offset."""
+    cell = row.theta if row.kind.turns else row.d
+    return cell + row.sense * row.mimic.offset if row.mimic else cell
+
+
+def added(variable: str, constant: str) -> str:
+    """`variable + constant` without zero terms and double signs."""
+    if constant == "0":
+        return variable
+    return f"{variable} - {constant[1:]}" if constant.startswith("-") else f"{variable} + {constant}"
+
+
+def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
+    """a, alpha, d, theta and, if any row needs it, beta, with the variable where it belongs."""
+    moves = variable(table, row, **style)
+    theta, d = units.angle(row.theta, pi), units.length(row.d)
+    if row.kind.turns:
+        theta = added(moves, units.angle(constant_of(row), pi))
+    else:
+        d = added(moves, units.length(constant_of(row)))
+    named = {"a": units.length(row.a), "alpha": units.angle(row.alpha, pi), "d": d, "theta": theta}
+    texts = [named[name] for name in units.columns]
+    return [*texts, units.angle(row.beta, pi)] if table.has_hayati_rows else texts
+
+
+def headings(table: DHTable, units: Units) -> list[str]:
+    """Names of the columns of `cells`, with units."""
+    at = "(i-1)" if table.convention is Convention.MODIFIED else ""
+    angle, length = units.angle_name, units.length_name
+    named = {
+        "a": f"a{at} [{length}]",
+        "alpha": f"alpha{at} [{angle}]",
+        "d": f"d [{length}]",
+        "theta": f"theta [{angle}]",
+    }
+    names = [named[name] for name in units.columns]
+    return [*names, f"beta{at} [{angle}]"] if table.has_hayati_rows else names
+
+
+def is_identity(T: FloatArray) -> bool:
+    """Whether a pose is the identity to the bit."""
+    return bool(np.array_equal(T, np.eye(4)))
+
+
+def pose_lines(T: FloatArray, digits: int = 10) -> list[str]:
+    """The three upper rows of a pose, aligned, in metres."""
+    texts = [[f"{x + 0.0:.{digits}g}" for x in row] for row in T[:3]]
+    widths = [max(len(row[i]) for row in texts) for i in range(4)]
+    return ["  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in texts]
+
+
+def at_most(value: float) -> str:
+    """A bound with three digits, rounded up so that it stays one.
+
+    Example:
+        >>> at_most(7.5912e-06), at_most(0.0)
+        ('7.60e-06', '0')
+    """
+    if value == 0.0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return f"{math.ceil(value / unit * _ON_THE_DIGIT) * unit:.2e}"
+
+
+def snap_lines(table: DHTable, bullet: str = "  ") -> list[str]:
+    """What was snapped, in sentences, then a line for each change."""
+    snap = table.snap
+    if snap is None:
+        return []
+    if not snap.changes:
+        return [f"Snapped within {snap.tolerance:.3g} rad: nothing had to move."]
+    metres, radians = at_most(snap.metres), at_most(snap.radians)
+    measured = f"{snap.measured_metres:.2e} m and {snap.measured_radians:.2e} rad"
+    lines = [
+        f"Snapped within {snap.tolerance:.3g} rad: the tip moves by at most {metres} m and turns by at most",
+        f"{radians} rad, guaranteed within the limits of sliding joints",
+        f"({measured} measured on {snap.samples} samples).",
+    ]
+    for change in snap.changes:
+        n = len(table.rows)
+        row = "base" if change.row < 0 else "tool" if change.row >= n else f"row {change.row + 1}"
+        moved = f"turned {change.angle:.2e} rad, tip at most {at_most(change.tip)} m"
+        lines.append(f"{bullet}{row}: {change.what}, {moved}")
+    return lines
+
+
+def write_terminal(table: DHTable, units: Units) -> str:
+    """Lines for a terminal, the last one ended."""
+    title = f"{table.robot}: {table.base_frame} to {table.tip_frame}"
+    lines = [f"{title}, {table.convention} Denavit-Hartenberg parameters", formula(table), ""]
+    body = [["i", "joint", *headings(table, units)]]
+    body += [[str(i), row.joint, *cells(table, row, units)] for i, row in enumerate(table.rows, 1)]
+    lines += aligned(body)
+    if not table.rows:
+        lines.append("(nothing moves between the two frames)")
+    if names := coordinate_names(table):
+        lines += ["", names]
+    for what, T in (("base", table.base), ("tool", table.tool)):
+        if not is_identity(T):
+            lines += ["", f"{what} (metres):", *("  " + line for line in pose_lines(T, units.digits))]
+        else:
+            lines += [] if what == "tool" and is_identity(table.base) else [""]
+            lines.append(f"{what}: the identity")
+    if table.snap is not None:
+        lines += ["", *snap_lines(table)]
+    return "\n".join(map(printable, lines)) + "\n"
+
+
+def aligned(body: list[list[str]]) -> list[str]:
+    """Columns side by side with a rule under the headings: names to the left, numbers to the right."""
+    body = [[printable(text) for text in row] for row in body]
+    widths = [max(len(row[i]) for row in body) for i in range(len(body[0]))]
+    lines = []
+    for row in body:
+        texts = [
+            text.ljust(width) if i == 1 else text.rjust(width)
+            for i, (text, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append("  ".join(texts).rstrip())
+    return [lines[0], "-" * (sum(widths) + 2 * (len(widths) - 1)), *lines[1:]]
+
+
+def write_markdown(table: DHTable, units: Units) -> str:
+    """A heading line, the table, base and tool, and what was snapped."""
+    body = [["i", "joint", *headings(table, units)]]
+    body += [
+        [str(i), markdown_code(row.joint), *cells(table, row, units)] for i, row in enumerate(table.rows, 1)
+    ]
+    robot, base, tip = (markdown_code(name) for name in (table.robot, table.base_frame, table.tip_frame))
+    title = f"**{robot}**, {base} to {tip}"
+    lines = [f"{title}, {table.convention} Denavit-Hartenberg parameters: `{formula(table)}`", ""]
+    lines += [_line(body[0]), _line(["---:", ":---", *["---:"] * (len(body[0]) - 2)])]
+    lines += [_line(row) for row in body[1:]]
+    if names := coordinate_names(table, markdown_code):
+        lines += ["", names]
+    for what, T in (("Base", table.base), ("Tool", table.tool)):
+        if is_identity(T):
+            lines += ["", f"{what}: the identity."]
+        else:
+            lines += ["", f"{what} (metres):", "", "```", *pose_lines(T, units.digits), "```"]
+    if table.snap is not None:
+        said = snap_lines(table, "- ")  # joints are named in it
+        lines += ["", *(f"- {markdown_text(s[2:])}" if s.startswith("- ") else s for s in said)]
+    return "\n".join(lines) + "\n"
+
+
+def _line(texts: list[str]) -> str:
+    return "| " + " | ".join(texts) + " |"
+
+
+def write_html(table: DHTable, units: Units) -> str:
+    """A title, the formula, the table, base and tool, and what was snapped."""
+    heads = ["i", "joint", *headings(table, units)]
+    rows = [
+        (str(i), row.joint, *cells(table, row, units, pi="\u03c0")) for i, row in enumerate(table.rows, 1)
+    ]
+    ends = f"{table.robot}: {table.base_frame} to {table.tip_frame}"
+    parts: list[str | Table] = [formula(table), Table(heads, rows, left=2)]
+    parts += [names] if (names := coordinate_names(table)) else []
+    for what, T in (("base", table.base), ("tool", table.tool)):
+        if is_identity(T):
+            parts.append(f"{what}: the identity")
+        else:
+            lines = [line.split() for line in pose_lines(T, units.digits)]
+            parts += [f"{what} (metres):", Table(("x", "y", "z", "position"), lines, left=0)]
+    parts += snap_lines(table)
+    title = f"{ends}, {table.convention} Denavit-Hartenberg parameters"
+    return TextDocument(title, parts).html() + "\n"
+
+
+_FORMULA = {
+    Convention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
+    Convention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
+}
+
+
+def write_latex(table: DHTable, units: Units) -> str:
+    """A table environment that needs the packages amsmath, booktabs and graphicx."""
+    modified = table.convention is Convention.MODIFIED
+    at = "_{i-1}" if modified else "_i"
+    angle = "rad" if units.angles is Angles.RADIANS else r"$^\circ$"
+    length = units.length_name
+    named = {
+        "a": f"$a{at}$ [{length}]",
+        "alpha": rf"$\alpha{at}$ [{angle}]",
+        "d": f"$d_i$ [{length}]",
+        "theta": rf"$\theta_i$ [{angle}]",
+    }
+    heads = [r"$i$", "joint", *(named[name] for name in units.columns)]
+    if table.has_hayati_rows:
+        heads.append(rf"$\beta{at}$ [{angle}]")
+    rows = []
+    for i, row in enumerate(table.rows, 1):
+        texts = [maths(text) for text in cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")]
+        rows.append([str(i), latex_text(row.joint), *texts])
+    poses = {what: T for what, T in (("Base", table.base), ("Tool", table.tool)) if not is_identity(T)}
+    lines = [
+        r"\begin{table}",
+        r"  \centering",
+        f"  \\caption{{{_caption(table)}}}",
+        *fitted(
+            [
+                rf"\begin{{tabular}}{{rl{'r' * (len(heads) - 2)}}}",
+                r"  \toprule",
+                f"  {' & '.join(heads)} \\\\",
+                r"  \midrule",
+                *(f"  {' & '.join(row)} \\\\" for row in rows),
+                r"  \bottomrule",
+                r"\end{tabular}",
+            ]
+        ),
+        *(line for what, T in poses.items() for line in pose(what, T)),
+        r"\end{table}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _caption(table: DHTable) -> str:
+    names = f"{latex_text(table.robot)}, {latex_text(table.base_frame)} to {latex_text(table.tip_frame)}"
+    product = _FORMULA[table.convention]
+    if table.has_hayati_rows:
+        product = product.replace(r"R_x(\alpha_i)", r"R_x(\alpha_i)\,R_y(\beta_i)")
+        product = product.replace(r"R_x(\alpha_{i-1})", r"R_x(\alpha_{i-1})\,R_y(\beta_{i-1})")
+    caption = f"Denavit--Hartenberg parameters of {names}, {table.convention} convention, $T = {product}$."
+    if table.snap is not None and table.snap.changes:
+        caption += (
+            f" Angles were rounded within {maths(f'{table.snap.tolerance:.2g}')}\\,rad,"
+            f" which moves the tip by at most {maths(at_most(table.snap.metres))}\\,m."
+        )
+    return caption
+
+
+def fitted(lines: list[str]) -> list[str]:
+    """What is wider than the page's text made as wide as that, and nothing else changed."""
+    size = r"\ifdim\width>\linewidth\linewidth\else\width\fi"
+    return [rf"  \resizebox{{{size}}}{{!}}{{%", *(f"    {line}" for line in lines), "  }"]
+
+
+def pose(what: str, T: FloatArray) -> list[str]:
+    """A line of its own with a pose, in metres."""
+    rows = (" & ".join(_plain(f"{x + 0.0:.6g}") for x in row) for row in T)
+    matrix = r"\begin{bmatrix}" + r" \\ ".join(rows) + r"\end{bmatrix}"
+    return [r"  \par\medskip", *fitted([rf"{what} (m): ${matrix}$"])]
+
+
+def maths(text: str) -> str:
+    """A cell in math mode, a/b as it stands and 1e-6 as a power."""
+    return f"${_plain(text)}$"
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"e([+-])0*(\d+)", lambda m: rf"\cdot 10^{{{'-' if m[1] == '-' else ''}{m[2]}}}", text)

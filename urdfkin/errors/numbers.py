@@ -1,0 +1,139 @@
+"""Numbers as people write them: decimal digits in ASCII, finite, and nothing else.
+
+Python's own `float` is far more generous: it takes `1_0`, Arabic digits, `nan` and `infinity`. It is only
+asked once the grammar has agreed, which is that of `xs:double` without its special values.
+
+
+A number with its unit as people write it: `30deg`, `pi/2`, `5 mm`, `-2*pi/3`, `90 deg/s`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import NamedTuple
+
+#: The grammar, which takes time linear in the length of a text.
+DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_WHOLE = re.compile(r"[+-]?[0-9]+")
+#: Longest number that is read; Python's conversion takes time quadratic in the length of absurd ones.
+_LONGEST = 2000
+
+#: What a refused number might have been meant as -> what to do about it; the first that matches.
+_REMEDIES = (
+    (r"", "it is empty: write a number"),
+    (r"[+-]?(nan|inf|infinity)", "only finite numbers have a meaning here"),
+    (r".*[^\x00-\x7f].*", "write ASCII digits and signs"),
+    (r".*_.*", "write the digits without underscores"),
+    (r"0[xXbBoO].*", "write it in decimal digits"),
+    (r".*;.*", "separate numbers by commas"),
+)
+
+
+def parse_float(text: str) -> float | None:
+    """The finite number that a text is, blanks around it allowed; None where it is none.
+
+    >>> [parse_float(text) for text in (" -1.5e-3", "1_0", "nan", "\u0661", "1e999")]
+    [-0.0015, None, None, None, None]
+    """
+    text = text.strip(" \t\r\n")
+    if len(text) > _LONGEST or not DECIMAL.fullmatch(text):
+        return None
+    value = float(text)
+    return value if math.isfinite(value) else None
+
+
+def parse_int(text: str) -> int | None:
+    """The whole number that a text is, blanks around it allowed; None where it is none.
+
+    >>> parse_int("12"), parse_int("1_2"), parse_int("1.0"), parse_int("1e3")
+    (12, None, None, None)
+    """
+    text = text.strip(" \t\r\n")
+    return int(text) if len(text) <= _LONGEST and _WHOLE.fullmatch(text) else None
+
+
+def remedy(text: str) -> str | None:
+    """What to do about a text that is no number; None where there is no telling what was meant."""
+    text = text.strip(" \t\r\n")
+    found = (words for pattern, words in _REMEDIES if re.fullmatch(pattern, text, re.IGNORECASE | re.DOTALL))
+    return next(found, None)
+
+
+#: Units by the names that people give them -> the short one.
+UNITS = {
+    **dict.fromkeys(("rad", "radian", "radians"), "rad"),
+    **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),
+    **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), "m"),
+    **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), "mm"),
+}
+_FACTOR = r"(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|pi)"
+_WRITTEN = re.compile(
+    rf"(?P<sign>[+-]?)\s*(?P<factors>{_FACTOR}(?:\s*[*/]\s*{_FACTOR}|\s*pi)*)"
+    r"\s*(?P<unit>[a-z]+)?\s*(?P<per>/\s*s\s*(?:\^?\s*2|/\s*s)?)?"
+)
+_STEP = re.compile(rf"\s*([*/]?)\s*({_FACTOR})")
+_LONGEST_QUANTITY = 200
+
+
+class Measured(NamedTuple):
+    """What a text says.
+
+    Attributes:
+        value: In radians or metres where it says a unit, else as it stands.
+        unit: "rad" or "m"; None where it says none. A multiple of pi without a unit is in radians.
+        per: How often it is divided by a second: 1 for a rate, 2 for a rate's rate.
+    """
+
+    value: float
+    unit: str | None
+    per: int
+
+
+def parse_quantity(text: str) -> Measured | None:
+    """The finite number that a text is, with its unit; None where it is none, or a sum.
+
+    >>> parse_quantity("30deg").value == math.pi / 6, parse_quantity("-pi/2").value == -math.pi / 2
+    (True, True)
+    >>> [parse_quantity(text) for text in ("5 mm", "2 rad/s^2", "0.3", "1-2", "1_0")]
+    [Measured(value=0.005, unit='m', per=0), Measured(value=2.0, unit='rad', per=2), \
+Measured(value=0.3, unit=None, per=0), None, None]
+    """
+    plain = text.strip(" \t\r\n").lower()
+    plain = plain.replace("°", "deg").replace("π", "pi").replace("²", "2")
+    if len(plain) > _LONGEST_QUANTITY or (found := _WRITTEN.fullmatch(plain)) is None:
+        return None
+    unit = UNITS.get(found["unit"]) if found["unit"] else None
+    value = _product(found["factors"])
+    if value is None or (found["unit"] and unit is None):
+        return None
+    if "pi" in found["factors"]:
+        if unit not in (None, "rad"):
+            return None
+        unit = "rad"
+    value = -value if found["sign"] == "-" else value
+    value = in_radians(value) if unit == "deg" else value / 1000.0 if unit == "mm" else value
+    per = re.sub(r"[\s^]", "", found["per"] or "")
+    return Measured(
+        value, {"deg": "rad", "mm": "m"}.get(unit or "", unit), 2 if len(per) > 2 else len(per) // 2
+    )
+
+
+def _product(factors: str) -> float | None:
+    value = 1.0
+    for sign, factor in _STEP.findall(factors):
+        number = math.pi if factor == "pi" else float(factor)
+        if sign == "/" and not number:
+            return None
+        value = value / number if sign == "/" else value * number
+    return value if math.isfinite(value) else None
+
+
+def in_radians(degrees: float) -> float:
+    """Radians; multiples of 15 degrees are those of pi/12 to the bit.
+
+    >>> in_radians(90.0) == math.pi / 2
+    True
+    """
+    twelfths = degrees / 15.0
+    return twelfths * math.pi / 12.0 if twelfths == round(twelfths) else math.radians(degrees)

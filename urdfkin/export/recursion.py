@@ -1,0 +1,202 @@
+"""The recursion of section 7.7 along one path, on whatever kind of number the equations are given.
+
+A plan of one frame is a row of steps: carried along a rigid link, turned by a constant, moved by a joint
+whose axis is z. Places and Jacobians are followed in the world's axes, as in the text. Velocities and
+accelerations are followed in each link's own, where axes are (0, 0, 1) and links constants; what is asked for
+in the world's is turned back joint by joint, which takes a third less than R itself.
+
+The recursion itself is `urdfkin.model.recursion`; here it reads a plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from urdfkin.compiled.plan import Column as ColumnField
+from urdfkin.compiled.plan import CompiledTree, Geometry, Motion
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.recursion import Column, Matrix, Number, Recursion, State, Vector
+from urdfkin.model.reference import Reference
+
+_Z: Vector = (0, 0, 1)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of number.
+
+    Attributes:
+        chapter: The equations, computing with it.
+        sine_cosine: Of an angle.
+        root: The square root.
+        entering: Told before each step, before the frame (after the last step) and before its results.
+        reached: Told of each state, after as many steps.
+    """
+
+    chapter: Any
+    sine_cosine: Callable[[Number], tuple[Number, Number]]
+    root: Callable[[Number], Number]
+    entering: Callable[[int], None] = lambda place: None
+    reached: Callable[[int, State], None] = lambda place, state: None
+
+
+class TreeRecursion(Recursion):
+    """One path.
+
+    Args:
+        plan: Of one frame.
+        kind: Of number.
+        inputs: q, v and a; zeros where nobody asks for them.
+        own: Whether motion is seen in each link's own axes.
+
+    Attributes:
+        states: After each step.
+        end: The frame's.
+        turns: The rotations from each frame's axes to those of the one before, from the base on.
+    """
+
+    def __init__(
+        self, plan: CompiledTree, kind: Kind, inputs: Sequence[Sequence[Number]], *, own: bool
+    ) -> None:
+        super().__init__(kind.chapter, own)
+        self.plan, self.kind, self.inputs = plan, kind, inputs
+        self.turns: list[Matrix] = []
+        self.states: list[State] = []
+        state = State()
+        for i in range(len(plan.steps)):
+            kind.entering(i)
+            state = self._moved(i, self._rigid(state, plan.geometry[i].tolist()))
+            self.states.append(state)
+            kind.reached(i, state)
+        kind.entering(len(self.states))
+        self.end = self._rigid(state, plan.offsets[0].tolist())
+        kind.reached(len(self.states), self.end)
+        kind.entering(len(self.states) + 1)
+
+    def turned(self, s: State, S: Matrix) -> State:
+        """As ever, and remembered."""
+        self.turns.append(S)
+        return super().turned(s, S)
+
+    def _rigid(self, s: State, row: Sequence[float]) -> State:
+        R, d = row[: Geometry.OFFSET], row[Geometry.OFFSET : Geometry.MULTIPLIER]
+        x, y, z = _structure(R[0:3]), _structure(R[3:6]), _structure(R[6:9])
+        return self.turned(self.carried(s, _structure(d)), (x, y, z))
+
+    def _about_z(self, angle: Number) -> Matrix:
+        found: Matrix = self.eq.about_z(*self.kind.sine_cosine(angle), 0.0, 1.0)
+        return found
+
+    def _moved(self, i: int, s: State) -> State:
+        (kind, at, rate_at), (q, v, a) = self.plan.steps[i].tolist(), self.inputs
+        multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
+        if kind == Motion.PLANAR:
+            x, y, angle = q[at : at + 3]
+            rates = [u for z in (v, a) for u in ((z[rate_at], z[rate_at + 1], 0), (0, 0, z[rate_at + 2]))]
+            return self.free(s, (x, y, 0), self._about_z(angle), rates)
+        if kind == Motion.FLOATING:
+            x, y, z, *quaternion = q[at : at + 7]
+            length = self.kind.root(sum(c * c for c in quaternion))
+            S = self.eq.rotation_of_quaternion(*(c / length for c in quaternion))
+            rates = [tuple(r[rate_at + k : rate_at + k + 3]) for r in (v, a) for k in (0, 3)]
+            return self.free(s, (x, y, z), S, rates)
+        value, rate, rate_2 = multiplier * q[at] + constant, multiplier * v[rate_at], multiplier * a[rate_at]
+        if kind == Motion.TURN:
+            return self.revolute(s, _Z, self._about_z(value), rate, rate_2)
+        return self.prismatic(s, _Z, value, rate, rate_2)
+
+    @property
+    def columns(self) -> list[Column]:
+        """The rates of the path."""
+        found = []
+        for row, factor in zip(self.plan.columns.tolist(), self.plan.multipliers.tolist(), strict=True):
+            s = self.states[row[ColumnField.STEP]]
+            z = self.eq.transposed(s.R)[row[ColumnField.AXIS]]
+            found.append(
+                Column(z, bool(row[ColumnField.TURNS]), s, row[ColumnField.STEP], row[ColumnField.V], factor)
+            )
+        return found
+
+
+def _structure(x: Sequence[float]) -> Vector:
+    """A constant vector without what is less than the rounding of its largest number.
+
+    The cosine of the double nearest to pi/2 is 6e-17: a product for nothing wherever it stands. What leaving
+    it out costs is counted in `urdfkin.kinematics.roundings`.
+    """
+    least = EPS / 2.0 * max(map(abs, x))
+    first, second, third = (c if abs(c) > least else 0.0 for c in x)
+    return first, second, third
+
+
+# -- what is asked of the frame ----------------------------------------------------------------------------
+
+
+def placement(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+    """T_world_frame, row by row."""
+    end = TreeRecursion(plan, kind, inputs, own=False).end
+    rows = [[*row, x] for row, x in zip(end.R, end.p, strict=True)]
+    return [*(x for row in rows for x in row), 0.0, 0.0, 0.0, 1.0]
+
+
+def velocity(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+    """[linear; angular]: 7.127, 7.128."""
+    walk = _seen_by(plan, kind, inputs, reference)
+    return _six(walk, reference, *walk.velocity(walk.end, reference))
+
+
+def acceleration(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+    """[linear; angular], classical: 7.129, 7.130."""
+    walk = _seen_by(plan, kind, inputs, reference)
+    return _six(walk, reference, *walk.acceleration(walk.end, reference))
+
+
+def jacobian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+    """Row by row, 7.85."""
+    walk = TreeRecursion(plan, kind, inputs, own=False)
+    return _by_row(walk.jacobian(walk.end, walk.columns, plan.nv, reference))
+
+
+def jacobian_rate(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+    """Row by row, 7.126."""
+    walk = TreeRecursion(plan, kind, inputs, own=False)
+    return _by_row(walk.jacobian_rate(walk.end, walk.columns, plan.nv, reference))
+
+
+def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+    """Column by column of each row of 7.85, how each rate changes it: 7.126 before it is summed."""
+    walk, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
+    out: list[Number] = [0.0] * (6 * nv**2)
+    for of, by, factor, six in walk.hessian(walk.end, walk.columns, reference):
+        for row, x in enumerate(six):
+            out[(row * nv + of) * nv + by] = out[(row * nv + of) * nv + by] + factor * x
+    return out
+
+
+def _seen_by(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> TreeRecursion:
+    # From the world's origin a motion is seen through p, which is followed in the world's axes.
+    return TreeRecursion(plan, kind, inputs, own=reference is not Reference.WORLD)
+
+
+def _six(walk: TreeRecursion, reference: Reference, linear: Vector, angular: Vector) -> list[Number]:
+    if reference is Reference.LOCAL_WORLD_ALIGNED:
+        for S in reversed(walk.turns):
+            linear, angular = walk.eq.rotate(S, linear), walk.eq.rotate(S, angular)
+    return [*linear, *angular]
+
+
+def _by_row(columns: Sequence[Sequence[Number]]) -> list[Number]:
+    return [x for row in zip(*columns, strict=True) for x in row]
+
+
+#: By the names of the table of quantities.
+QUANTITIES: dict[str, Callable[[CompiledTree, Kind, Any, Reference], list[Number]]] = {
+    "placement": placement,
+    "velocity": velocity,
+    "jacobian": jacobian,
+    "jacobian rate": jacobian_rate,
+    "hessian": hessian,
+    "acceleration": acceleration,
+}

@@ -1,0 +1,645 @@
+"""A frame that moves in another, and rows of such frames.
+
+Sections 7.3 and 7.6, equations 7.58 to 7.61, 7.49 and 7.125.
+
+
+A point in a moving frame: its position, its velocity and its acceleration, part by part.
+
+Sections 7.3.1 and 7.6, equations 7.58, 7.59 and 7.123 to 7.125. `p_1`, `v_1`, `a_1` are what an observer who
+moves with frame 1 measures, expressed in frame 1; results are what one in frame 0 sees, expressed in frame 0.
+
+
+What one joint does: to the link it moves, and to a point further out.
+
+Sections 7.4.1, 7.4.2 and 7.4.4, equations 7.62 to 7.67, 7.72 to 7.74, 7.80 and a column of 7.85. `z` is the
+joint's axis z_{i-1} in frame 0; `turns` says whether the joint is rotary or prismatic.
+
+
+One link in the plane: where its endpoint is and how fast it goes.
+
+Section 7.1, equations 7.1 to 7.7 (page 2 of the text, with 7.6 and 7.8 to 7.10, is lost).
+
+
+Velocity of one point of a link from that of another: the tool and the last frame.
+
+Section 7.4.8, equation 7.115. Six-vectors are [linear; angular]. The angular velocity is the same at both.
+
+
+The manipulator Jacobian: rates of position and of an orientation's *representation*.
+
+Section 7.5, equations 7.116 to 7.122. The velocity Jacobian J_v gives linear and angular velocity; the
+manipulator (or analytical) Jacobian J gives the rates of x = (position, orientation), where the orientation
+is three Euler angles in any sequence ("ZYZ" is the text's) or a unit quaternion ("quaternion"). People have
+mixed the two up: the text warns of it.
+
+
+Moving bodies: one link in the plane, points and frames in moving frames, and what a joint does.
+
+Sections 7.1, 7.3 and 7.6 of the text, and of 7.4 and 7.5 what needs no robot. Every
+function takes any leading batch shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields
+from functools import reduce
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.kinematics.inputs import FloatArray, matrices, rotations, scalars, unit_vectors, vectors
+from urdfkin.kinematics.number_kinds import array_equations as eq
+from urdfkin.kinematics.rotation.euler import NEAREST, euler_of, euler_rate_inverse, euler_rate_matrix
+from urdfkin.kinematics.rotation.quaternion import quaternion_of, quaternion_rate_matrix
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MovingFrame:
+    """Where frame 1 is in frame 0 and how it moves, everything expressed in frame 0.
+
+    Attributes:
+        R_0_1: (..., 3, 3) orientation.
+        d_0_1: (..., 3) interorigin vector from O_0 to O_1, metres.
+        w_0_1: (..., 3) angular velocity, rad/s.
+        v_0_1: (..., 3) rate of `d_0_1`, m/s.
+        alpha_0_1: (..., 3) angular acceleration, rad/s^2.
+        a_0_1: (..., 3) rate of `v_0_1`, m/s^2.
+
+    Raises:
+        InputError: a shape, a value that is not finite, or `R_0_1` is no rotation.
+    """
+
+    R_0_1: FloatArray
+    d_0_1: FloatArray
+    w_0_1: FloatArray = field(default_factory=lambda: np.zeros(3))
+    v_0_1: FloatArray = field(default_factory=lambda: np.zeros(3))
+    alpha_0_1: FloatArray = field(default_factory=lambda: np.zeros(3))
+    a_0_1: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            check = rotations if entry.name == "R_0_1" else vectors
+            array = np.array(check(getattr(self, entry.name), entry.name), order="C")
+            array.setflags(write=False)
+            object.__setattr__(self, entry.name, array)
+
+
+def turned(R: FloatArray, p: FloatArray) -> FloatArray:
+    """R p for (..., 3, 3) and (..., 3)."""
+    return (R @ p[..., np.newaxis])[..., 0]
+
+
+def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
+    """Frame 2 in frame 0, from frame 1 in frame 0 and frame 2 in frame 1 (7.60, 7.61).
+
+    O_2 is a point that moves in frame 1, so that 7.58, 7.124 and 7.125 give its motion. Angular
+    velocities add (7.49), and the rate of that sum has the term w_01 x w_12.
+
+    Args:
+        outer: Frame 1 in frame 0.
+        inner: Frame 2 in frame 1: its "frame 0" is our frame 1.
+
+    Returns:
+        Frame 2 in frame 0.
+    """
+    R, w = outer.R_0_1, outer.w_0_1
+    d_12, v_12, a_12 = (turned(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
+    w_12, alpha_12 = turned(R, inner.w_0_1), turned(R, inner.alpha_0_1)
+    return MovingFrame(
+        R @ inner.R_0_1,
+        outer.d_0_1 + d_12,
+        w + w_12,
+        eq.moving_point_velocity(outer.v_0_1, w, d_12, v_12),
+        eq.free_angular_acceleration(outer.alpha_0_1, w, w_12, alpha_12),
+        eq.moving_point_acceleration(outer.a_0_1, outer.alpha_0_1, w, d_12, v_12, a_12),
+    )
+
+
+def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
+    """The last of a row of frames, each given in the one before it, in frame 0 (7.50, 7.61).
+
+    Args:
+        frames: Frame i + 1 in frame i, for i = 0, 1, ...; none at all gives frame 0 itself.
+
+    Returns:
+        The last frame in frame 0.
+    """
+    return reduce(compose, frames, MovingFrame(np.eye(3), np.zeros(3)))
+
+
+def seen_from(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = None) -> FloatArray:
+    """(..., 4, 4) T_1_2 = T_0_1^-1 T_0_2: frame 2 in frame 1, both given in frame 0 (7.77)."""
+    T = np.empty(np.broadcast_shapes(T_0_1.shape, T_0_2.shape)) if out is None else out
+    back = T_0_1[..., :3, :3].swapaxes(-1, -2)
+    T[..., :3, :3] = back @ T_0_2[..., :3, :3]
+    T[..., :3, 3] = turned(back, T_0_2[..., :3, 3] - T_0_1[..., :3, 3])
+    T[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
+    return T
+
+
+_STILL = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VelocityParts:
+    """The velocity of a point, m/s in frame 0, as 7.124 names its terms.
+
+    Attributes:
+        rotation: w x p, from the turning of the frame.
+        relative: R v_1, from the point's motion in the frame.
+        origin: d-dot, from the motion of the frame's origin.
+    """
+
+    rotation: FloatArray
+    relative: FloatArray
+    origin: FloatArray
+
+    @property
+    def total(self) -> FloatArray:
+        """The sum of the parts."""
+        return self.rotation + self.relative + self.origin
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AccelerationParts:
+    """The acceleration of a point, m/s^2 in frame 0, as 7.125 names its terms.
+
+    Attributes:
+        transverse: alpha x p.
+        centripetal: w x (w x p), towards the axis of rotation.
+        coriolis: 2 w x R v_1, perpendicular to both.
+        relative: R a_1, from the point's acceleration in the frame.
+        origin: d-dot-dot, the acceleration of the frame's origin.
+    """
+
+    transverse: FloatArray
+    centripetal: FloatArray
+    coriolis: FloatArray
+    relative: FloatArray
+    origin: FloatArray
+
+    @property
+    def total(self) -> FloatArray:
+        """The sum of the parts."""
+        return self.transverse + self.centripetal + self.coriolis + self.relative + self.origin
+
+
+def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
+    """p_0 = d_01 + R p_1 (7.58).
+
+    Args:
+        frame: Frame 1 in frame 0.
+        p_1: (..., 3) the point in frame 1, metres.
+
+    Returns:
+        (..., 3) the point in frame 0, metres.
+
+    Raises:
+        InputError: a shape or a value that is not finite.
+    """
+    p_0: FloatArray = eq.point_position(frame.d_0_1, frame.R_0_1, vectors(p_1, "p_1"))
+    return p_0
+
+
+def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _STILL) -> VelocityParts:
+    """p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 when the point is fixed in frame 1).
+
+    Args:
+        frame: Frame 1 in frame 0.
+        p_1: (..., 3) the point in frame 1, metres.
+        v_1: (..., 3) its velocity in frame 1, m/s; at rest unless given.
+
+    Returns:
+        The parts; `.total` is the velocity, (..., 3) m/s in frame 0.
+
+    Raises:
+        InputError: a shape or a value that is not finite.
+    """
+    p_0 = turned(frame.R_0_1, vectors(p_1, "p_1"))
+    rotation = eq.tangential(frame.w_0_1, p_0)
+    relative = turned(frame.R_0_1, vectors(v_1, "v_1"))
+    return VelocityParts(*np.broadcast_arrays(rotation, relative, frame.v_0_1))
+
+
+def point_acceleration(
+    frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _STILL, a_1: ArrayLike = _STILL
+) -> AccelerationParts:
+    """p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot (7.125; 7.123 at rest).
+
+    Args:
+        frame: Frame 1 in frame 0.
+        p_1: (..., 3) the point in frame 1, metres.
+        v_1: (..., 3) its velocity in frame 1, m/s; at rest unless given.
+        a_1: (..., 3) its acceleration in frame 1, m/s^2; none unless given.
+
+    Returns:
+        The parts; `.total` is the acceleration, (..., 3) m/s^2 in frame 0.
+
+    Raises:
+        InputError: a shape or a value that is not finite.
+    """
+    p_0 = turned(frame.R_0_1, vectors(p_1, "p_1"))
+    v_0 = turned(frame.R_0_1, vectors(v_1, "v_1"))
+    a_0 = turned(frame.R_0_1, vectors(a_1, "a_1"))
+    transverse = eq.transverse(frame.alpha_0_1, p_0)
+    centripetal, coriolis = eq.centripetal(frame.w_0_1, p_0), eq.coriolis(frame.w_0_1, v_0)
+    return AccelerationParts(*np.broadcast_arrays(transverse, centripetal, coriolis, a_0, frame.a_0_1))
+
+
+def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -> FloatArray:
+    """d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+
+    Args:
+        d: (...) offset d_i along the joint's axis, metres.
+        z: (..., 3) unit axis z_{i-1}.
+        a: (...) length a_i of the common normal, metres.
+        x: (..., 3) unit vector x_i along the common normal.
+
+    Returns:
+        (..., 3) metres, in the frame of `z` and `x`.
+
+    Raises:
+        InputError: a shape, or a vector that is not of unit length.
+
+    Example:
+        >>> interorigin_vector(0.3, [0.0, 0.0, 1.0], 0.5, [1.0, 0.0, 0.0])
+        array([0.5, 0. , 0.3])
+    """
+    vector: FloatArray = eq.interorigin_vector(
+        scalars(d, "d"), unit_vectors(z, "z"), scalars(a, "a"), unit_vectors(x, "x")
+    )
+    return vector
+
+
+def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatArray:
+    """w_{i-1,i}: theta-dot z for a rotary joint (7.62), nothing for a prismatic one (7.63).
+
+    Args:
+        z: (..., 3) unit axis z_{i-1} in frame 0.
+        rate: (...) the joint's rate, rad/s or m/s.
+        turns: Whether the joint is rotary.
+
+    Returns:
+        (..., 3) rad/s, in frame 0.
+
+    Raises:
+        InputError: a shape, or an axis that is not of unit length.
+    """
+    w: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
+    return w if turns else np.zeros_like(w)
+
+
+def interorigin_velocity(
+    w_0_i: ArrayLike, d_vector: ArrayLike, z: ArrayLike, rate: ArrayLike, turns: bool
+) -> FloatArray:
+    """d-dot_{i-1,i} = w_0i x d_{i-1,i}, and d-dot_i z more for a prismatic joint (7.73, 7.74).
+
+    With only joint i moving, w_0i is w_{i-1,i} and these are 7.66 and 7.67.
+
+    Args:
+        w_0_i: (..., 3) angular velocity of link i, rad/s, in frame 0.
+        d_vector: (..., 3) interorigin vector d_{i-1,i}, metres, in frame 0.
+        z: (..., 3) unit axis z_{i-1} in frame 0.
+        rate: (...) the joint's rate, rad/s or m/s.
+        turns: Whether the joint is rotary.
+
+    Returns:
+        (..., 3) m/s, in frame 0: the rate of the vector as frame 0 sees it.
+
+    Raises:
+        InputError: a shape, or an axis that is not of unit length.
+    """
+    carried: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
+    slid: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
+    return carried if turns else carried + slid
+
+
+def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
+    """What a joint's unit rate does to an endpoint: [z x d_{i-1,n}; z] or [z; 0] (7.80, 7.85).
+
+    Args:
+        z: (..., 3) unit axis z_{i-1} in frame 0.
+        arm: (..., 3) moment arm d_{i-1,n} from the joint's origin to the endpoint, metres, in frame 0.
+        turns: Whether the joint is rotary.
+
+    Returns:
+        (..., 6) [linear; angular], in frame 0.
+
+    Raises:
+        InputError: a shape, or an axis that is not of unit length.
+    """
+    z, arm = np.broadcast_arrays(unit_vectors(z, "z"), vectors(arm, "arm"))
+    linear, angular = eq.turning_column(z, arm) if turns else (z, np.zeros_like(z))
+    return np.concatenate((linear, angular), axis=-1)
+
+
+def planar_rotation(theta: ArrayLike) -> FloatArray:
+    """R(theta) of the plane (7.5).
+
+    Args:
+        theta: (...) radians.
+
+    Returns:
+        (..., 2, 2) rotation; its columns are the axes x1 and y1 in frame 0.
+
+    Raises:
+        InputError: an angle that is not a finite number.
+    """
+    theta = scalars(theta, "theta")
+    c, s = np.cos(theta), np.sin(theta)
+    return np.stack((np.stack((c, -s), axis=-1), np.stack((s, c), axis=-1)), axis=-2)
+
+
+def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
+    """dR/dtheta: the same axes a right angle on, y1 and -x1 (used in 7.4; drawn in figure 7.2).
+
+    Args:
+        theta: (...) radians.
+
+    Returns:
+        (..., 2, 2), per radian.
+
+    Raises:
+        InputError: an angle that is not a finite number.
+    """
+    R = planar_rotation(theta)
+    return np.stack((R[..., 1], -R[..., 0]), axis=-1)
+
+
+def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
+    """d_01 = a x1 = R a (1, 0): the endpoint of a link that turns about O_0 (7.1, 7.3).
+
+    Args:
+        theta: (...) joint angle, radians.
+        length: (...) the link's length a, metres.
+
+    Returns:
+        (..., 2) metres, in frame 0.
+
+    Raises:
+        InputError: a value that is not a finite number.
+
+    Example:
+        >>> link_endpoint(np.pi / 2, 2.0).round(12)
+        array([0., 2.])
+    """
+    endpoint: FloatArray = scalars(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
+    return endpoint
+
+
+def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
+    """d-dot_01 = a theta-dot y1: along the tangent, v = r w (7.2, 7.4, 7.7).
+
+    Args:
+        theta: (...) joint angle, radians.
+        rate: (...) its rate, rad/s.
+        length: (...) the link's length a, metres.
+
+    Returns:
+        (..., 2) m/s, in frame 0.
+
+    Raises:
+        InputError: a value that is not a finite number.
+
+    Example:
+        >>> link_endpoint_velocity(0.0, 3.0, 2.0) + 0.0
+        array([0., 6.])
+    """
+    speed = scalars(length, "length") * scalars(rate, "rate")
+    velocity: FloatArray = speed[..., np.newaxis] * planar_rotation_derivative(theta)[..., 0]
+    return velocity
+
+
+def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
+    """d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}: from frame n out to the tool.
+
+    Args:
+        velocity: (..., 6) of frame n, m/s and rad/s, in frame 0.
+        d_n_tool: (..., 3) from O_n to O_tool, metres, in frame 0.
+
+    Returns:
+        (..., 6) of the tool frame, in frame 0.
+
+    Raises:
+        InputError: a shape or a value that is not finite.
+    """
+    velocity, d = vectors(velocity, "velocity", 6), vectors(d_n_tool, "d_n_tool")
+    linear, w = velocity[..., :3], velocity[..., 3:]
+    moved = eq.point_velocity(linear, w, d)
+    return np.concatenate(np.broadcast_arrays(moved, w), axis=-1)
+
+
+def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
+    """d-dot_0n = d-dot_{0,tool} - w x d_{n,tool}: from the tool back to frame n (7.115).
+
+    Args:
+        velocity: (..., 6) of the tool frame, m/s and rad/s, in frame 0.
+        d_n_tool: (..., 3) from O_n to O_tool, metres, in frame 0.
+
+    Returns:
+        (..., 6) of frame n, in frame 0.
+
+    Raises:
+        InputError: a shape or a value that is not finite.
+
+    Example:
+        >>> frame_velocity([0.0, 1.0, 0.0, 0.0, 0.0, 2.0], [0.5, 0.0, 0.0])
+        array([0., 0., 0., 0., 0., 2.])
+    """
+    return tool_velocity(velocity, -vectors(d_n_tool, "d_n_tool"))
+
+
+QUATERNION = "quaternion"
+
+
+def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
+    """The numbers that represent a rotation: the last entries of the text's x.
+
+    Args:
+        representation: An Euler sequence by SciPy's name, or "quaternion".
+        R: (..., 3, 3) rotation.
+
+    Returns:
+        (..., 3) angles in radians, or (..., 4) quaternion, scalar last.
+
+    Raises:
+        UnknownNameError: no such representation.
+        InputError: a shape, or `R` is no rotation.
+    """
+    return quaternion_of(R) if representation == QUATERNION else euler_of(representation, R)
+
+
+def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
+    """C, with [d-dot; w] = C x-dot: the identity and Omega on its diagonal (7.119, 7.120).
+
+    For a quaternion Omega is 4 E^T, three by four, with E that of 7.57.
+
+    Args:
+        representation: An Euler sequence by SciPy's name, or "quaternion".
+        R: (..., 3, 3) orientation of the end frame.
+
+    Returns:
+        (..., 6, 6), or (..., 6, 7) for a quaternion.
+
+    Raises:
+        UnknownNameError: no such representation.
+        InputError: a shape, or `R` is no rotation.
+    """
+    if representation == QUATERNION:
+        return _blocks(4.0 * quaternion_rate_matrix(quaternion_of(R)).swapaxes(-1, -2))
+    return _blocks(euler_rate_matrix(representation, euler_of(representation, R)))
+
+
+def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
+    """C^-1, with x-dot = C^-1 [d-dot; w] (7.122).
+
+    For a quaternion it is the right inverse whose rates keep the length: there is no singularity.
+
+    Args:
+        representation: An Euler sequence by SciPy's name, or "quaternion".
+        R: (..., 3, 3) orientation of the end frame.
+        nearest: How near the representational singularity may be, radians.
+
+    Returns:
+        (..., 6, 6), or (..., 7, 6) for a quaternion.
+
+    Raises:
+        RepresentationSingularityError: Euler angles of a sample are nearer than `nearest` to where Omega
+            cannot be inverted; the error says how near.
+        UnknownNameError: no such representation.
+        InputError: a shape, or `R` is no rotation.
+    """
+    if representation == QUATERNION:
+        return _blocks(quaternion_rate_matrix(quaternion_of(R)))
+    return _blocks(euler_rate_inverse(representation, euler_of(representation, R), nearest))
+
+
+def analytical_jacobian(
+    representation: str, R: ArrayLike, J_v: ArrayLike, nearest: float = NEAREST
+) -> FloatArray:
+    """J = C^-1 J_v, the manipulator Jacobian (7.122).
+
+    Args:
+        representation: An Euler sequence by SciPy's name, or "quaternion".
+        R: (..., 3, 3) orientation of the end frame.
+        J_v: (..., 6, n) velocity Jacobian, [linear; angular], in frame 0.
+        nearest: How near the representational singularity may be, radians.
+
+    Returns:
+        (..., 6, n), or (..., 7, n) for a quaternion: the derivatives of x by the joint coordinates.
+
+    Raises:
+        RepresentationSingularityError: see `representation_inverse`.
+        UnknownNameError: no such representation.
+        InputError: a shape, or `R` is no rotation.
+    """
+    J: FloatArray = representation_inverse(representation, R, nearest) @ _rows(J_v, "J_v", 6)
+    return J
+
+
+def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
+    """J_v = C J, the velocity Jacobian back from the manipulator Jacobian (7.121); never singular.
+
+    Args:
+        representation: An Euler sequence by SciPy's name, or "quaternion".
+        R: (..., 3, 3) orientation of the end frame.
+        J: (..., 6, n), or (..., 7, n) for a quaternion.
+
+    Returns:
+        (..., 6, n), [linear; angular], in frame 0.
+
+    Raises:
+        UnknownNameError: no such representation.
+        InputError: a shape, or `R` is no rotation.
+    """
+    C = representation_matrix(representation, R)
+    J_v: FloatArray = C @ _rows(J, "J", C.shape[-1])
+    return J_v
+
+
+def pose_rates(
+    representation: str, R: ArrayLike, velocity: ArrayLike, nearest: float = NEAREST
+) -> FloatArray:
+    """Rates x-dot = C^-1 [d-dot; w]: the rates of position and representation of a moving frame.
+
+    Args:
+        representation: An Euler sequence by SciPy's name, or "quaternion".
+        R: (..., 3, 3) orientation of the frame.
+        velocity: (..., 6) [linear; angular] in frame 0, m/s and rad/s.
+        nearest: How near the representational singularity may be, radians.
+
+    Returns:
+        (..., 6), or (..., 7) for a quaternion.
+
+    Raises:
+        RepresentationSingularityError: see `representation_inverse`.
+        UnknownNameError: no such representation.
+        InputError: a shape, or `R` is no rotation.
+    """
+    column = vectors(velocity, "velocity", 6)[..., np.newaxis]
+    return (representation_inverse(representation, R, nearest) @ column)[..., 0]
+
+
+def velocity_of_pose_rates(representation: str, R: ArrayLike, rates: ArrayLike) -> FloatArray:
+    """[d-dot; w] = C x-dot (7.119).
+
+    Args:
+        representation: An Euler sequence by SciPy's name, or "quaternion".
+        R: (..., 3, 3) orientation of the frame.
+        rates: (..., 6), or (..., 7) for a quaternion.
+
+    Returns:
+        (..., 6) [linear; angular] in frame 0, m/s and rad/s.
+
+    Raises:
+        UnknownNameError: no such representation.
+        InputError: a shape, or `R` is no rotation.
+    """
+    C = representation_matrix(representation, R)
+    column = vectors(rates, "rates", C.shape[-1])[..., np.newaxis]
+    return (C @ column)[..., 0]
+
+
+def _blocks(lower: FloatArray) -> FloatArray:
+    """The identity and `lower` on the diagonal."""
+    rows, columns = lower.shape[-2:]
+    C = np.zeros((*lower.shape[:-2], 3 + rows, 3 + columns))
+    C[..., :3, :3] = np.eye(3)
+    C[..., 3:, 3:] = lower
+    return C
+
+
+def _rows(value: ArrayLike, name: str, rows: int) -> FloatArray:
+    array = scalars(value, name)
+    columns = array.shape[-1] if array.ndim else 0
+    return matrices(array, name, rows, columns)
+
+
+__all__ = [
+    "AccelerationParts",
+    "MovingFrame",
+    "VelocityParts",
+    "analytical_jacobian",
+    "compose",
+    "compose_all",
+    "frame_velocity",
+    "interorigin_vector",
+    "interorigin_velocity",
+    "jacobian_column",
+    "joint_angular_velocity",
+    "link_endpoint",
+    "link_endpoint_velocity",
+    "orientation_of",
+    "planar_rotation",
+    "planar_rotation_derivative",
+    "point_acceleration",
+    "point_position",
+    "point_velocity",
+    "pose_rates",
+    "representation_inverse",
+    "representation_matrix",
+    "tool_velocity",
+    "velocity_jacobian",
+    "velocity_of_pose_rates",
+]

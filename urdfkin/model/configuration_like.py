@@ -1,0 +1,277 @@
+"""q, v and a as people give them: in order, by name, with units, or as a named pose.
+
+Text is numbers between commas or blanks (`0.3, 30deg, pi/2`, brackets allowed), or `NAME=NUMBER` between
+commas (`shoulder=30deg, elbow=pi/2`), or a pose (`ready`), which `NAME=NUMBER` behind it changes. A mapping
+has a number, an array of a batch, or such a text for each name. A pandas Series or DataFrame, and any other
+table whose labels or columns have names, is read as a mapping. A missing name is an error, never 0.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.errors import InputError, Question, UnknownNameError
+from urdfkin.errors.numbers import parse_float, parse_quantity, remedy
+from urdfkin.errors.validators import safe_repr
+from urdfkin.kinematics.inputs import FloatArray, floats
+
+#: What q, v and a may be given as; text counts as an ArrayLike.
+Given = ArrayLike | Mapping[str, ArrayLike]
+
+#: How many names a message lists.
+_LISTED = 8
+#: A unit belongs to the number before it, blanks or not.
+_UNIT_APART = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
+_AROUND_SIGNS = re.compile(r" ?([=*/]) ?")
+
+
+class Hint(NamedTuple):
+    """What to do instead of what was given, and the question whose answer says why."""
+
+    remedy: str
+    question: Question
+
+
+@dataclass(frozen=True, slots=True)
+class CoordinateLayout:
+    """What the numbers of a q, v or a are called, and how they are measured.
+
+    Attributes:
+        what: "q", "v" or "a".
+        names: One a number.
+        units: "rad", "m", "" for a number without a unit, such as a quaternion's, or None for whatever it is.
+        spans: Joints with several numbers: where the first stands, and how many they are.
+        poses: Makes the named values; it and the next two are only called where they are needed.
+        otherwise: Makes what else might be named, and what to do instead.
+        lengths: Makes other lengths than `names` has that people give, and what to do about it.
+    """
+
+    what: str
+    names: tuple[str, ...]
+    units: tuple[str | None, ...]
+    spans: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    poses: Callable[[], Mapping[str, FloatArray]] = dict
+    otherwise: Callable[[], Mapping[str, Hint]] = dict
+    lengths: Callable[[], Mapping[int, Hint]] = dict
+
+    def read(self, value: str | Mapping[str, ArrayLike], where: str | None = None) -> FloatArray:
+        """(..., numbers) that a text or a mapping says.
+
+        Args:
+            value: See the module.
+            where: How messages call the place that it was given in.
+
+        Raises:
+            InputError: too few or too many numbers, one that is none, a unit that does not fit.
+            UnknownNameError: no such coordinate, rate or pose.
+
+        >>> rest = {"neutral": np.zeros(2)}
+        >>> arm = CoordinateLayout("q", ("shoulder", "elbow"), ("rad", "rad"), poses=lambda: rest)
+        >>> arm.read("neutral, elbow=2").tolist(), arm.read({"elbow": [1, 2], "shoulder": 0.5}).tolist()
+        ([0.0, 2.0], [[0.5, 1.0], [0.5, 2.0]])
+        >>> arm.read("elbow=30deg")
+        Traceback (most recent call last):
+        urdfkin.errors.InputError: q: no value for shoulder; name it too, or begin with a pose that it \
+keeps: 'neutral, elbow=...'
+        """
+        where = where or self.what
+        if isinstance(value, Mapping):
+            return self._by_name(dict(value), where, None)
+        cells = _cells(value)
+        named = [_pair(cell) for cell in cells]
+        is_pose = len(cells) == 1 and _is_word(cells[0])
+        if not is_pose and all(name is None for name, _ in named):
+            return self._in_order(cells, where)
+        pose = None
+        if named[0][0] is None:
+            pose = self._pose(cells[0], where)
+            named = named[1:]
+        values: dict[str, ArrayLike] = {}
+        for name, number in named:
+            if name is None or name in values:
+                wrong = f"{name!r} twice" if name else repr(number[:60])
+                raise InputError("numbers come in order, or each with its name", where=where, found=wrong)
+            values[name] = number
+        return self._by_name(values, where, pose)
+
+    def _pose(self, word: str, where: str) -> FloatArray:
+        poses = self.poses()
+        if word not in poses:
+            raise UnknownNameError("pose", word[:60], poses, where=where)
+        return poses[word]
+
+    def _in_order(self, cells: Sequence[str], where: str) -> FloatArray:
+        if len(cells) != len(self.names):
+            instead = self.lengths().get(len(cells))
+            raise wrong_count(self.names, len(cells), where, **instead._asdict() if instead else {})
+        rows = zip(cells, self.names, self.units, strict=True)
+        return np.array([self._number(text, f"{where}, {name}", unit) for text, name, unit in rows], float)
+
+    def _by_name(self, values: dict[str, ArrayLike], where: str, rest: FloatArray | None) -> FloatArray:
+        found: dict[int, FloatArray] = {}
+        index = {name: i for i, name in enumerate(self.names)}
+        for name, value in values.items():
+            if name in index:
+                i = index[name]
+                place = f"{where}, {name}"
+                number = self._number(value, place, self.units[i]) if isinstance(value, str) else value
+                found[i] = floats(number, place)
+            else:
+                found |= self._of_a_joint(name, value, where)
+        missing = [name for i, name in enumerate(self.names) if i not in found]
+        if missing and rest is None:
+            raise self._missing(missing, values, where)
+        shapes = [x.shape for x in found.values()]
+        try:
+            shape = np.broadcast_shapes(*shapes)
+        except ValueError:
+            raise InputError("batches of different shapes", where=where, found=safe_repr(shapes)) from None
+        out = np.empty((*shape, len(self.names)))
+        out[...] = 0.0 if rest is None else rest
+        for i, x in found.items():
+            out[..., i] = x
+        return out
+
+    def _of_a_joint(self, name: object, value: ArrayLike, where: str) -> dict[int, FloatArray]:
+        """The numbers of a joint that has several; an error for anything else that is no name here."""
+        kind = "coordinate" if self.what == "q" else "rate"
+        if not isinstance(name, str):
+            raise InputError(f"a {kind} is called by its name", where=where, found=safe_repr(name))
+        if (instead := self.otherwise().get(name)) is not None:
+            raise InputError(f"{name!r} is no {kind}", where=where, **instead._asdict())
+        if name not in self.spans:
+            raise UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
+        at, size = self.spans[name]
+        x = floats(value, f"{where}, {name}")
+        if x.shape[-1:] != (size,):
+            names, count = self.names[at : at + size], (x.shape or (1,))[-1]
+            raise wrong_count(names, count, f"{where}, {name}", question=Question.FLOATING_BASES)
+        return {at + k: x[..., k] for k in range(size)}
+
+    def _missing(self, missing: Sequence[str], values: Mapping[str, object], where: str) -> InputError:
+        them, keeps = ("it", "it keeps") if len(missing) == 1 else ("them", "they keep")
+        begun = f"'neutral, {next(iter(values), missing[0])}=...'"
+        return InputError(
+            f"no value for {listed(missing)}",
+            where=where,
+            remedy=f"name {them} too, or begin with a pose that {keeps}: {begun}",
+        )
+
+    def _number(self, text: str, where: str, unit: str | None) -> float:
+        """One number in SI units.
+
+        Raises:
+            InputError: it is none, or in a unit that does not fit.
+        """
+        found = parse_quantity(text)
+        value = parse_float(text) if found is None else found.value
+        if value is None:
+            hint = remedy(text) or "write 0.5, 30deg, pi/2 or 5mm"
+            raise InputError("not a finite number", where=where, found=repr(text.strip()[:60]), remedy=hint)
+        if found is None:
+            return value
+        order = "qva".index(self.what)
+        other = unit is not None and found.unit not in (None, unit)
+        if other or found.per not in (0, order):
+            kinds = {"rad": "rad or deg", "m": "m or mm", "": "no unit", None: "rad, deg, m or mm"}[unit]
+            per = ("", ", or that per s", ", or that per s^2")[order]
+            raise InputError(
+                "a unit that does not fit",
+                where=where,
+                found=repr(text.strip()),
+                remedy=f"it is in {kinds}{per}",
+            )
+        return value
+
+
+def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
+    """`value` where it gives its numbers by name, a table with labels as a mapping; None where by order.
+
+    Raises:
+        InputError: a label that stands twice; a list of tables with labels.
+
+    >>> by_name([0.5, 0.1], "q"), by_name("ready", "q"), by_name({"elbow": 0.5}, "q")
+    (None, 'ready', {'elbow': 0.5})
+    """
+    if isinstance(value, np.ndarray):
+        return None
+    if isinstance(value, Mapping | str):
+        return value
+    if isinstance(value, list | tuple):
+        if any(_labels(item) for item in value):
+            raise InputError(
+                "a list of tables with labels",
+                where=where,
+                found=f"{len(value)} of them",
+                remedy="give one table of them all, or numbers in order",
+            )
+        return None
+    labels = _labels(value)
+    if twice := [safe_repr(label) for label, count in Counter(labels).items() if count > 1]:
+        raise InputError("a label stands twice", where=where, found=listed(twice))
+    table: Any = value
+    return {label: table[label] for label in labels} or None
+
+
+def _labels(value: object) -> list[Any]:
+    """A table's labels (pandas' `keys()`, `columns`, `column_names`); none where they only count."""
+    table: Any = value
+    if not hasattr(type(value), "__getitem__"):
+        return []
+    if hasattr(type(value), "keys"):
+        labels = list(table.keys())
+    else:
+        labels = list(getattr(table, "column_names", getattr(table, "columns", ())))
+    return [] if labels == list(range(len(labels))) else labels
+
+
+def wrong_count(
+    names: Sequence[str],
+    count: int,
+    where: str,
+    remedy: str | None = None,
+    question: Question = Question.JOINT_ORDER,
+) -> InputError:
+    """The error for another count of numbers than there are names."""
+    without = f", none for {listed(names[count:])}" if count < len(names) else ""
+    return InputError(
+        f"{len(names)} numbers are expected ({listed(names) or 'none: nothing moves'})",
+        where=where,
+        found=f"{count}{without}",
+        remedy=remedy,
+        question=question,
+    )
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names for a message, no more than a line holds."""
+    more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
+    return ", ".join(map(str, names[:_LISTED])) + more
+
+
+def _cells(text: str) -> list[str]:
+    """What stands between commas; where there are none, between blanks."""
+    text = " ".join(text.split())
+    if text[:1] + text[-1:] in ("[]", "()", "{}"):
+        text = text[1:-1].strip()
+    if "," in text:
+        return [cell.strip() for cell in text.removesuffix(",").split(",")]
+    return _UNIT_APART.sub("", _AROUND_SIGNS.sub(r"\1", text)).split()
+
+
+def _pair(cell: str) -> tuple[str | None, str]:
+    """A name and what stands behind its last `=`; None where there is no name."""
+    name, equals, number = cell.rpartition("=")
+    return (name.strip(), number.strip()) if equals else (None, cell)
+
+
+def _is_word(text: str) -> bool:
+    """Whether a text may be a pose's name: it is no number, nor something that was meant as one."""
+    return text[:1].isalpha() and "=" not in text and parse_quantity(text) is None and remedy(text) is None

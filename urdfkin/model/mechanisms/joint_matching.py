@@ -1,0 +1,423 @@
+"""Which joints of two bodies are each other's: by given and agreeing names, else by how they lie.
+
+Where one model may have to be set for its axes to lie on another's: guesses to be tried, not results.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+from math import pi, remainder
+from typing import TypeVar
+
+import numpy as np
+
+from urdfkin.model.chain import LEAST_SIZE
+from urdfkin.model.mechanisms.mechanism import (
+    ALONG,
+    Edge,
+    Mechanism,
+    Screw,
+    Tolerance,
+    along,
+    angle_from_to,
+    between,
+    between_lines,
+)
+from urdfkin.model.tree import FloatArray, JointKind
+
+Pair = tuple[Edge, Edge]
+Came = tuple[Edge | None, Edge | None]
+
+
+def family(kind: JointKind) -> str:
+    """What two joints must have in common to be each other's: how they move, not how far."""
+    return "turns" if kind.turns else kind.value
+
+
+class Pairing:
+    """The pairs of two mechanisms, body by body.
+
+    Args:
+        a: One.
+        b: The other.
+        given: Joint names of `a` and the names that they have in `b`.
+        tolerance: Within which axes agree.
+    """
+
+    def __init__(self, a: Mechanism, b: Mechanism, given: Mapping[str, str], tolerance: Tolerance) -> None:
+        self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
+        self._named = {name for pair in given.items() for name in pair}
+        self._signatures: dict[tuple[bool, int, int], str] = {}
+        #: What names alone tell is asked again for thousands of places where a root may stand.
+        self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
+        self._by_names = dict[
+            tuple[tuple[int, int], Came], tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]
+        ]()
+
+    def links(self, body_a: int, body_b: int) -> tuple[tuple[int, int], ...]:
+        """Links of one name on two bodies."""
+        if (known := self._links.get((body_a, body_b))) is None:
+            there = {self.b.tree.links[link]: link for link in self.b.bodies[body_b]}
+            known = self._links[body_a, body_b] = tuple(
+                (link, there[name])
+                for link in self.a.bodies[body_a]
+                if (name := self.a.tree.links[link]) in there
+            )
+        return known
+
+    def edges(
+        self, bodies: tuple[int, int], came: Came, G: FloatArray, XC: FloatArray
+    ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
+        """Joints that lead on from two bodies: pairs, and what is left over of each.
+
+        Args:
+            bodies: Of a and of b.
+            came: The joints by which they were reached.
+            G: (4, 4) what moves a's home to where b's is.
+            XC: (4, 4) what moves b's own home there.
+        """
+        named, left_a, left_b = self.by_names(bodies, came)
+        pairs = list(named)
+        rest = sorted(
+            (self._unlikeness(one, other), i, j)
+            for i, one in self._standing(self.a, bodies[0], left_a, G)
+            for j, other in self._standing(self.b, bodies[1], left_b, XC)
+            if one.kind == other.kind
+        )
+        taken_a, taken_b = set[int](), set[int]()
+        for _, i, j in rest:
+            if i not in taken_a and j not in taken_b:
+                pairs.append((left_a[i], left_b[j]))
+                taken_a.add(i)
+                taken_b.add(j)
+        return (
+            pairs,
+            [edge for i, edge in enumerate(left_a) if i not in taken_a],
+            [edge for j, edge in enumerate(left_b) if j not in taken_b],
+        )
+
+    def by_names(
+        self, bodies: tuple[int, int], came: Came
+    ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
+        """What `edges` says as far as names tell: the pairs, and what is left for how joints lie."""
+        if (known := self._by_names.get((bodies, came))) is None:
+            known = self._by_names[bodies, came] = self._named_alike(bodies, came)
+        return known
+
+    def same_shape(self, bodies: tuple[int, int], came: Came) -> bool:
+        """Whether as many joints of the same kinds are behind two bodies, branch by branch."""
+        shapes = (
+            sorted(self._signature(m, body, edge) for edge in m.edges_of[body] if edge is not by)
+            for m, body, by in zip((self.a, self.b), bodies, came, strict=True)
+        )
+        return next(shapes) == next(shapes)
+
+    def alike(self, bodies: tuple[int, int], e: Edge, f: Edge) -> bool:
+        """Whether as many joints of the same kinds hang on two joints at two bodies."""
+        return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
+
+    def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
+        """Whether each axis at a body of A has one of B's at it, B's home moved by X."""
+        at = np.eye(4)
+        return all(
+            any(
+                family(self.a.joint(e).kind) == family(self.b.joint(f).kind)
+                and self._tolerance.holds(*self.mismatch(e, f, at, X))
+                for f in self.b.edges_of[bodies[1]]
+            )
+            for e in self.a.edges_of[bodies[0]]
+            if self.a.joint(e).kind.has_axis
+        )
+
+    def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
+        """Joints at a body of B that no given name tells about, the most like one of A first.
+
+        Args:
+            bodies: Of A and of B.
+            e: Joint of A.
+            edges: Joints of B.
+            X: (4, 4) what moves B's home to where A's is.
+        """
+        one = self._standing(self.a, bodies[0], [e], np.eye(4))
+        others = self._standing(self.b, bodies[1], edges, X)
+        ranked = sorted((self._unlikeness(one[0][1], other), j) for j, other in others) if one else []
+        return [edges[j] for _, j in ranked]
+
+    def _named_alike(self, bodies: tuple[int, int], came: Came) -> tuple[list[Pair], list[Edge], list[Edge]]:
+        left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not came[0]]
+        left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not came[1]]
+        pairs: list[Pair] = []
+        for e, f in self._by_name(bodies, list(left_a), list(left_b)):
+            if e in left_a and f in left_b:
+                pairs.append((e, f))
+                left_a.remove(e)
+                left_b.remove(f)
+        return pairs, left_a, left_b
+
+    def _by_name(self, bodies: tuple[int, int], ours: list[Edge], theirs: list[Edge]) -> Iterator[Pair]:
+        by_name = {self.b.joint(f).name: f for f in theirs}
+        for e in ours:
+            name = self.a.joint(e).name
+            if (f := by_name.get(self.given.get(name, name))) is not None:
+                yield e, f
+        for e in ours:
+            links = {self.a.tree.links[k] for k in self.a.bodies[e.beyond(bodies[0])]}
+            for f in theirs:
+                if links & {self.b.tree.links[k] for k in self.b.bodies[f.beyond(bodies[1])]}:
+                    yield e, f
+
+    def _standing(
+        self, mechanism: Mechanism, body: int, edges: Sequence[Edge], T: FloatArray
+    ) -> list[tuple[int, _Standing]]:
+        """The joints that no given name tells about, moved by T."""
+        return [
+            (i, _Standing.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
+            for i, edge in enumerate(edges)
+            if mechanism.joint(edge).name not in self._named
+        ]
+
+    def _unlikeness(self, one: _Standing, other: _Standing) -> tuple[bool, float, float]:
+        """Of shape, then of axes, then, where axes lie on one line, of where they point and stand on it."""
+        angle, way = one.mismatch(other)
+        off = 0.0 if self._tolerance.holds(angle, way) else angle * max(self.a.size, LEAST_SIZE) + way
+        place = math.dist(one.place, other.place)
+        points_back = bool(one.screw.direction @ other.screw.direction < 0.0)
+        return one.shape != other.shape, off, place + self.a.size * points_back
+
+    def _signature(self, mechanism: Mechanism, body: int, edge: Edge) -> str:
+        """What hangs on a joint, joints' kinds alone."""
+        key = mechanism is self.a, body, edge.joint
+        if (known := self._signatures.get(key)) is None:
+            beyond = edge.beyond(body)
+            below = sorted(
+                self._signature(mechanism, beyond, other)
+                for other in mechanism.edges_of[beyond]
+                if other is not edge
+            )
+            known = f"({family(mechanism.joint(edge).kind)}{''.join(below)})"
+            self._signatures[key] = known
+        return known
+
+    def mismatch(self, e: Edge, f: Edge, G: FloatArray, XC: FloatArray) -> tuple[float, float]:
+        """How far (rad, m) the axes of two joints lie apart as lines, whichever way they point."""
+        kind = family(self.a.joint(e).kind)
+        if kind != family(self.b.joint(f).kind):
+            return 0.0, 0.0
+        if kind == "planar":
+            return _Standing.of(self.a, e, G).mismatch(_Standing.of(self.b, f, XC))
+        return _lines_apart(kind, self.a.screw(e).moved(G), self.b.screw(f).moved(XC))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Standing:
+    """A joint where it stands: how it moves, what hangs on it, its axis, its frame's place, and Z axis."""
+
+    kind: str
+    shape: str
+    screw: Screw
+    place: list[float]
+    normal: FloatArray
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, shape: str = "") -> _Standing:
+        """The joint of an edge, moved by T."""
+        pose = T @ mechanism.homes[edge.joint + 1]
+        screw = mechanism.screw(edge).moved(T)
+        return cls(family(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
+
+    def mismatch(self, other: _Standing) -> tuple[float, float]:
+        """How far (rad, m) its axis lies from that of a joint of its kind."""
+        if self.kind == "planar":
+            normals = (Screw(one.normal, one.normal) for one in (self, other))
+            return between_lines(*normals, placed=False)
+        return _lines_apart(self.kind, self.screw, other.screw)
+
+
+def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
+    """How far (rad, m) the axes of two joints of a kind lie apart."""
+    if kind == "floating":  # goes anywhere, wherever it counts from
+        return 0.0, 0.0
+    return between_lines(s, t, placed=kind == "turns")
+
+
+_Some = TypeVar("_Some")
+#: One of A and one of B.
+Both = tuple[_Some, _Some]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Axis:
+    """A joint's screw at home.
+
+    Attributes:
+        screw: Its line; that of a slide has no place.
+        turns: Whether it turns.
+        seen: The line that it is seen from.
+    """
+
+    screw: Screw
+    turns: bool
+    seen: Screw
+
+    def moved(self, T: FloatArray) -> Axis:
+        """The axis after a rigid motion."""
+        return Axis(self.screw.moved(T), self.turns, self.seen.moved(T))
+
+    def height(self, u: FloatArray) -> float | None:
+        """How far along u (m) the nearest point of the line that it is seen from is; None where any is."""
+        s, start = self.screw, self.seen
+        along_s = float(start.direction @ s.direction)
+        if not self.turns or 1.0 - along_s**2 < ALONG**2:
+            return None
+        way = s.point - start.point
+        foot = float(way @ start.direction - along_s * (way @ s.direction)) / (1.0 - along_s**2)
+        return float(u @ (start.point + foot * start.direction))
+
+
+def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
+    """By how much theirs must be turned about u, or slid along it, to lie as ours does."""
+    if not turns:
+        heights = ours.height(u.direction), theirs.height(u.direction)
+        if heights[0] is not None and heights[1] is not None:
+            yield heights[0] - heights[1]
+        return
+    s, t = ours.screw, theirs.screw
+    guess = angle_from_to(u.direction, t.direction, s.direction)
+    if guess is not None:
+        yield guess
+        yield remainder(guess + pi, 2.0 * pi)
+    if ours.turns:
+        feet = [line.point - line.direction * (line.direction @ (line.point - u.point)) for line in (t, s)]
+        guess = angle_from_to(u.direction, feet[0] - u.point, feet[1] - u.point)
+        if guess is not None:
+            yield guess
+
+
+def behind(
+    mechanisms: Both[Mechanism], came: Both[Edge | None], bodies: Both[int], seen: Both[Screw]
+) -> Iterator[Both[Axis]]:
+    """Pairs of axes at two bodies, and behind the ones along a line, which move nothing seen from it."""
+    for e, f in _led_on(mechanisms, came, bodies):
+        axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])
+        yield axes
+        screws = axes[0].screw, axes[1].screw
+        if np.linalg.norm(np.cross(screws[0].direction, seen[0].direction)) < ALONG:
+            beyond = e.beyond(bodies[0]), f.beyond(bodies[1])
+            yield from behind(mechanisms, (e, f), beyond, screws if axes[0].turns else seen)
+
+
+def laid(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
+    """Where B's root may stand for its axes to lie on A's: first axis on first, then by those behind it.
+
+    What is left free is a turn about the first axis and a slide along it. Where nothing is behind, as of a
+    rotor, those beside it tell.
+    """
+    firsts = _firsts((a, b), (None, None), bodies, ())
+    for (ours, theirs), near, far in firsts:
+        seen = far or [
+            (replace(one, seen=ours.screw), replace(other, seen=theirs.screw)) for (one, other), *_ in firsts
+        ]
+        for start in (theirs.screw, theirs.screw.reversed()):
+            K = between(start, ours.screw, turns=True)[0]
+            for turn in _guesses(ours.screw, [*near, *seen], K, turns=True):
+                X = along(ours.screw, turn, turns=True) @ K
+                for way in _guesses(ours.screw, seen, X, turns=False):
+                    yield along(ours.screw, way, turns=False) @ X
+
+
+def laid_by_siblings(
+    a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
+) -> Iterator[FloatArray]:
+    """Where B's root may stand for three axes of one body to lie on three of A's, whatever is behind them.
+
+    Args:
+        a: One.
+        b: The other.
+        bodies: Of both, with several joints each.
+        alike: Whether a joint of A may be one of B.
+    """
+    edges = _with_axes(a, bodies[0])
+    ours = [_axis(a, edge) for edge in edges]
+    turning = [i for i, axis in enumerate(ours) if axis.turns]
+    if len(edges) < 2 or not turning:
+        return
+    first = turning[0]
+    u = ours[first].screw
+    rest = sorted((i for i in range(len(edges)) if i != first), key=lambda i: -_across(u, ours[i].screw))
+    second, others = rest[0], [i for i in rest[1:] if ours[i].turns][:1]
+    theirs = [[(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if alike(edge, f)] for edge in edges]
+    for f, axis in theirs[first]:
+        lines = u, axis.screw
+        pair_of = partial(_seen_from, lines)
+        beyond = edges[first].beyond(bodies[0]), f.beyond(bodies[1])
+        far = list(behind((a, b), (edges[first], f), beyond, lines))
+        for start, (g, other) in product((axis.screw, axis.screw.reversed()), theirs[second]):
+            if g is f:
+                continue
+            pair = pair_of(ours[second], other)
+            more = [
+                pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
+            ]
+            if not ours[second].turns:  # a slide across the first axis leaves heights along it as they are
+                carried = edges[second].beyond(bodies[0]), g.beyond(bodies[1])
+                led = _led_on((a, b), (edges[second], g), carried)
+                more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
+            K = between(start, u, turns=True)[0]
+            for turn in zeros(u, pair[0], pair[1].moved(K), turns=True):
+                X = along(u, turn, turns=True) @ K
+                ways = list(zeros(u, pair[0], pair[1].moved(X), turns=False))
+                for way in ways or _guesses(u, [*more, *far], X, turns=False):
+                    yield along(u, way, turns=False) @ X
+
+
+def _seen_from(lines: Both[Screw], ours: Axis, theirs: Axis) -> Both[Axis]:
+    return replace(ours, seen=lines[0]), replace(theirs, seen=lines[1])
+
+
+def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
+    return [edge for edge in mechanism.edges_of[body] if mechanism.joint(edge).kind.has_axis]
+
+
+def _across(u: Screw, s: Screw) -> float:
+    """The sine of the angle between two axes."""
+    return float(np.linalg.norm(np.cross(u.direction, s.direction)))
+
+
+def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: bool) -> list[float]:
+    return [x for ours, theirs in pairs for x in zeros(u, ours, theirs.moved(X), turns)] or [0.0]
+
+
+def _firsts(
+    mechanisms: Both[Mechanism], came: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
+) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
+    """Pairs of first turning axes, with slides before them and what is behind; of slides where none turns."""
+    found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
+    for e, f in _led_on(mechanisms, came, bodies):
+        pair, beyond = (
+            (_axis(mechanisms[0], e), _axis(mechanisms[1], f)),
+            (e.beyond(bodies[0]), f.beyond(bodies[1])),
+        )
+        lines = pair[0].screw, pair[1].screw
+        deeper = [] if pair[0].turns else _firsts(mechanisms, (e, f), beyond, (*near, pair))
+        found += deeper or [(pair, near, list(behind(mechanisms, (e, f), beyond, lines)))]
+    return found
+
+
+def _led_on(mechanisms: Both[Mechanism], came: Both[Edge | None], bodies: Both[int]) -> Iterator[Both[Edge]]:
+    """All pairs of joints with axes that lead on from two bodies and move alike."""
+    ours, theirs = (
+        [edge for edge in mechanism.edges_of[body] if edge is not by and mechanism.joint(edge).kind.has_axis]
+        for mechanism, by, body in zip(mechanisms, came, bodies, strict=True)
+    )
+    for e, f in product(ours, theirs):
+        if _axis(mechanisms[0], e).turns is _axis(mechanisms[1], f).turns:
+            yield e, f
+
+
+def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
+    screw = mechanism.screw(edge)
+    return Axis(screw, mechanism.joint(edge).kind.turns, seen or screw)

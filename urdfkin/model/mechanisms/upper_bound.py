@@ -1,0 +1,389 @@
+"""Where a point of a moving chain can come at most: support functions, bounded from above.
+
+The support function of a set W of points is h(u) = max over p in W of u . p. It is all that a bound on
+distances asks of W, and it passes through joints: where W is turned by any angle of a range about an axis,
+h'(u) is the largest h over the directions u turned back, and where it slides, the slide's own is added. So
+the whole reach of a chain is a function on directions, however many joints it has: no search in all its
+coordinates together.
+
+h is kept at the points of a grid on the cube's surface, and is convex with h(s u) = s h(u): at any direction
+it is at most what interpolation between grid points says, which therefore is a bound, not a guess. A turn is
+bounded likewise: an arc of directions lies in the polygon drawn about it, and h on the polygon is largest at
+a corner. Each makes a bound larger by a share that falls with the square of the grid's step.
+
+
+How far apart a frame of two models can be at most: proven for all configurations at once.
+
+Behind joint i, seen from A's home, let y be where B's frame is and d how far B's is from A's. In front of it
+
+    d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d.
+
+All but the last are nothing where nothing differs. For each direction u the largest u . d' is at most the sum
+of the largest of each term, which support functions of y and d give (`urdfkin.model.mechanisms.upper_bound`).
+Where a single thing differs there is one term, and nothing is given away but what the grid costs; where
+several do, each may have its own worst configuration, and the bound is larger than the truth by what they do
+not share. Where nothing is but moved, the lengths of the ways add up to a bound that costs nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from urdfkin.kinematics.rotation.axis_angle import rotation_about
+from urdfkin.kinematics.rotation.matrix import axis_aligning
+from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step
+from urdfkin.model.mechanisms.mechanism import Screw, apart
+from urdfkin.model.mechanisms.variables import Pair, Variables
+from urdfkin.model.tree import FloatArray
+
+_WHOLE = 2.0 * math.pi
+#: Corners of the polygon about a circle: they lie farther out by a thousandth.
+_AROUND = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Directions on a cube's surface.
+
+    Attributes:
+        cells: Along an edge of a face.
+        segments: Into which a whole turn is divided.
+    """
+
+    cells: int
+    segments: int
+
+    @property
+    def points(self) -> FloatArray:
+        """(n, 3) of largest coordinate 1."""
+        return _points(self.cells)
+
+    @property
+    def lengths(self) -> FloatArray:
+        """(n,) of the points."""
+        return np.asarray(np.linalg.norm(self.points, axis=1))
+
+
+@cache
+def _points(cells: int) -> FloatArray:
+    across = np.linspace(-1.0, 1.0, cells + 1)
+    second, third = (x.ravel() for x in np.meshgrid(across, across, indexing="ij"))
+    faces = []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            face = np.empty((len(second), 3))
+            face[:, axis], face[:, (axis + 1) % 3], face[:, (axis + 2) % 3] = sign, second, third
+            faces.append(face)
+    points = np.concatenate(faces)
+    points.setflags(write=False)
+    return points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Support:
+    """A bound on a support function, metres: its values at the grid's points."""
+
+    grid: Grid
+    values: FloatArray
+
+    def at(self, u: FloatArray) -> FloatArray:
+        """(...) bounds at directions (..., 3) of any length; 0 at none."""
+        cells, v = self.grid.cells, self.values
+        x, y, z = u[..., 0].ravel(), u[..., 1].ravel(), u[..., 2].ravel()
+        X, Y, Z = np.abs(x), np.abs(y), np.abs(z)
+        first = (X >= Y) & (X >= Z)
+        second = ~first & (Y >= Z)
+        front = np.where(first, x, np.where(second, y, z))
+        right = np.where(first, y, np.where(second, z, x))
+        up = np.where(first, z, np.where(second, x, y))
+        largest = np.abs(front)
+        scale = (0.5 * cells) / np.where(largest > 0.0, largest, 1.0)
+        right, up = right * scale + 0.5 * cells, up * scale + 0.5 * cells
+        i = np.minimum(right.astype(np.int32), cells - 1)
+        j = np.minimum(up.astype(np.int32), cells - 1)
+        right -= i
+        up -= j
+        face = np.where(first, 0, np.where(second, 2, 4)) + (front < 0.0)
+        at = (face * (cells + 1) + i) * (cells + 1) + j
+        with np.errstate(invalid="ignore"):
+            near = v[at] + up * (v[at + 1] - v[at])
+            far = v[at + cells + 1] + up * (v[at + cells + 2] - v[at + cells + 1])
+            found = (near + right * (far - near)) * largest
+        found[np.isnan(found)] = np.inf  # nothing of an infinite neighbour is not told from some
+        return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
+
+    def turned(self, screw: Screw, low: float, high: float) -> Support:
+        """Of the set turned about a screw by any angle of a range."""
+        angles, factors = np.array(_corners(low, high, self.grid.segments)).T
+        G = self.grid.points
+        centred = Support(self.grid, self.values - G @ screw.point)
+        best = centred.turned_back(screw.direction, angles, factors).max(axis=0)
+        return Support(self.grid, best + G @ screw.point)
+
+    def turned_back(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
+        """(angles, n) at the grid's points turned back about an axis, their part across it made longer."""
+        G = self.grid.points
+        along = (G @ axis)[:, np.newaxis] * axis
+        back = rotation_about(axis, angles)  # a row times R is R^T times the column
+        across = (G - along) @ back * np.reshape(factors, (-1, 1, 1))
+        return self.at(along + across)
+
+    def slid(self, direction: FloatArray, low: float, high: float) -> Support:
+        """Of the set slid along a direction by any way of a range."""
+        c = self.grid.points @ direction
+        with np.errstate(invalid="ignore"):
+            ways = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
+        return Support(self.grid, self.values + ways)
+
+    def moved(self, T: FloatArray) -> Support:
+        """Of the set after a rigid motion."""
+        return Support(self.grid, self.at(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
+
+    def radius(self, screw: Screw) -> float:
+        """How far from a screw's line the set comes at most, metres."""
+        x, y, _ = axis_aligning(screw.direction).T
+        corners = [
+            factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in _corners(0.0, _WHOLE, _AROUND)
+        ]
+        u = np.array(corners)
+        return float(max((self.at(u) - u @ screw.point).max(), 0.0))
+
+    def largest(self) -> float:
+        """How far from the origin the set comes at most, metres.
+
+        A direction between grid points g_k is a sum of them, c_k g_k, all within r of the middle of their
+        cell; so its length is cos r times that of all c_k |g_k| at least, and h there 1 / cos r of theirs at
+        most.
+        """
+        share = (self.values / self.grid.lengths).max(initial=0.0)
+        return float(share) / math.cos(math.atan(math.sqrt(2.0) / self.grid.cells))
+
+    def __add__(self, other: Support) -> Support:
+        return Support(self.grid, self.values + other.values)
+
+
+def point(grid: Grid, p: FloatArray) -> Support:
+    """Of a single point."""
+    return Support(grid, grid.points @ p)
+
+
+def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]]:
+    """Angles and lengths of the corners of a polygon that holds an arc of radius 1."""
+    if high - low >= _WHOLE:
+        half = math.pi / segments
+        return [(2.0 * half * k, 1.0 / math.cos(half)) for k in range(segments)]
+    if high == low:
+        return [(low, 1.0)]
+    count = max(1, math.ceil((high - low) / _WHOLE * segments))
+    half = (high - low) / (2.0 * count)
+    middles = [(low + (2 * k + 1) * half, 1.0 / math.cos(half)) for k in range(count)]
+    return [(low, 1.0), *middles, (high, 1.0)]
+
+
+#: For every frame; for the one that is farthest.
+COARSE, FINE = Grid(8, 24), Grid(16, 48)
+#: A joint that turns more often is bounded as a whole.
+MOST_VALUES = 1024
+
+
+def upper_bounds(
+    found: Alignment, variables: Variables, frame: FramePair, grid: Grid = COARSE
+) -> tuple[float, float]:
+    """(m, rad) that a frame's places, and its orientations, are apart at most, within limits.
+
+    0 where nothing on its way differs; inf where a joint that nothing bounds lets it grow, or a joint is of
+    another kind.
+    """
+    steps, pairs = behind_first(found, variables, frame)
+    if not steps and frame.end is IDENTITY:
+        return 0.0, 0.0
+    if any(step.unlike and pair is None for step, pair in zip(steps, pairs, strict=True)):
+        return math.inf, math.inf
+    radians = _radians(steps, pairs, variables, frame)
+    if not steps:  # nothing that moves it one way in A and another in B: as far off everywhere
+        d = frame.end[:3, :3] @ frame.home[:3, 3] + frame.end[:3, 3] - frame.home[:3, 3]
+        return float(np.linalg.norm(d)), radians
+    return _metres(steps, pairs, variables, frame, grid), radians
+
+
+def behind_first(
+    found: Alignment, variables: Variables, frame: FramePair
+) -> tuple[list[Step], list[Pair | None]]:
+    """The steps on the way to a frame, and their values, from the first one that differs."""
+    steps = found.path(frame.previous)
+    pairs = [variables.pairs[i] for i in found.indices(frame.previous)]
+    first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
+    return steps[first:], pairs[first:]
+
+
+def _differs(step: Step, pair: Pair | None) -> bool:
+    return step.differs or bool(step.unlike) or (pair is not None and pair.a != pair.b)
+
+
+def _radians(
+    steps: Sequence[Step], pairs: Sequence[Pair | None], variables: Variables, frame: FramePair
+) -> float:
+    """The angle of a product of rotations is at most the sum of theirs."""
+    total = apart(IDENTITY, frame.end)[0]
+    for step, pair in zip(steps, pairs, strict=True):
+        total += apart(IDENTITY, step.before)[0]
+        if step.kind != "turns" or pair is None:
+            continue
+        if step.other is not step.axis:
+            # Q R Q^T R^T, of a turn by t and a tilt by s: sin(its quarter) = sin(s/2) sin(t/2).
+            most = min(max(map(abs, variables.range(pair.b))), math.pi)
+            total += 4.0 * math.asin(math.sin(step.tilt / 2.0) * math.sin(most / 2.0))
+        if pair.a != pair.b:
+            total += variables.off(pair)
+    return min(total, math.pi)
+
+
+def _metres(
+    steps: Sequence[Step], pairs: Sequence[Pair | None], variables: Variables, frame: FramePair, grid: Grid
+) -> float:
+    d, y = at_the_frame(frame, grid)
+    ways = _off(frame.end, y.largest())
+    for step, pair in zip(reversed(steps), reversed(pairs), strict=True):
+        d, y = passed(step, pair, variables, d, y)
+        moves_alike = step.other is step.axis and pair is not None and pair.a == pair.b
+        ways += _off(step.before, y.largest()) if moves_alike else math.inf
+    return min(d.largest(), ways)
+
+
+def _off(L: FloatArray, reach: float) -> float:
+    """How far (m) L moves any point within reach at most: |(R - 1) y + p|, y before L or behind it."""
+    turned, moved = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
+    return moved + turned * reach if turned else moved
+
+
+def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
+    """D and y behind the last joint."""
+    p, end = frame.home[:3, 3], frame.end
+    y = end[:3, :3] @ p + end[:3, 3]
+    return point(grid, y - p), point(grid, y)
+
+
+def passed(
+    step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
+) -> tuple[Support, Support]:
+    """D and y in front of a step, from those behind it."""
+    if pair is None:  # a planar or floating joint may turn to where it is worst, and go anywhere
+        d = Support(d.grid, d.largest() * d.grid.lengths)
+        y = Support(d.grid, np.full(len(d.grid.points), math.inf))
+    else:
+        d = difference(step, pair, variables, y, d)
+        ends = variables.range(pair.b)
+        y = y.turned(step.other, *ends) if step.kind == "turns" else y.slid(step.other.direction, *ends)
+    return before_it(step, d, y)
+
+
+def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
+    """D and y in front of a step's L."""
+    if step.before is IDENTITY:
+        return d, y
+    G, L = d.grid.points, step.before
+    return Support(d.grid, d.values + y.at(G @ (L[:3, :3] - np.eye(3))) + G @ L[:3, 3]), y.moved(L)
+
+
+def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Support) -> Support:
+    """Of (e(S' t') - e(S t)) y + e(S t) d, over what t and t' range over."""
+    same = step.other is step.axis and pair.a == pair.b
+    if step.kind == "turns":
+        about = Screw(step.axis.direction, np.zeros(3))
+        if same:
+            return d.turned(about, *variables.range(pair.a)) if d.values.any() else d
+        z = _values(pair, variables, d.grid)
+        if z is not None:
+            return _together(step, pair, z, y, d)
+        return d.turned(about, *variables.range(pair.a)) + _set_off(step, pair, variables, y)
+    return d if same else d + _slid_apart(step, pair, variables, y.grid)
+
+
+def _slid_apart(step: Step, pair: Pair, variables: Variables, grid: Grid) -> Support:
+    """Of two slides' difference, which is largest at the ends of their ranges."""
+    if (name := pair.variable) is not None:
+        ends = [(z, z) for z in variables.ranges.get(name, (0.0, 0.0))]
+        values = [
+            tuple(
+                line.constant + (line.slope and line.slope * z)
+                for line, z in zip((pair.a, pair.b), zz, strict=True)
+            )
+            for zz in ends
+        ]
+    else:
+        values = [(t, other) for t in variables.range(pair.a) for other in variables.range(pair.b)]
+    with np.errstate(invalid="ignore"):
+        found = [
+            grid.points @ step.other.direction * other - grid.points @ step.axis.direction * t
+            for t, other in values
+        ]
+    worst = np.max(found, axis=0)
+    return Support(grid, np.where(np.isnan(worst), np.inf, worst))
+
+
+def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
+    """(n,) values of the variable that moves a turning joint in both models; None where one is not enough."""
+    if (name := pair.variable) is None:
+        return None
+    low, high = variables.ranges[name]
+    fastest = max(abs(pair.a.slope), abs(pair.b.slope))
+    if math.isinf(high - low):
+        if {abs(pair.a.slope), abs(pair.b.slope)} - {0.0, 1.0}:
+            return None
+        low, high = -math.pi, math.pi
+    count = max(1, math.ceil(fastest * (high - low) / math.pi * grid.segments))
+    return np.linspace(low, high, count + 1) if count <= MOST_VALUES else None
+
+
+def _together(step: Step, pair: Pair, z: FloatArray, y: Support, d: Support) -> Support:
+    """The same where one variable moves both: from each of its values to the next, the larger ends.
+
+    Between two values h apart a function exceeds both by h^2/8 of its second derivative at most. Where t' = t
+    + c that is R' P' x' - R P x, with x the way from the axis to y, P what takes its part across, and R' a
+    turn about the other axis: |R' - R| <= 2 |u' - u| + |c|, |P' - P| <= |u' - u|, and x' - x lies across by
+    what the axes are off. Else it is no more than what either turn has, squared with its rate.
+    """
+    G = y.grid.points
+    axis, other = step.axis, step.other
+    t, t_other = (line.constant + line.slope * z for line in (pair.a, pair.b))
+    turns = [rotation_about(screw.direction, values) for screw, values in ((axis, t), (other, t_other))]
+    D = turns[1] - turns[0]
+    c = (other.point - turns[1] @ other.point) - (axis.point - turns[0] @ axis.point)
+    apart_ = y.at(G @ D) + (G @ c.T).T
+    widest = y.radius(other)
+    if pair.a.slope == pair.b.slope:
+        tilt = float(np.linalg.norm(other.direction - axis.direction))
+        reach = Support(y.grid, y.values - G @ other.point).largest() if tilt else 0.0
+        off = float(np.linalg.norm(np.cross(other.point - axis.point, axis.direction)))
+        late = abs(pair.b.constant - pair.a.constant)
+        bend = (2.0 * tilt + min(late, 2.0)) * widest + tilt * reach + off
+        bend *= pair.a.slope**2
+    else:
+        bend = pair.a.slope**2 * y.radius(axis) + pair.b.slope**2 * widest
+    between = np.maximum(apart_[:-1], apart_[1:]) + bend * (z[1] - z[0]) ** 2 / 8.0 * y.grid.lengths
+    if d.values.any():
+        half = abs(pair.a.slope) * (z[1] - z[0]) / 2.0
+        ends = d.turned_back(axis.direction, t, 1.0)
+        middles = d.turned_back(axis.direction, (t[:-1] + t[1:]) / 2.0, 1.0 / math.cos(half))
+        between += np.maximum(np.maximum(ends[:-1], ends[1:]), middles)
+    return Support(y.grid, between.max(axis=0))
+
+
+def _set_off(step: Step, pair: Pair, variables: Variables, y: Support) -> Support:
+    """Of (e(S' t') - e(S t)) y where t' and t are moved by two variables, or by one without end.
+
+    Set off along a chord by what the values differ by; where the axis is another one too, all of either turn.
+    """
+    G, u = y.grid.points, step.axis.direction
+    if step.other is not step.axis:
+        there = y.turned(step.other, *variables.range(pair.b))
+        back = Support(y.grid, y.values).turned(step.axis, *variables.range(pair.a))
+        return Support(y.grid, there.values + back.at(-G))
+    chord = 2.0 * math.sin(min(variables.off(pair), math.pi) / 2.0) * y.radius(step.axis)
+    across = G - (G @ u)[:, None] * u
+    return Support(y.grid, chord * np.linalg.norm(across, axis=1))

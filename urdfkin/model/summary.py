@@ -1,0 +1,103 @@
+"""A robot in words: its joints with their axes, places and limits, in the order of its coordinates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from urdfkin.errors.display import Table, TextDocument
+from urdfkin.model.ranges import narrowed_ranges
+from urdfkin.model.tree import KinematicTree
+
+#: What is said of a joint, in rad and rad/s, of prismatic joints in m and m/s.
+COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "follows")
+#: Those that hold words, behind the link and the joint.
+WORDS = (0, 1, 2, 3, 4, 5, 9)
+
+
+def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
+    """What there is to say of a robot, in a terminal or a notebook's cell: one table that is also its tree.
+
+    Args:
+        tree: The robot.
+        base: Where chains begin unless told.
+        tip: Where they end.
+        order: What there is to say of the order of its joints.
+    """
+    columns = COLUMNS if any(joint.mimic for joint in tree.joints) else COLUMNS[:-1]
+    names = ["", *(joint.name for joint in tree.joints)]
+    cells = [("",) * len(columns), *(cells_of(tree, i)[: len(columns)] for i in range(len(tree.joints)))]
+    rows = [
+        (guide + link, joint, *own)
+        for guide, link, joint, own in zip(guides(tree), tree.links, names, cells, strict=True)
+    ]
+    tips = ", ".join(tree.links[leaf] for leaf in tree.leaves())
+    return TextDocument(
+        f"{tree.name}: nq {tree.nq}, nv {tree.nv}, {len(tree.links)} links, {len(tree.joints)} joints",
+        (
+            f"root {tree.links[0]}, default base {base}, default tip {tip}",
+            Table(("link", "joint", *columns), rows, left=WORDS),
+            *map(str, narrowed_ranges(tree)),
+            f"frames: {len(tree.frame_names)}, every link and joint by its name; tips: {tips}",
+            order,
+        ),
+    )
+
+
+def guides(tree: KinematicTree) -> Iterator[str]:
+    """What stands before each link, root first, so that the list is a tree: nothing before an only child."""
+    children = [0] * len(tree.links)
+    for joint in tree.joints:
+        children[joint.parent] += 1
+    left, below = list(children), [""]
+    yield ""
+    for joint in tree.joints:
+        left[joint.parent] -= 1
+        own, behind = ("├ ", "│ ") if left[joint.parent] else ("└ ", "  ")
+        if children[joint.parent] == 1:
+            own, behind = "", ""
+        yield below[joint.parent] + own
+        below.append(below[joint.parent] + behind)
+
+
+def cells_of(tree: KinematicTree, i: int) -> tuple[str, ...]:
+    """The cells of `COLUMNS` for joint `i`; of a fixed joint its kind alone."""
+    joint = tree.joints[i]
+    if not joint.kind.nv:
+        return (joint.kind.value, *[""] * (len(COLUMNS) - 1))
+    q, v = _place("q", tree.q_index[i], joint.kind.nq), _place("v", tree.v_index[i], joint.kind.nv)
+    limit = joint.limit
+    limits = ("", "", "") if limit is None else map(_bound, (limit.lower, limit.upper, limit.velocity))
+    axis = axis_words(joint.axis.tolist()) if joint.kind.has_axis else ""
+    rule = joint.mimic
+    follows = rule_words(rule.leader, rule.multiplier, rule.offset) if rule else ""
+    return (joint.kind.value, axis, q, v, *limits, follows)
+
+
+def _place(letter: str, at: int, count: int) -> str:
+    return f"{letter}[{at}]" if count == 1 else f"{letter}[{at}:{at + count}]"
+
+
+def axis_words(axis: Sequence[float]) -> str:
+    """A joint's axis: `z`, `-x`, or the three numbers where it is none of the frame's own.
+
+    >>> axis_words((0.0, -1.0, 0.0)), axis_words((0.0, 0.6, 0.8))
+    ('-y', '0 0.6 0.8')
+    """
+    if sorted(map(abs, axis)) == [0.0, 0.0, 1.0]:
+        k = next(k for k, x in enumerate(axis) if x)
+        return f"{'-' if axis[k] < 0.0 else ''}{'xyz'[k]}"
+    return " ".join(f"{x:.4g}" for x in axis)
+
+
+def rule_words(leader: str, factor: float, offset: float) -> str:
+    """What a follower's value is.
+
+    >>> rule_words("thumb", 2.0, -0.1), rule_words("thumb", 1.0, 0.0)
+    ('2 * thumb -0.1', 'thumb')
+    """
+    return (f"{factor:g} * " if factor != 1.0 else "") + leader + (f" {offset:+g}" if offset else "")
+
+
+def _bound(value: float) -> str:
+    return "" if math.isinf(value) else f"{value:.6g}"

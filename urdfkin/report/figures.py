@@ -1,0 +1,213 @@
+"""A picture of how far results disagree: a histogram for each quantity above its bound.
+
+The abscissa is the disagreement in eps * scale on a logarithmic axis. Each row is one quantity, all
+references together: the hill is the share of its results, the triangle the worst, the bar on the right the
+bound from the shallowest frame to the deepest. A hill that keeps left of its bar is verified.
+
+
+What the 3D view of a robot needs, as small as it can be: links, joints, chains with their tables.
+
+The numbers are for the eye: seven digits. Everything that is computed with stands in the JSON document.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from urdfkin.report.document import Chain, Check, Model, Robot, Table
+from urdfkin.report.words import of_quantity, quantities, quantity_name, units, worst
+from urdfkin.view.figure import FIRST, GRID, SECOND, TEXT, THIRD, inline_svg, label, new_figure, style
+
+if TYPE_CHECKING:
+    from urdfkin.view.figure import Axes
+
+
+#: What lies below is drawn as exact: a hundredth of a rounding.
+_LEFT = 1e-2
+_HEIGHT = 0.82
+
+
+def distributions(robot: Robot, edges: Sequence[float], prefix: str) -> str:
+    """The picture of one robot as inline SVG; empty if nothing was compared."""
+    names = quantities([robot])
+    if not names:
+        return ""
+    with style():
+        figure = new_figure(5.6, 0.6 + 0.4 * len(names))
+        axes = figure.add_subplot()
+        right = _right(robot["checks"], edges)
+        for row, name in enumerate(names):
+            _row(axes, len(names) - 1 - row, of_quantity(robot, name), np.asarray(edges))
+        _decorate(axes, names, right)
+        said = (
+            f"{quantity_name(name)}: worst {units(worst(c['worst'] for c in of_quantity(robot, name)))}"
+            for name in names
+        )
+        return inline_svg(
+            figure,
+            prefix,
+            f"Distribution of the disagreement with Pinocchio, {robot['source']}",
+            f"Histograms in eps*scale for each quantity, against the bound. {'; '.join(said)}.",
+        )
+
+
+def _right(checks: Sequence[Check], edges: Sequence[float]) -> float:
+    """The right end of the axis: past every bound and every finite disagreement."""
+    ends = [check["bound"][1] or 1.0 for check in checks] + [check["worst"] or 1.0 for check in checks]
+    return float(min(max(ends) * 2.0, edges[-1] * 10.0))
+
+
+def _row(axes: Axes, base: int, checks: Sequence[Check], edges: np.ndarray) -> None:
+    counts = np.sum([check["histogram"] for check in checks], axis=0)
+    results = counts.sum()
+    first = int(np.searchsorted(edges, _LEFT))
+    heights = counts[first + 1 :] / max(1, counts[first + 1 :].max())
+    last = int(np.flatnonzero(heights).max(initial=-1)) + 1
+    axes.plot([_LEFT, edges[-1] * 10], [base, base], color=GRID, linewidth=0.7, zorder=1)
+    if last > 0:
+        at = edges[first : first + last + 1] if first + last < len(edges) else edges[first:]
+        steps = heights[: len(at) - 1]
+        axes.stairs(
+            base + _HEIGHT * steps,
+            at,
+            baseline=base,
+            fill=True,
+            color=FIRST,
+            alpha=0.85,
+            linewidth=0,
+            zorder=3,
+        )
+    exact = counts[: first + 1].sum() / results if results else 0.0
+    axes.annotate(
+        f"{exact:.0%}" if exact else "",
+        (_LEFT, base),
+        xytext=(-4, 2),
+        textcoords="offset points",
+        ha="right",
+        fontsize=8,
+        color=TEXT,
+    )
+    _bound(axes, base, checks)
+    largest = worst(check["worst"] for check in checks)
+    if largest:
+        failed = any(check["failed"] for check in checks)
+        axes.plot(
+            [largest], [base + 0.13], marker="v", markersize=5, color=THIRD if failed else TEXT, zorder=5
+        )
+
+
+def _bound(axes: Axes, base: int, checks: Sequence[Check]) -> None:
+    lows = [check["bound"][0] for check in checks if check["bound"][0] is not None]
+    highs = [check["bound"][1] for check in checks if check["bound"][1]]
+    if lows and highs:
+        low, high = min(x for x in lows if x is not None), max(x for x in highs if x is not None)
+        axes.plot(
+            [low, high], [base + 0.13] * 2, color=SECOND, linewidth=3.0, solid_capstyle="butt", zorder=4
+        )
+        axes.plot([low, low], [base, base + 0.42], color=SECOND, linewidth=1.2, zorder=4)
+
+
+def _decorate(axes: Axes, names: Sequence[str], right: float) -> None:
+    axes.set_xscale("log")
+    axes.set_xlim(_LEFT, right)
+    axes.set_ylim(-0.15, len(names) - 0.05)
+    axes.set_yticks(
+        [len(names) - 1 - row for row in range(len(names))], [label(quantity_name(name)) for name in names]
+    )
+    axes.tick_params(axis="y", length=0, labelsize=9, colors=TEXT, pad=26)
+    axes.tick_params(axis="x", which="both", labelsize=8, colors=TEXT, color=GRID)
+    axes.minorticks_off()
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.annotate(
+        "exact",
+        (_LEFT, len(names) - 0.4),
+        xytext=(-4, 6),
+        textcoords="offset points",
+        ha="right",
+        fontsize=7.5,
+        color=TEXT,
+        annotation_clip=False,
+    )
+    axes.set_xlabel("disagreement with Pinocchio, eps·scale", fontsize=9, color=TEXT)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_visible(False)
+    axes.grid(axis="x", color=GRID, linewidth=0.5, alpha=0.6)
+    axes.patch.set_visible(False)
+
+
+_KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
+
+
+def scene(model: Model, chains: list[Chain]) -> dict[str, Any]:
+    """A robot for the page's script, `assets/view3d.js`.
+
+    Returns:
+        `links`: names. `joints`: one list each of name, kind's index, parent link, child link, pose in the
+        parent (three rows of four), axis or 0, place in q or -1, lower, upper (None: no bound), mimic
+        (leader's place in q, multiplier, offset) or 0. `chains`: base link, tip link, two tables.
+    """
+    links = {name: i for i, name in enumerate(model["links"])}
+    joints = {joint["name"]: i for i, joint in enumerate(model["joints"])}
+    return {
+        "links": model["links"],
+        "nq": model["nq"],
+        "joints": [_joint(model, i, links) for i in range(len(model["joints"]))],
+        "tip": _link(model["tip"], links, joints),
+        "chains": [
+            {
+                "base": _link(chain["base"], links, joints),
+                "tip": _link(chain["tip"], links, joints),
+                "standard": _table(chain["standard"], joints),
+                "modified": _table(chain["modified"], joints),
+            }
+            for chain in chains
+        ],
+    }
+
+
+def _joint(model: Model, i: int, links: dict[str, int]) -> list[Any]:
+    joint = model["joints"][i]
+    limit, mimic = joint["limit"], joint["mimic"]
+    return [
+        joint["name"],
+        _KINDS.index(joint["kind"]),
+        links[joint["parent"]],
+        links[joint["child"]],
+        [_short(x) for row in joint["placement"][:3] for x in row],
+        [_short(x) for x in joint["axis"]] if joint["axis"] else 0,
+        -1 if joint["q"] is None else joint["q"],
+        None if limit is None or limit["lower"] is None else _short(limit["lower"]),
+        None if limit is None or limit["upper"] is None else _short(limit["upper"]),
+        [joint["q"], mimic["multiplier"], mimic["offset"]] if mimic else 0,
+    ]
+
+
+def _table(table: Table, joints: dict[str, int]) -> dict[str, Any]:
+    return {
+        "base": [_short(x) for row in table["base"][:3] for x in row],
+        "tool": [_short(x) for row in table["tool"][:3] for x in row],
+        "rows": [
+            [
+                joints[row["joint"]],
+                *(_short(row[key]) for key in ("a", "alpha", "beta", "d", "theta")),
+                row["sense"],
+            ]
+            for row in table["rows"]
+        ],
+    }
+
+
+def _link(frame: str, links: dict[str, int], joints: dict[str, int]) -> int:
+    """The link that carries a frame."""
+    kind, _, rest = frame.partition(":")
+    if kind in ("link", "joint") and (rest in links or rest in joints):
+        frame = rest
+    return links[frame] if frame in links else joints[frame] + 1
+
+
+def _short(value: float) -> float | int:
+    rounded = float(f"{value:.7g}")
+    return int(rounded) if rounded == int(rounded) else rounded

@@ -1,0 +1,57 @@
+"""A robot in a notebook's cell: the report's 3D view alone, in a frame that asks no network for anything."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Any, cast
+
+from urdfkin.errors.escape import log_line
+from urdfkin.report.document import Model, asset
+from urdfkin.report.figures import scene
+from urdfkin.report.html import as_is, environment
+from urdfkin.report.reading import moving_names
+from urdfkin.validation.robot_summary import describe
+
+if TYPE_CHECKING:
+    from urdfkin.model.tree import FloatArray
+    from urdfkin.robot import Robot
+
+
+class Cell:
+    """What `Robot.view` hands to a notebook.
+
+    Args:
+        robot: The robot.
+        q: (nq,) where it begins.
+        height: Pixels.
+    """
+
+    def __init__(self, robot: Robot, q: FloatArray, height: int) -> None:
+        self._name, self._height = robot.name, height
+        self._description, self._q = describe(robot), q.tolist()
+
+    def __repr__(self) -> str:
+        return log_line(f"<a view of {self._name}: the last line of a notebook's cell shows it>")
+
+    def page(self) -> str:
+        """The page."""
+        model = cast("Model", self._description)
+        data: dict[str, Any] = {"source": self._name, "joints": moving_names(model), "chains": []}
+        return (
+            environment()
+            .get_template("cell.html.j2")
+            .render(
+                data=data,
+                robot={"index": 0, "scene": scene(model, []) | {"start": self._q}},
+                style=as_is(asset("report.css")),
+                three=as_is(asset("three.min.js")),
+                view_script=as_is(asset("view3d.js")),
+            )
+        )
+
+    def _repr_html_(self) -> str:
+        # Scripts, but nothing of the notebook's own.
+        return (
+            f'<iframe sandbox="allow-scripts" title="{escape(self._name)}" srcdoc="{escape(self.page())}"'
+            f' style="width:100%;height:{self._height}px;border:0"></iframe>'
+        )

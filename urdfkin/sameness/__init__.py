@@ -1,1 +1,0 @@
-"""Whether two models are the same robot, proven: one idea a file."""

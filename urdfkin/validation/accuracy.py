@@ -1,0 +1,280 @@
+"""Whose last digits are right: the true errors of urdfkin and of Pinocchio, in eps * scale.
+
+The judge's values are right to fifty digits; the scale is the one that verification uses, so that the
+numbers can be set beside a report's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urdfkin.errors import InputError
+from urdfkin.kinematics.bodies import QUATERNION, analytical_jacobian
+from urdfkin.kinematics.rotation.euler import NEAREST, SEQUENCES, euler_of, singularity_distance
+from urdfkin.kinematics.rotation.quaternion import quaternion_of
+from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
+from urdfkin.verify.bounds import (
+    euler_jacobian_bound,
+    magnitudes,
+    nearest_singularity,
+    quaternion_jacobian_bound,
+    result_k,
+)
+from urdfkin.verify.call import Call
+from urdfkin.verify.exact.numbers import exact, mp, read_exact
+from urdfkin.verify.exact.recursion import move, on_base
+from urdfkin.verify.oracle_query import BaseRows
+from urdfkin.verify.pinocchio_inputs import BaseNumbers, davenport
+from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated
+from urdfkin.verify.sampling import Samples, draw
+from urdfkin.verify.verifier import bound_of, theirs_of, urdfkins
+
+_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+_FIFTY_DIGITS = np.vectorize(mp.mpf, otypes=[object])
+#: The numbers of an orientation, by what a line calls them.
+_REPRESENTATIONS = {
+    "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
+    QUATERNION: (QUATERNION,),
+}
+#: urdfkin is called the worse when its typical error is more than this many times Pinocchio's.
+FACTOR = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """True errors of one side, in eps * scale.
+
+    Attributes:
+        worst: The largest.
+        typical: The root of their mean square.
+    """
+
+    worst: float
+    typical: float
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One quantity in one reference.
+
+    Attributes:
+        quantity: What was judged.
+        reference: Its name, empty for placements; what describes the orientation, for analytical Jacobians.
+        numbers: How many numbers were compared.
+        urdfkin: urdfkin's true errors.
+        pinocchio: Pinocchio's.
+    """
+
+    quantity: str
+    reference: str
+    numbers: int
+    urdfkin: Errors
+    pinocchio: Errors
+
+    @property
+    def ours_is_worse(self) -> bool:
+        """Whether urdfkin's typical or worst error is more than twice Pinocchio's."""
+        return (
+            self.urdfkin.typical > FACTOR * self.pinocchio.typical
+            or self.urdfkin.worst > FACTOR * self.pinocchio.worst
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What the judge found about one robot.
+
+    Attributes:
+        robot: Its name.
+        samples: How many configurations were judged.
+        seed: What they were drawn from.
+        lines: One for each quantity and reference.
+        moving_base: Whether the root link moved.
+    """
+
+    robot: str
+    samples: int
+    seed: int
+    lines: tuple[Line, ...]
+    moving_base: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "robot": self.robot,
+            "samples": self.samples,
+            "seed": self.seed,
+            "moving_base": self.moving_base,
+            "lines": [
+                {
+                    "quantity": line.quantity,
+                    "reference": line.reference or None,
+                    "numbers": line.numbers,
+                    "urdfkin": {"worst": line.urdfkin.worst, "typical": line.urdfkin.typical},
+                    "pinocchio": {"worst": line.pinocchio.worst, "typical": line.pinocchio.typical},
+                }
+                for line in self.lines
+            ],
+        }
+
+
+def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | None = None) -> Judgement:
+    """Evaluate every link's placement, velocity, Jacobians, their rate and acceleration at 50 digits.
+
+    Analytical Jacobians are those of the twelve sequences of Euler angles together (about fixed axes they are
+    the same, last row first), and of quaternions; left out is what is nearer to a singularity than
+    `Robot.analytical_jacobian` goes, or has a quaternion whose sign rounding hides. Pinocchio has none of its
+    own: its rotation and Jacobian go into 7.122 as urdfkin's do.
+
+    Args:
+        robot: A robot that was loaded.
+        samples: Configurations, drawn as `validate` draws its first; each takes a good part of a second.
+        seed: The same seed gives the same numbers.
+        base: How the root link moves, in all samples or (samples, ...) in each; None if it stands still.
+
+    Raises:
+        OracleError: Pinocchio does not accept the robot.
+        InputError: bases that are neither one nor as many as samples.
+    """
+    work = _Work(robot, draw(robot.tree, samples, np.random.default_rng(seed), with_special=False), base)
+    return Judgement(robot.name, samples, seed, tuple(work.lines()), base is not None)
+
+
+class _Compared(NamedTuple):
+    """Both sides' doubles, the judge's numbers of 50 digits, and the scale of their errors."""
+
+    urdfkin: FloatArray
+    pinocchio: FloatArray
+    true: NDArray[np.object_]
+    scale: FloatArray
+
+
+class _Work:
+    """One batch, as urdfkin, Pinocchio and the judge are asked for it."""
+
+    def __init__(self, robot: Robot, x: Samples, base: BaseMotion | None) -> None:
+        if base is not None and base.batch_shape not in ((), (len(x.q),)):
+            raise InputError(
+                f"base is one, or one for each of {len(x.q)} samples", found=f"{base.batch_shape}"
+            )
+        self.oracle = robot.verifier.oracle(base)
+        self.part = Call(robot.tree, robot.plan, robot.link_frames, _ALIGNED, base, (x.q, x.v, x.a)).part(
+            slice(0, len(x.q))
+        )
+        self.links = range(len(robot.tree.links))
+        joints, moves = read_exact(robot.urdf, robot.tree), self.part.asked.base
+        self.motions = [
+            move(
+                robot.tree,
+                joints,
+                *([exact(number) for number in row[k]] for row in self.part.asked.inputs),
+                base=None if moves is None else on_base(_one(moves, k)),
+            )
+            for k in range(len(x.q))
+        ]
+
+    def lines(self) -> Iterator[Line]:
+        """Quantity by quantity, reference by reference."""
+        for reference in (None, *Reference):
+            for row in validated():
+                if row.exact is not None and reference in row.references:
+                    name = "" if reference is None else reference.name.lower()
+                    yield _line(row.name, name, [self._compared(row, reference)])
+        for name, representations in _REPRESENTATIONS.items():
+            yield _line(ANALYTICAL_JACOBIAN.name, name, list(self._analytical(representations)))
+
+    def _compared(self, row: Quantity, reference: Reference | None) -> _Compared:
+        reference = _ALIGNED if reference is None else reference
+        asked = self.part.asked._replace(reference=reference)
+        part = self.part._replace(reference=reference, asked=asked)
+        ours, theirs = urdfkins(row, part), theirs_of(row, self.oracle, asked)
+        scale = np.broadcast_to(bound_of(row, part).scale, ours.shape)
+        return _Compared(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
+
+    def _true(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
+        """(n, links, ...) as `urdfkins`."""
+        return np.array(
+            [[row.truth(motion, link, reference) for link in self.links] for motion in self.motions],
+            dtype=object,
+        )
+
+    def _analytical(self, representations: Sequence[str]) -> Iterator[_Compared]:
+        """Representation by representation, each a list of Jacobians."""
+        poses, J_v = self._compared(PLACEMENT, None), self._compared(JACOBIAN, _ALIGNED)
+        plan, x = self.part.plan, self.part
+        size, nearest = magnitudes(plan, x.q, None, None, x.state), max(NEAREST, nearest_singularity(plan))
+        jacobian = JACOBIAN.bound(plan, size, _ALIGNED)
+        R, R_theirs = poses.urdfkin[..., :3, :3], poses.pinocchio[..., :3, :3]
+        moving = _moving_columns(J_v.scale)
+        R_true, J_true = map(_FIFTY_DIGITS, (poses.true[..., :3, :3], _columns(J_v.true, moving)))
+        for name in representations:
+            if name == QUATERNION:
+                bound, quat = quaternion_jacobian_bound(jacobian), quaternion_of(R)
+                clear = np.abs(quat[..., 3]) > EPS * result_k(bound, quat.shape[:-1])
+                true = quaternion_jacobian(exact_quaternion(R_true[clear], quat[clear]), J_true[clear])
+            else:
+                clear = singularity_distance(name, euler_of(name, R)) > nearest
+                true, apart = euler_jacobian(name, R_true[clear], J_true[clear])
+                everywhere = np.ones(clear.shape)
+                everywhere[clear] = apart
+                bound = euler_jacobian_bound(jacobian, size, everywhere)
+            ours = analytical_jacobian(name, R[clear], J_v.urdfkin[clear], 0.0)
+            theirs = analytical_jacobian(name, R_theirs[clear], J_v.pinocchio[clear], 0.0)
+            ours, theirs, scale = (_columns(J, moving[clear]) for J in (ours, theirs, bound.scale[clear]))
+            yield _Compared(ours, theirs, true, scale)
+
+
+def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
+    """(n, links, most) the columns that move each link, filled up with others."""
+    idle = ~(scale > 0.0).any(axis=-2)
+    most = int((~idle).sum(axis=-1).max(initial=0))
+    return np.argsort(idle, axis=-1, kind="stable")[..., :most]
+
+
+def _columns(J: NDArray[Any], which: NDArray[np.intp]) -> NDArray[Any]:
+    """Some columns of (..., rows, nv)."""
+    return np.take_along_axis(J, which[..., np.newaxis, :], axis=-1)
+
+
+def _one(base: BaseNumbers, k: int) -> BaseNumbers:
+    """The base of one sample."""
+    return BaseRows(base.placement[k], base.velocity[k], base.acceleration[k])
+
+
+def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
+    """(m, 4) unit quaternions of rotations (m, 3, 3), of the two that each has those near to others."""
+    K = davenport(R)
+    q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I is 4 q q^T
+    unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
+    return unit
+
+
+def _line(quantity: str, reference: str, compared: Sequence[_Compared]) -> Line:
+    """The errors of both sides in what was compared of one quantity."""
+    sides: tuple[list[FloatArray], list[FloatArray]] = [], []
+    for ours, theirs, true, scale in compared:
+        counted = scale > 0.0
+        units = np.maximum(EPS * scale[counted], LEAST_UNIT)
+        # The difference of doubles that are near each other is exact; the rest of the digits follows.
+        high = true[counted].astype(float)
+        low = (true[counted] - high).astype(float)
+        for errors, side in zip(sides, (ours, theirs), strict=True):
+            errors.append(np.abs((side[counted] - high) - low) / units)
+    mine, other = map(np.concatenate, sides)
+    return Line(quantity, reference, len(mine), _errors(mine), _errors(other))
+
+
+def _errors(units: FloatArray) -> Errors:
+    if not units.size:
+        return Errors(0.0, 0.0)
+    return Errors(float(units.max()), float(np.sqrt((units * units).mean())))

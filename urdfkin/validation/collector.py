@@ -1,0 +1,229 @@
+"""How far a campaign has come.
+
+What has come back of a run, and the report that it makes of each robot.
+
+Whatever was asked for is reported on: a robot of which nothing came back, or not everything, is not verified.
+Results are added up as they come, so that memory does not grow with samples: neighbours to runs of chunks, in
+the order of chunks whatever the order in which they come.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from operator import add
+
+from urdfkin.validation.answer import Answer, Failure
+from urdfkin.validation.chunk import ChunkResult, Cut
+from urdfkin.validation.engines import Task
+from urdfkin.validation.error_stats import Key, Tally, plus
+from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.results import RobotReport
+from urdfkin.validation.robot_input import RobotInput
+from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary
+from urdfkin.verify.oracles import WITNESSES
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignProgress:
+    """What is done and what is to do.
+
+    Attributes:
+        robots_done: Robots of which everything is there, or that failed.
+        robots: Robots in all.
+        chunks_done: Chunks that need no more waiting for.
+        chunks: Chunks in all.
+        chunks_kept: Chunks of those done that were there from an earlier run.
+        failures: Robots that disagree or could not be checked, so far.
+        label: The robot in hand.
+    """
+
+    robots_done: int
+    robots: int
+    chunks_done: int
+    chunks: int
+    chunks_kept: int
+    failures: int
+    label: str
+
+
+#: Called after each chunk.
+Progress = Callable[[CampaignProgress], None]
+
+
+class ResultCollector:
+    """The answers of a run, by robot and chunk.
+
+    Args:
+        subjects: The robots.
+        cut: Their chunks.
+        parts: Which of its chunks each robot shall have here.
+        progress: Told before the work, and after each answer.
+    """
+
+    def __init__(
+        self,
+        subjects: Sequence[RobotInput],
+        cut: Cut,
+        parts: Sequence[range],
+        progress: Progress | None = None,
+    ) -> None:
+        self._subjects, self._cut, self._progress = subjects, cut, progress
+        self._robots = [_Robot(part) for part in parts]
+        self._chunks = sum(map(len, parts))
+        self._chunks_done = self._kept = self._over = self._failures = 0
+
+    def begin(self) -> None:
+        """Tell where it stands: from now on there is work, and nothing else."""
+        if self._progress is not None:
+            self._progress(self.standing(self._subjects[0].label if self._subjects else ""))
+
+    def enter(self, task: Task, found: Answer, *, kept: bool = False) -> None:
+        """Take an answer; one that was kept from an earlier run counts as none of this one's work."""
+        robot = self._robots[task.robot]
+        was_over, had_failed, before = robot.over, robot.has_failed, robot.done
+        robot.enter(task.chunk.index, found)
+        self._chunks_done += robot.done - before
+        self._kept += kept * (robot.done - before)
+        self._over += robot.over and not was_over
+        self._failures += robot.has_failed and not had_failed
+        if self._progress is not None:
+            self._progress(self.standing(self._subjects[task.robot].label))
+
+    def standing(self, label: str = "") -> CampaignProgress:
+        """How far it has come, with the robot in hand."""
+        return CampaignProgress(
+            robots_done=self._over,
+            robots=sum(bool(robot.part) for robot in self._robots),
+            chunks_done=self._chunks_done,
+            chunks=self._chunks,
+            chunks_kept=self._kept,
+            failures=self._failures,
+            label=label,
+        )
+
+    def missing(self, robot: int) -> Iterator[int]:
+        """The chunks of a robot that have no answer, until it fails."""
+        known = self._robots[robot]
+        for index in known.part:
+            if known.failures:
+                return
+            if index not in known:
+                yield index
+
+    def give_up(self, found: Failure) -> None:
+        """The answer for every robot that has not all of its own."""
+        for robot in self._robots:
+            if not robot.over:
+                robot.failures[len(self._cut)] = found
+
+    def reports(self) -> Iterator[RobotReport]:
+        """A report for each robot of which something was to be done, in the order asked for."""
+        for subject, robot in zip(self._subjects, self._robots, strict=True):
+            if robot.part:
+                yield robot.report(subject, self._cut.configurations(robot.part))
+
+
+class _Robot:
+    """The answers for one robot."""
+
+    def __init__(self, part: range) -> None:
+        self.part = part
+        self.failures: dict[int, Failure] = {}
+        self._runs: list[tuple[range, ChunkResult]] = []
+        self._has_disagreed = False
+
+    def enter(self, index: int, found: Answer) -> None:
+        if isinstance(found, Failure):
+            self.failures[index] = found
+        else:
+            self._has_disagreed = self._has_disagreed or any(_outside(found.tallies))
+            self._add(range(index, index + 1), found)
+
+    def _add(self, chunks: range, found: ChunkResult) -> None:
+        """Join it to the runs that end where it begins, or begin where it ends."""
+        at = next((i for i, (run, _) in enumerate(self._runs) if run.start > chunks.start), len(self._runs))
+        if at and self._runs[at - 1][0].stop == chunks.start:
+            at -= 1
+            before, result = self._runs.pop(at)
+            chunks, found = range(before.start, chunks.stop), result + found
+        if at < len(self._runs) and self._runs[at][0].start == chunks.stop:
+            after, result = self._runs.pop(at)
+            chunks, found = range(chunks.start, after.stop), found + result
+        self._runs.insert(at, (chunks, found))
+
+    def __contains__(self, index: int) -> bool:
+        return index in self.failures or any(index in run for run, _ in self._runs)
+
+    @property
+    def has_failed(self) -> bool:
+        return self._has_disagreed or bool(self.failures)
+
+    @property
+    def done(self) -> int:
+        """How many of its chunks need no more waiting for."""
+        return len(self.part) if self.failures else sum(len(run) for run, _ in self._runs)
+
+    @property
+    def over(self) -> bool:
+        return self.done == len(self.part)
+
+    def report(self, subject: RobotInput, wanted: int) -> RobotReport:
+        # What others found after the chunk that failed is left out: it depends on who was how fast.
+        last = min(self.failures, default=self.part.stop)
+        failure = self.failures.get(last)
+        results = [result for run, result in self._runs if run.start < last]
+        found = reduce(add, results) if results else None
+        tallies = found.tallies if found else {}
+        portrait = (found.portrait if found else None) or NO_PORTRAIT
+        if failure is not None and portrait is NO_PORTRAIT:
+            portrait = failure.portrait
+        samples = found.samples if found else 0
+        verdict, reasons = _verdict(tallies, portrait, failure, samples, wanted)
+        known = found.name if found else portrait.model["name"] if portrait.model else subject.label
+        return RobotReport(
+            origin=subject.origin,
+            name=known,
+            verdict=verdict,
+            reason="; ".join(reasons) or None,
+            joints=found.joints if found else (),
+            frames=found.frames if found else (),
+            tallies=tallies,
+            samples=samples,
+            seconds=found.seconds if found else 0.0,
+            portrait=portrait,
+            clock=found.clock if found else None,
+            error=failure.error if failure else None,
+        )
+
+
+def _verdict(
+    tallies: dict[Key, Tally], portrait: RobotSummary, failure: Failure | None, samples: int, wanted: int
+) -> tuple[Verdict, list[str]]:
+    """The verdict and every reason for it: a disagreement stays one, whatever else went wrong."""
+    disagreements = [*_outside(tallies), *portrait.disagreements]
+    verdict, reasons = Verdict.VERIFIED, list[str]()
+    if failure is not None:
+        verdict, reasons = failure.verdict, [failure.reason]
+    elif samples < wanted:
+        verdict = Verdict.NOT_VERIFIED
+        reasons = [f"interrupted: {samples:,} of {wanted:,} samples were compared"]
+    elif not any(tally.results for tally in tallies.values()):
+        verdict, reasons = Verdict.NOT_VERIFIED, ["nothing was compared"]
+    return (Verdict.DISAGREES if disagreements else verdict), disagreements + reasons
+
+
+def _outside(tallies: dict[Key, Tally]) -> Iterator[str]:
+    failed = sum(tally.failed for tally in tallies.values())
+    if failed:
+        results = sum(tally.results for tally in tallies.values())
+        yield f"{failed:,} of {results:,} results lie outside their bound"
+    found = reduce(plus, (tally.witness for tally in tallies.values()), None)
+    if found is not None and found.urdfkin.failed:
+        ours, theirs, witness = found.alone
+        title = WITNESSES[found.by].title
+        yield (
+            f"{found.urdfkin.failed:,} results disagree with {title}'s: urdfkin stands alone in {ours:,},"
+            f" Pinocchio in {theirs:,}, {title} in {witness:,}"
+        )

@@ -1,0 +1,203 @@
+"""Every frame of a robot, ours against Pinocchio's, for some samples.
+
+Frames are compared in blocks, so that memory is bounded whatever the robot: it is the Jacobians' arrays,
+samples * frames * 6 * rates, that grow. A frame's numbers do not depend on its neighbours, and tallies of
+blocks join to the tally of all frames: nothing that is reported depends on the blocks.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from urdfkin.compiled.plan import compile_tree
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, KinematicTree, freed
+from urdfkin.robot import Robot
+from urdfkin.validation.error_stats import Inputs, Key, Tally, ThreeSides, tally, three_sides
+from urdfkin.validation.timings import Clock
+from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.oracles import Witness
+from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.quantities import SCREWS, Quantity, validated
+from urdfkin.verify.sampling import Samples
+
+#: How large an array of a block may be, bytes; some ten arrays of this size are there at a time.
+BLOCK_BYTES = 32 * 2**20
+
+
+@dataclass(frozen=True, slots=True)
+class SecondWitness:
+    """Who is asked besides Pinocchio, and its model of the robot."""
+
+    witness: Witness
+    oracle: Any
+
+    def three_sides(
+        self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
+    ) -> ThreeSides:
+        """Its answers beside urdfkin's and Pinocchio's, about the block's frames or joints."""
+        inputs = block.x.q, block.x.v, block.x.a
+        answers = block.clock.witness(row.theirs, self.oracle, inputs, block.asked(row)[0], reference)
+        bounds = (
+            row.bound(block.plan, size, reference) for size in (block.size, self.witness.size(block.size))
+        )
+        if row.of == "joints":
+            bounds = (block.part(one) for one in bounds)
+        return three_sides(self.witness.name, ours, theirs, answers, *bounds)
+
+
+def tallies(
+    robot: Robot,
+    oracle: Oracle,
+    x: Samples,
+    first_sample: int,
+    clock: Clock,
+    second: SecondWitness | None = None,
+) -> dict[Key, Tally]:
+    """Compare all frames, joints and columns of a robot.
+
+    Args:
+        robot: The robot.
+        oracle: Pinocchio's model of it.
+        x: What to compare at.
+        first_sample: The number of the first sample.
+        clock: Told whose work took how long.
+        second: Asked about frames too, if there is one.
+    """
+    found: dict[Key, Tally] = {}
+    work = robot, oracle, x, first_sample, clock
+    for frames in blocks(len(robot.all_frames), frame_bytes(len(x.q), robot.nv)):
+        for key, part in _Block(*work, frames).tallies(second):
+            found[key] = found[key].beside(part) if key in found else part
+    screws = reduce(Tally.beside, _Screws(*work).tallies())
+    return found | {(SCREWS.name, Reference.WORLD.name.lower()): screws}
+
+
+def frame_bytes(samples: int, rates: int) -> int:
+    """The size of the largest array of a frame: its Jacobians, or its placements where few rates move it."""
+    return samples * 8 * max(16, 6 * rates)
+
+
+def blocks(count: int, size: int) -> Iterator[slice]:
+    """Cut so many things of a size in bytes into runs of at most `BLOCK_BYTES`; at least one run."""
+    most = max(1, BLOCK_BYTES // size)
+    for start in range(0, max(1, count), most):
+        yield slice(start, min(count, start + most))
+
+
+class _Work:
+    """Some samples of a robot, and how their comparisons are counted."""
+
+    def __init__(self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock) -> None:
+        self.robot, self.oracle, self.x, self.first, self.clock = robot, oracle, x, first_sample, clock
+        rows = zip(x.q.tolist(), x.v.tolist(), x.a.tolist(), strict=True)
+        self.inputs: list[Inputs] = list(rows)
+
+    def tally(self, ours: FloatArray, theirs: FloatArray, bound: Bound, names: tuple[str, ...]) -> Tally:
+        return tally(ours, theirs, bound, names, self.first, self.inputs)
+
+
+class _Block(_Work):
+    """The comparisons of some frames, and of the joints whose child links are among them."""
+
+    def __init__(
+        self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock, frames: slice
+    ) -> None:
+        super().__init__(robot, oracle, x, first_sample, clock)
+        tree = robot.tree
+        self.frames = robot.all_frames[frames]
+        links = tuple(tree.frame_link(frame) for frame in self.frames)
+        # A robot keeps the plan of all its frames for the next chunk; a block's is made when needed.
+        whole = len(links) == len(robot.all_frames)
+        self.plan = robot.plan(links) if whole else compile_tree(tree, links)
+        self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
+        # A joint's Jacobian is its child link's, and links come first among the frames, root before all.
+        moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
+        self.joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
+        self.places = [link - frames.start for link in moving[self.joints]]
+        self.joint_names = robot.joint_names[self.joints]
+
+    def tallies(self, second: SecondWitness | None) -> Iterator[tuple[Key, Tally]]:
+        """Quantity by quantity; a joint's is its child link's, for which Pinocchio has another way."""
+        inputs = self.x.q, self.x.v, self.x.a
+        for row in validated():
+            joints = [joint for joint in validated("joints") if joint.compute is row.compute]
+            for reference in row.references:
+                ours = self.clock.ours(row.ours, self.plan, inputs, reference)
+                bound = row.bound(self.plan, self.size, reference)
+                yield self._held(row, reference, ours, bound, second)
+                for joint in joints:
+                    yield self._held(joint, reference, ours[:, self.places], self.part(bound), second)
+
+    def part(self, bound: Bound) -> Bound:
+        """What of a bound on the frames is one on the joints."""
+        return Bound(bound.scale[:, self.places], bound.k[:, self.places])
+
+    def asked(self, row: Quantity) -> tuple[Any, tuple[str, ...]]:
+        """What an oracle is asked about for a quantity, and its names."""
+        return (self.joints, self.joint_names) if row.of == "joints" else (self.frames, self.frames)
+
+    def _held(
+        self,
+        row: Quantity,
+        reference: Reference | None,
+        ours: FloatArray,
+        bound: Bound,
+        second: SecondWitness | None,
+    ) -> tuple[Key, Tally]:
+        asked, names = self.asked(row)
+        inputs = self.x.q, self.x.v, self.x.a
+        theirs = self.clock.theirs(row.theirs, self.oracle, inputs, asked, reference)
+        found = self.tally(ours, theirs, bound, names)
+        if second is not None:
+            found = replace(found, witness=second.three_sides(self, row, reference, ours, theirs))
+        return (row.name, reference.name.lower() if reference is not None else ""), found
+
+
+class _Screws(_Work):
+    """The whole `data.J`: each rate's column is its own joint's Jacobian column, seen from WORLD."""
+
+    def tallies(self) -> Iterator[Tally]:
+        robot, x = self.robot, self.x
+        tree = freed(robot.tree)
+        q_free = _leaders_spread(robot.tree, tree, x.q)
+        theirs = self.clock.theirs(SCREWS.ask, self.oracle, x.q).swapaxes(1, 2)
+        moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
+        column = 0
+        for block in blocks(len(moving), frame_bytes(len(x.q), tree.nv)):
+            joints = moving[block]
+            width = sum(tree.joints[i].kind.nv for i in joints)
+            yield self._block(tree, q_free, joints, theirs[:, column : column + width])
+            column += width
+
+    def _block(self, tree: KinematicTree, q: FloatArray, joints: Sequence[int], theirs: FloatArray) -> Tally:
+        links = [i + 1 for i in joints]
+        plan = compile_tree(tree, links)
+        still = (np.zeros((len(q), tree.nv)),) * 2
+        size = magnitudes(plan, q, *still, STILL_STATE)
+        J = self.clock.ours(SCREWS.ours, plan, (q,), Reference.WORLD)
+        bound = SCREWS.bound(plan, size, Reference.WORLD)
+        own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
+        frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
+        ours = J[:, frame, :, column].swapaxes(0, 1)
+        scale = bound.scale[:, frame, :, column].swapaxes(0, 1)
+        names = tuple(tree.joints[joints[f]].name for f, _ in own)
+        return self.tally(ours, theirs, Bound(scale, bound.k[:, frame, 0]), names)
+
+
+def _leaders_spread(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
+    """The configuration of the freed tree in which every follower stands where its leader puts it."""
+    spread = np.empty((len(q), free.nq))
+    for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
+        own = q[:, at : at + joint.kind.nq]
+        if joint.mimic:
+            own = joint.mimic.multiplier * own + joint.mimic.offset
+        spread[:, free_at : free_at + joint.kind.nq] = own
+    return spread

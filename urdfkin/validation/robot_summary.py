@@ -1,0 +1,215 @@
+"""A robot as data: what it is made of, as `urdfkin info --format json` and the validation report have it.
+
+The Denavit-Hartenberg tables of a robot's chains for its report, each held against Pinocchio.
+
+The chains are the catalogue's limbs; for other robots the paths from the base to the leaves, one for each
+set of moving joints. Tables are exact, in both conventions.
+
+
+What a report tells about a robot besides its checks: its parts, what was found in its file, its tables.
+
+Plain data from the start, so that it can come back from another process and go into JSON as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from urdfkin.dh import DHRow, DHTable
+from urdfkin.dh.make import dh_table
+from urdfkin.errors import InputError
+from urdfkin.lint import Finding
+from urdfkin.model.ranges import NarrowedRange, narrowed_ranges
+from urdfkin.robot import Robot
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.sampling import draw
+from urdfkin.verify.tables import check_table
+
+if TYPE_CHECKING:
+    from urdfkin.model.tree import Joint
+
+
+def describe(robot: Robot) -> dict[str, Any]:
+    """Plain data for JSON: coordinates, frames, and every joint with its placement, axis and limits.
+
+    >>> import urdfkin
+    >>> data = describe(urdfkin.load("ur5"))
+    >>> data["nq"], {joint["kind"] for joint in data["joints"]} == {"fixed", "revolute"}
+    (6, True)
+    """
+    tree = robot.tree
+    narrowed = {one.joint: one for one in narrowed_ranges(tree)}
+    return {
+        "name": robot.name,
+        "source": robot.source,
+        "path": robot.path,
+        "sha256": robot.sha256,
+        "mimic": robot.origin.mimic if robot.verifier.mimic else False,
+        "root_joint": robot.root_joint,
+        "nq": robot.nq,
+        "nv": robot.nv,
+        "base": robot.base_frame,
+        "tip": robot.tip_frame,
+        "coordinates": list(robot.coordinate_names),
+        "rates": list(robot.rate_names),
+        "frames": list(robot.frame_names),
+        "links": list(robot.link_names),
+        "joints": [_joint(robot, i, narrowed) for i in range(len(tree.joints))],
+    }
+
+
+def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str, Any]:
+    tree = robot.tree
+    joint = tree.joints[i]
+    return {
+        "name": joint.name,
+        "kind": joint.kind.value,
+        "parent": tree.links[joint.parent],
+        "child": tree.links[i + 1],
+        "placement": joint.T_parent_joint.tolist(),
+        "axis": joint.axis.tolist() if joint.kind.has_axis else None,
+        "q": tree.q_index[i] if joint.kind.nq else None,
+        "v": tree.v_index[i] if joint.kind.nv else None,
+        "limit": _limit(joint),
+        "mimic": asdict(joint.mimic) if joint.mimic else None,
+        "kept": _kept(narrowed.get(joint.name)),
+    }
+
+
+def _kept(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
+    """The part of a joint's range in which its mimic joints keep their limits, where they narrow it."""
+    if narrowed is None:
+        return None
+    lower, upper = narrowed.kept or (None, None)
+    return {"lower": lower, "upper": upper, "by": list(narrowed.by)}
+
+
+def _limit(joint: Joint) -> dict[str, float | None] | None:
+    """Bounds; what is infinite is None, as JSON has no infinity."""
+    limit = joint.limit
+    if limit is None:
+        return None
+    named = {"lower": limit.lower, "upper": limit.upper, "velocity": limit.velocity, "effort": limit.effort}
+    return {name: value if math.isfinite(value) else None for name, value in named.items()}
+
+
+#: A robot with more leaves shows this many chains; `urdfkin dh --all` gives them all.
+MOST = 12
+_SAMPLES = 10
+_CONVENTIONS = ("standard", "modified")
+
+
+def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[dict[str, Any], ...]:
+    """Plain data for JSON: frames, both tables, and how well they agree with Pinocchio.
+
+    Args:
+        robot: The robot.
+        oracle: Pinocchio's model; None where it cannot check the robot: then nothing is said to be checked.
+    """
+    found = []
+    for limb, base, tip in _chains(robot):
+        try:
+            tables = {name: dh_table(robot.tree, tip, base, name) for name in _CONVENTIONS}
+        except InputError:
+            continue  # a planar or floating joint on the way has no row
+        if any(table.rows for table in tables.values()):
+            found.append({"limb": limb, "base": base, "tip": tip} | _checked(robot, oracle, tables))
+    return tuple(found)
+
+
+def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
+    entry = catalogue().get(robot.source)
+    if entry is not None and entry.limbs:
+        yield from ((limb, base, tip) for limb, (base, tip) in entry.limbs.items())
+        return
+    tree, seen = robot.tree, set[tuple[int, ...]]()
+    for leaf in sorted(tree.leaves(), key=lambda leaf: tree.links[leaf] != robot.tip_frame):
+        moving = tuple(i for i in tree.path(leaf) if tree.joints[i].kind.nv)
+        if moving and moving not in seen and len(seen) < MOST:
+            seen.add(moving)
+            yield None, robot.base_frame, tree.link_frames[leaf]
+
+
+def _checked(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable]) -> dict[str, Any]:
+    data: dict[str, Any] = {name: _table(table) for name, table in tables.items()}
+    if oracle is None:
+        return data | {"samples": 0, "metres": None, "worst": None, "share_of_bound": None}
+    drawn = draw(robot.tree, _SAMPLES, np.random.default_rng(0), with_special=True)
+    checks = [check_table(oracle, robot.tree, table, drawn) for table in tables.values()]
+    return data | {
+        "samples": checks[0].samples,
+        "metres": max(check.metres for check in checks),
+        "worst": max(units for check in checks for units in check.units.values()),
+        "share_of_bound": max(share for check in checks for share in check.shares.values()),
+    }
+
+
+def _table(table: DHTable) -> dict[str, Any]:
+    return {
+        "rows": [_row(row) for row in table.rows],
+        "base": table.base.tolist(),
+        "tool": table.tool.tolist(),
+    }
+
+
+def _row(row: DHRow) -> dict[str, Any]:
+    return {
+        "joint": row.joint,
+        "kind": row.kind.value,
+        "a": row.a,
+        "alpha": row.alpha,
+        "beta": row.beta,
+        "d": row.d,
+        "theta": row.theta,
+        "sense": row.sense,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSummary:
+    """A robot for the reader of a report.
+
+    Attributes:
+        model: As `urdfkin.validation.robot_summary.describe` gives it; None if the robot could not be read.
+        findings: As `Finding.as_dict` gives them.
+        chains: Denavit-Hartenberg tables of its chains, both conventions each.
+    """
+
+    model: dict[str, Any] | None = None
+    findings: tuple[dict[str, Any], ...] = ()
+    chains: tuple[dict[str, Any], ...] = ()
+
+    @classmethod
+    def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
+        """The portrait of a robot that was loaded; its tables are checked where Pinocchio can."""
+        return cls(describe(robot), as_data(robot.findings), chains_of(robot, oracle))
+
+    @property
+    def disagreements(self) -> tuple[str, ...]:
+        """What is said of each chain whose tables lie outside their bound."""
+        return tuple(said for chain in self.chains if (said := chain_disagreement(chain)) is not None)
+
+
+def chain_disagreement(chain: Mapping[str, Any]) -> str | None:
+    """How a chain's tables disagree with Pinocchio; None if they do not, or were not compared."""
+    share = chain["share_of_bound"]
+    if not chain["samples"] or (share is not None and share <= 1.0):
+        return None
+    how = "beyond all numbers" if share is None else f"{share:.3g} times the bound"
+    off = "" if chain["metres"] is None else f", tip {chain['metres']:.2g} m off"
+    return f"the Denavit-Hartenberg tables from {chain['base']} to {chain['tip']} disagree: {how}{off}"
+
+
+#: Of a robot nothing is known about.
+NO_PORTRAIT = RobotSummary()
+
+
+def as_data(findings: Iterable[Finding]) -> tuple[dict[str, Any], ...]:
+    """Findings as JSON has them."""
+    return tuple(finding.as_dict() for finding in findings)

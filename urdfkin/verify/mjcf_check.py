@@ -1,0 +1,247 @@
+"""An MJCF file read in a confined process, and whether the robot that was made of it is the file's.
+
+Every result is checked on the URDF that was written of the tree. What that leaves open is whether the tree is
+the file's. So MuJoCo's own model of the file is held against it when it is loaded: the places of bodies and
+sites, and the equalities that became mimic rules. Pinocchio's MJCF reader reads the file itself, and is known
+to read some otherwise: what it says is told, and decides nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from urdfkin.compiled.plan import compile_tree
+from urdfkin.errors import InputError, OracleError
+from urdfkin.errors.escape import printable
+from urdfkin.kinematics.roundings import EPS, MJCF_RULE
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.frame_names import LinkFrame
+from urdfkin.model.tree import FloatArray
+from urdfkin.system.files import at_home
+from urdfkin.system.processes import ask_python, own_python
+from urdfkin.urdf.mjcf import Listed, is_text, name_of
+from urdfkin.urdf.mujoco import version
+from urdfkin.verify.bounds import Bound, about_the_root, magnitudes, mjcf_placement_bound, result_k
+from urdfkin.verify.comparison import worst_of_each
+from urdfkin.verify.mjcf_process import TOO_MUCH, unpacked
+from urdfkin.verify.quantities import PLACEMENT
+from urdfkin.verify.verifier import Verifier
+
+#: Configurations that the two are compared in, besides the neutral one.
+_SAMPLES = 8
+#: Seconds after which reading is given up.
+PATIENCE = 60.0
+#: Letters of an error of MuJoCo's that a certificate quotes.
+_SAID = 300
+#: Bytes of answers after which they are not read on.
+MOST = 400_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class MjcfReading:
+    """What the confined process has read of an MJCF file, as plain data.
+
+    Attributes:
+        urdf: The tree, written as a URDF.
+        listed: What the tree does not hold.
+        path: The file; None where it was text.
+        answer: The process's answer about the robot: frames, and what MuJoCo has computed.
+        not_whole: Why MuJoCo was asked without the file's shapes and inertias; None where it was with them.
+        pinocchio: The answer about Pinocchio's reader; None where there is none.
+    """
+
+    urdf: str
+    listed: tuple[Listed, ...]
+    path: str | None
+    answer: Mapping[str, Any]
+    not_whole: str | None
+    pinocchio: Mapping[str, Any] | None
+
+
+def read_mjcf(
+    source: str | bytes | os.PathLike[str], *, check: bool = True, patience: float = PATIENCE
+) -> MjcfReading:
+    """The robot of an MJCF file or text, compiled in a process with limits on time and memory.
+
+    Args:
+        source: A path, or text, or its bytes; files that it includes are read.
+        check: Whether MuJoCo places what it has read, for `check_mjcf_source`.
+        patience: Seconds to wait.
+
+    Raises:
+        InputError: MuJoCo is not installed, does not accept the file, takes too much time or memory, or the
+            robot has a ball joint.
+    """
+    version()
+    name = name_of(source)
+    text = isinstance(source, bytes) or is_text(source)
+    path = None if text else str(at_home(os.fspath(source)))  # type: ignore[arg-type]
+    request = {
+        "path": path,
+        "text": _text(source, name) if text else None,
+        "name": name,
+        "samples": _SAMPLES if check else 0,
+        "seconds": ceil(patience) + 1,
+    }
+    answers, ending = _ask(request, patience)
+    if errors := [answer["error"] for answer in answers if "error" in answer]:
+        words = {key: errors[0].get(key) for key in ("found", "remedy")}
+        raise InputError(errors[0]["what"], where=errors[0].get("where") or name, **words)
+    read = [answer for answer in answers if "urdf" in answer]
+    if not read:
+        raise InputError(
+            "MuJoCo cannot compile this MJCF",
+            where=name,
+            found=ending,
+            remedy="does it replicate, or ask for, more than a robot has?",
+        )
+    said = [answer["not_whole"] for answer in answers if "not_whole" in answer]
+    return MjcfReading(
+        read[-1]["urdf"],
+        tuple(Listed(*one) for one in read[-1]["listed"]),
+        path,
+        read[-1],
+        None if read[-1]["whole"] else printable((said or [ending])[0])[:_SAID],
+        next((answer["pinocchio"] for answer in answers if "pinocchio" in answer), None),
+    )
+
+
+def _text(source: str | bytes | os.PathLike[str], name: str) -> str:
+    try:
+        return source.decode("utf-8-sig") if isinstance(source, bytes) else str(source).lstrip("\ufeff")
+    except UnicodeDecodeError as error:
+        raise InputError("MuJoCo does not accept this MJCF", where=name, found=str(error)) from None
+
+
+def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
+    """The process's answers, and in words why there are no more."""
+    command = own_python(
+        "from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8")
+    )
+    output, status = ask_python(command, json.dumps(request).encode(), patience, MOST)
+    answers = [json.loads(line) for line in output.splitlines(keepends=True) if _is_answer(line)]
+    if status is None:
+        return answers, f"no end within {patience:g} s"
+    if len(output) > MOST:
+        return answers, f"an answer of more than {MOST} bytes"
+    return answers, f"its process ended with status {status}: perhaps {TOO_MUCH}"
+
+
+def _is_answer(line: bytes) -> bool:
+    """Whether a line is a whole answer: libraries may print, and a process that is killed stops anywhere."""
+    return line.startswith(b"{") and line.endswith(b"}\n")
+
+
+def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
+    """Who vouches for the reading of an MJCF file, in words.
+
+    Args:
+        verifier: Of the robot that was made of it.
+        read: What was read.
+
+    Raises:
+        OracleError: MuJoCo places a body or a site elsewhere than the tree does, or couples other joints.
+    """
+    tree, answer = verifier.tree, read.answer
+    q = unpacked(answer["q"])
+    frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
+    plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
+    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
+    # Both readings round, and so do the angles of the URDF between them: twice MuJoCo's bound.
+    size = about_the_root(magnitudes(plan, q, None, None, STILL_STATE))
+    bound = PLACEMENT.bound(plan, size, None)
+    bound = Bound(bound.scale, 2.0 * bound.k)
+    bound = mjcf_placement_bound(bound, unpacked(answer["lengths"]), unpacked(answer["angles"]))
+    share = _shares(ours, _whole(answer["placements"]), bound)
+    if not (share <= 1.0).all():
+        k, f = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)
+        raise _error(
+            f"{tree.name}, {frames[f]}", f"{share[k, f]:.3g} times what rounding allows, MuJoCo {version()}"
+        )
+    coupled = _demand_the_rules(tree.name, answer)
+    said = (
+        f"MuJoCo {version()} places {len(frames)} bodies and sites of the MJCF likewise in {len(q)}"
+        f" configurations ({share.max(initial=0.0):.1%} of the bound)"
+    )
+    if coupled is not None:
+        said += f", and holds its {len(answer['rules'])} mimic rules there ({coupled:.1%})"
+    if read.not_whole is not None:
+        said += f", without the file's shapes and inertias, with which it does not compile: {read.not_whole}"
+    return f"{said}; {_pinocchios(read, ours, bound)}"
+
+
+def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
+    """Whether MuJoCo's own equalities hold where the mimic rules put the joints: the worst share, if any."""
+    rules = {int(i): str(follower) for i, follower in answer["rules"]}
+    residuals, sizes = unpacked(answer["residuals"]), unpacked(answer["rule_sizes"])
+    held = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())
+    if odd := held.symmetric_difference(rules.keys() | set(answer["apart"])):
+        first = min(odd)
+        what = f"mimic joint {rules[first]}" if first in rules else f"equality {first}"
+        raise _error(
+            f"{name}, {what}", f"MuJoCo {version()} {'holds' if first in held else 'does not hold'} it"
+        )
+    if not rules:
+        return None
+    own = sorted(rules)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.abs(residuals[:, own]) / (MJCF_RULE * EPS * sizes[:, own])
+    share = np.where(residuals[:, own] == 0.0, 0.0, share)
+    if not (share <= 1.0).all():
+        k, i = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)
+        off = abs(residuals[k, own[i]])
+        raise _error(f"{name}, mimic joint {rules[own[i]]}", f"MuJoCo {version()} has it {off:.3g} elsewhere")
+    return float(share.max())
+
+
+def _error(where: str, found: str) -> OracleError:
+    return OracleError(
+        "the robot that was made of an MJCF file is not the file's",
+        where=where,
+        found=found,
+        remedy="please report this as an error of urdfkin, with the file",
+    )
+
+
+def _whole(found: Mapping[str, Any]) -> FloatArray:
+    """(n, frames, 4, 4) from the three rows that were sent."""
+    rows = unpacked(found)
+    T = np.zeros((*rows.shape[:2], 4, 4))
+    T[..., :3, :], T[..., 3, 3] = rows, 1.0
+    return T
+
+
+def _shares(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
+    units = worst_of_each(ours, theirs, bound.scale, 2)
+    share: FloatArray = units / result_k(bound, units.shape)
+    return share
+
+
+def _pinocchios(read: MjcfReading, ours: FloatArray, bound: Bound) -> str:
+    """What Pinocchio's MJCF reader says of the same bodies."""
+    if read.path is None:
+        return "Pinocchio's MJCF reader, which takes files, was not asked"
+    found = read.pinocchio or {"error": "its process ended"}
+    if "error" in found:
+        return f"Pinocchio's MJCF reader does not vouch for it ({found['error']})"
+    names = list(found["bodies"])
+    if not names:
+        return "Pinocchio's MJCF reader finds no body either"
+    places = [name for name, _ in read.answer["frames"]]
+    bodies, theirs = [places.index(name) for name in names], _whole(found["placements"])
+    share = _shares(ours[:, bodies], theirs, Bound(bound.scale[:, bodies], bound.k[:, bodies]))
+    if (share <= 1.0).all():
+        return "Pinocchio's MJCF reader places the bodies likewise"
+    f = int(share.max(axis=0).argmax())
+    off = np.abs(ours[:, bodies[f]] - theirs[:, f])[:, :3]
+    return (
+        f"Pinocchio's MJCF reader stands alone: it has {names[f]} up to {off[..., 3].max():.3g} m away,"
+        f" and its axes {off[..., :3].max():.3g}"
+    )

@@ -1,0 +1,89 @@
+"""Whether the robot that was made of a `pinocchio.Model` is the model's: the model itself is asked."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from urdfkin.compiled.plan import compile_tree
+from urdfkin.errors import OracleError
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.configuration import neutral
+from urdfkin.model.frame_names import LinkFrame
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
+from urdfkin.urdf.pinocchio_model import Modelled
+from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.certificate import compare
+from urdfkin.verify.pinocchio import MOST_RATES
+from urdfkin.verify.pinocchio_module import pinocchio, version
+from urdfkin.verify.quantities import PLACEMENT
+from urdfkin.verify.sampling import sample
+from urdfkin.verify.verifier import Verifier
+
+#: Configurations that the two are compared in, besides the neutral one.
+_SAMPLES = 8
+
+
+def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
+    """Who vouches for the reading of a model, in words.
+
+    Args:
+        verifier: Of the robot that was made of it.
+        made: What was read.
+        source: The model, or what wraps it.
+
+    Raises:
+        OracleError: the model places a frame elsewhere than the tree does.
+    """
+    model, tree = getattr(source, "model", source), verifier.tree
+    if model.nv > MOST_RATES:  # its workspace grows with the cube
+        return f"the model itself was not asked: it has {model.nv} rates, more than {MOST_RATES}"
+    q = np.vstack((neutral(tree), sample(tree, _SAMPLES, np.random.default_rng(0))))
+    names = [*made.joints, *made.frames]
+    plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
+    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
+    theirs = _placements(model, _configurations(model, tree, q), made)
+    # Both readings round, and so do the angles of the URDF between them.
+    bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
+    found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
+    if not found.agrees:
+        raise OracleError(
+            "the robot that was made of a pinocchio.Model is not the model's",
+            where=f"{tree.name}, {names[found.index[1]]}",
+            found=f"{found.share:.3g} times what rounding allows, Pinocchio {version()}",
+            remedy="please report this as an error of urdfkin, with the model",
+        )
+    return (
+        f"the model itself places {len(names)} links likewise in {len(q)} configurations"
+        f" ({found.share:.1%} of the bound)"
+    )
+
+
+def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
+    """(n, links, 4, 4) of joints, then of frames."""
+    pin = pinocchio()
+    data = model.createData()
+    out = np.empty((len(q), len(made.joints) + len(made.frames), 4, 4))
+    for k, q_k in enumerate(q):
+        pin.framesForwardKinematics(model, data, q_k)
+        placed = [data.oMi[j] for j in made.joints.values()] + [data.oMf[i] for i in made.frames.values()]
+        out[k] = [one.homogeneous for one in placed]
+    return out
+
+
+def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
+    """(n, the model's nq), joint for joint by their names: the model may have them in another order."""
+    full = np.zeros((len(q), int(model.nq)))
+    for joint, at in zip(tree.joints, tree.q_index, strict=True):
+        if not joint.nq:
+            continue
+        theirs = model.joints[model.getJointId(joint.name)]
+        to, size = int(theirs.idx_q), int(theirs.nq)
+        own = q[:, at : at + joint.nq]
+        if joint.kind is JointKind.PLANAR:
+            own = np.column_stack((own[:, :2], np.cos(own[:, 2]), np.sin(own[:, 2])))
+        elif size == 2:
+            own = np.column_stack((np.cos(own), np.sin(own)))
+        full[:, to : to + size] = own
+    return full

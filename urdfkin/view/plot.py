@@ -1,0 +1,288 @@
+"""Pictures of a frame's motion along a trajectory (the extra `urdfkin[plots]`).
+
+The panels of `urdfkin plot`: what each draws of a frame's motion over time.
+
+One sheet with the panels that were asked for, and a foot that says what was checked.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from urdfkin.compiled.breakdown import KINDS
+from urdfkin.compiled.plan import IntArray
+from urdfkin.errors import UnknownNameError
+from urdfkin.kinematics.rotation import log_rotation
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model import configuration
+from urdfkin.model.tree import FloatArray
+from urdfkin.motion.frame_motion import FrameMotion
+from urdfkin.motion.trajectory import Trajectory
+from urdfkin.robot import Robot
+from urdfkin.verify.pinocchio_module import version
+from urdfkin.view.figure import label, new_figure, style
+
+if TYPE_CHECKING:
+    from urdfkin.view.figure import Axes, Figure
+
+
+#: Draws into axes: motion and seconds.
+Panel = Callable[["Axes", FrameMotion, FloatArray], None]
+
+#: Okabe and Ito's colours, which differ for every kind of eye; line styles differ as well.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
+
+
+_LINEAR, _ANGULAR = slice(0, 3), slice(3, 6)
+#: With more lines than this none is named: nobody could tell them apart.
+_NAMED = 14
+
+
+def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) -> None:
+    for k, name in enumerate(names):
+        axes.plot(t, rows[:, k], color=COLOURS[k % 7], linestyle=STYLES[k % 7], label=name)
+
+
+def position(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+    """The origin in the world."""
+    _lines(axes, t, x.placement[:, :3, 3], ("x", "y", "z"))
+    axes.set_ylabel("position [m]")
+
+
+def orientation(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+    """The turn since the start: axis times angle, in world axes."""
+    R = x.placement[:, :3, :3]
+    _lines(axes, t, log_rotation(R @ R[0].T), ("x", "y", "z"))
+    axes.set_ylabel("turned [rad]")
+
+
+def velocity(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+    """Linear rows."""
+    _lines(axes, t, x.velocity[:, :3], ("x", "y", "z"))
+    axes.set_ylabel("velocity [m/s]")
+
+
+def angular_velocity(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+    """Angular rows."""
+    _lines(axes, t, x.velocity[:, 3:], ("x", "y", "z"))
+    axes.set_ylabel("angular velocity [rad/s]")
+
+
+def acceleration(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+    """Linear rows, classical."""
+    _lines(axes, t, x.acceleration[:, :3], ("x", "y", "z"))
+    axes.set_ylabel("acceleration [m/s²]")
+
+
+def angular_acceleration(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+    """Angular rows."""
+    _lines(axes, t, x.acceleration[:, 3:], ("x", "y", "z"))
+    axes.set_ylabel("ang. acceleration [rad/s²]")
+
+
+def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+    """How large each kind of contribution to the linear acceleration is, and their sum."""
+    sizes = np.linalg.norm(x.parts.by_kind[..., :3], axis=-1)
+    total = np.linalg.norm(x.acceleration[:, :3], axis=-1)
+    used = [k for k in range(len(KINDS)) if sizes[:, k].any()]
+    names = tuple(KINDS[k] for k in used)
+    _lines(axes, t, np.column_stack([sizes[:, used], total]), (*names, "all together"))
+    axes.set_ylabel("parts, size [m/s²]")
+
+
+def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
+    """Of the Jacobian's linear or its angular rows: together they would add metres to radians."""
+    values = x.singular_values_of(rows)
+    largest = values.max(initial=1.0)
+    shown = np.where(values > EPS * largest, values, np.nan)
+    _lines(axes, t, shown, [f"σ{k + 1}" for k in range(values.shape[1])])
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    lower, upper = axes.get_ylim()
+    axes.yaxis.set_minor_formatter(lambda value, _: f"{value:g}" if upper < 10.0 * lower else "")
+    axes.set_ylabel(f"singular values, {unit}\nper unit of rates")
+
+
+def manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
+    """Yoshikawa's: the product of the singular values of the linear or of the angular rows."""
+    _lines(axes, t, x.manipulability(rows)[:, np.newaxis], ("",))
+    axes.set_ylabel(f"manipulability\n[{unit}]")
+    axes.set_ylim(bottom=0.0)
+
+
+def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+    """With Pinocchio at the same q, v and a, in eps * scale; thin, the bound; a cross where it is outside."""
+    axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
+    if x.not_verified is not None:
+        axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
+        return
+    for k, (quantity, check) in enumerate(x.checks.items()):
+        axes.plot(t, check.units, color=COLOURS[k % 7], linestyle=STYLES[k % 7], label=quantity)
+        axes.plot(t, check.bound, color=COLOURS[k % 7], linewidth=0.6, linestyle=STYLES[k % 7])
+        outside = check.share > 1.0
+        if outside.any():
+            axes.plot(t[outside], check.units[outside], "x", color="#B00020", label="outside the bound")
+    # Bounds are a hundred times what is usual: below 1, which a rounding gives, the scale is plain.
+    axes.set_yscale("symlog", linthresh=1.0)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_ylim(bottom=0.0)
+
+
+#: Every panel by name, in the order of the sheet.
+PANELS: dict[str, Panel] = {
+    "position": position,
+    "orientation": orientation,
+    "velocity": velocity,
+    "angular-velocity": angular_velocity,
+    "acceleration": acceleration,
+    "angular-acceleration": angular_acceleration,
+    "parts": parts,
+    "singular-values": partial(singular_values, rows=_LINEAR, unit="m/s"),
+    "angular-singular-values": partial(singular_values, rows=_ANGULAR, unit="rad/s"),
+    "manipulability": partial(manipulability, rows=_LINEAR, unit="(m/s)³"),
+    "angular-manipulability": partial(manipulability, rows=_ANGULAR, unit="(rad/s)³"),
+    "disagreement": disagreement,
+}
+
+#: What is put behind a unit in the panels of q, v and a.
+_PER = {"q": "", "v": "/s", "a": "/s²"}
+#: The panels of the coordinates, each an axis for each unit.
+COORDINATES = tuple(_PER)
+
+
+def coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[Panel]:
+    """q, v or a over time: a panel for each unit that its numbers have, with the limits of what moves."""
+    units = np.array(configuration.units(robot.tree, what))
+    return [
+        partial(_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit).astype(np.int64))
+        for unit in ("rad", "m", "")
+        if (units == unit).any()
+    ]
+
+
+def _coordinates(
+    robot: Robot,
+    trajectory: Trajectory,
+    what: str,
+    unit: str,
+    places: IntArray,
+    axes: Axes,
+    x: FrameMotion,
+    t: FloatArray,
+) -> None:
+    """Those that move, or all where none does; thin, their limits; a cross where one is outside."""
+    del x
+    values: FloatArray = getattr(trajectory, what)
+    names = robot.coordinate_names if what == "q" else robot.rate_names
+    moves = [i for i in places if (values[:, i] != values[0, i]).any()] or list(places)
+    _lines(
+        axes, t, values[:, moves], [names[i] for i in moves] if len(moves) <= _NAMED else [""] * len(moves)
+    )
+    bounded, crosses = False, "outside the limits"
+    for k, (i, lower, upper) in enumerate((i, *_limits(robot, what, i)) for i in moves):
+        for bound in filter(np.isfinite, (lower, upper)):
+            axes.axhline(bound, color=COLOURS[k % 7], linestyle=STYLES[k % 7], linewidth=0.6)
+            bounded = True
+        # As everywhere, a bound printed in decimal is no violation where it is one unit in the last place.
+        outside = (values[:, i] < np.nextafter(lower, -np.inf)) | (values[:, i] > np.nextafter(upper, np.inf))
+        if outside.any():
+            axes.plot(t[outside], values[outside, i], "x", color="#B00020", markersize=3.0, label=crosses)
+            crosses = ""
+    said = f"{unit}{_PER[what]}" if unit else "quaternion"
+    axes.set_ylabel(f"{what} [{said}]" + ("\nthin: limits" if bounded else ""))
+
+
+def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
+    if what == "q":
+        return float(robot.limits[0, i]), float(robot.limits[1, i])
+    largest = float(robot.velocity_limits[i]) if what == "v" else np.inf
+    return -largest, largest
+
+
+_PANEL = (5.2, 2.3)
+#: Letters of the foot that an inch has room for.
+_LETTERS = 15
+#: Letters that an axis' width has room for in its legend, and how many of them a line's own mark takes.
+_LETTERS_OF_LEGEND, _HANDLE = 80, 8
+#: What a check says nothing about.
+_RATES_UNCHECKED = "Pinocchio checks the formulas at these q, v and a, not whether v and a are the rates of q"
+
+
+def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
+    """A figure of two columns.
+
+    Args:
+        robot: The robot.
+        x: The frame's motion along the trajectory.
+        trajectory: When, and how its rates were found.
+        panels: Names out of `COORDINATES` and `PANELS`; none means all.
+
+    Raises:
+        UnknownNameError: no such panel.
+        InputError: matplotlib is not installed.
+    """
+    drawn = _drawn(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
+    columns = min(2, len(drawn))
+    rows = -(-len(drawn) // columns)
+    with style(font_size=9):
+        figure = new_figure(_PANEL[0] * columns, _PANEL[1] * rows + 0.9)
+        grid = figure.subplots(rows, columns, squeeze=False, sharex=True)
+        for axes in grid.flat[len(drawn) :]:
+            axes.set_axis_off()
+        for axes, panel in zip(grid.flat, drawn, strict=False):
+            panel(axes, x, trajectory.t)
+            axes.grid(color="#dddddd", linewidth=0.5)
+            if names := axes.get_legend_handles_labels()[1]:
+                across = max(1, min(7, _LETTERS_OF_LEGEND // (max(map(len, names)) + _HANDLE)))
+                axes.legend(
+                    fontsize=7, frameon=False, ncols=across, loc="lower left", bbox_to_anchor=(-0.02, 0.98)
+                )
+            axes.tick_params(labelbottom=True)
+        for axes in grid[-1]:
+            axes.set_xlabel("time [s]")
+        figure.suptitle(
+            f"{label(f'{robot.name}: {x.frame}, {x.reference.name}')}\n{way(x, trajectory)}", fontsize=11
+        )
+        words = textwrap.wrap(label(foot(x, trajectory)), width=int(_LETTERS * _PANEL[0] * columns))
+        figure.supxlabel("\n".join(words), fontsize=8, color="#444444")
+    return figure
+
+
+def _drawn(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[Panel]:
+    found = list[Panel]()
+    for name in names:
+        if name in COORDINATES:
+            found += coordinate_panels(robot, trajectory, name)
+        elif name in PANELS:
+            found.append(PANELS[name])
+        else:
+            raise UnknownNameError("panel", name, [*COORDINATES, *PANELS])
+    return found
+
+
+def way(x: FrameMotion, trajectory: Trajectory) -> str:
+    """From where to where the frame goes, and in which time."""
+    ends = [
+        "({})".format(", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0)) for k in (0, -1)
+    ]
+    return f"from {ends[0]} to {ends[1]} m in {trajectory.t[-1] - trajectory.t[0]:.4g} s"
+
+
+def foot(x: FrameMotion, trajectory: Trajectory) -> str:
+    """What was checked, and what was not, in a line."""
+    rates = f"rates {trajectory.rates}" + (", exactly" if trajectory.exact else f"; {_RATES_UNCHECKED}")
+    if x.not_verified is not None:
+        return f"NOT VERIFIED by Pinocchio {version()}: {x.not_verified}; {rates}"
+    worst = max(float(np.max(check.units, initial=0.0)) for check in x.checks.values())
+    share = max(float(np.max(check.share, initial=0.0)) for check in x.checks.values())
+    word = "verified by" if x.agrees else "DISAGREES with"
+    return (
+        f"{len(trajectory.t)} samples, {word} Pinocchio {version()}: worst disagreement {worst:.2g} eps*scale"
+        f" ({share:.1%} of the bound); {rates}"
+    )

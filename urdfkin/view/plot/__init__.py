@@ -1,1 +1,0 @@
-"""Pictures of a frame's motion along a trajectory (the extra `urdfkin[plots]`)."""

@@ -1,0 +1,203 @@
+"""The border to trimesh: mesh files as vertices and faces.
+
+What a URDF says about the looks of its links; kinematics never asks.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from urdfkin.kinematics.rotation import rotation_from_rpy
+from urdfkin.model.pose import pose
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+from urdfkin.system.files import read_bytes
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.packages import find_package, split_uri
+from urdfkin.urdf.plain_xml import plain_xml
+
+#: Bytes of a mesh, a material or a texture; what is larger is not shown.
+LARGEST_FILE = 200_000_000
+
+
+@lru_cache(maxsize=256)
+def _read(file: Path) -> Any:
+    import trimesh  # noqa: PLC0415  half a second
+
+    class Beside(trimesh.resolvers.FilePathResolver):
+        """Materials and textures: regular files in the mesh's folder or below it."""
+
+        def get(self, name: str) -> bytes:
+            folder = Path(self.parent).resolve()
+            for path in (folder / name.strip().lstrip("/"), folder / Path(name).name):
+                if path.resolve().is_relative_to(folder) and path.is_file():
+                    return read_bytes(path, LARGEST_FILE)
+            raise FileNotFoundError(name)
+
+    data = io.BytesIO(read_bytes(file, LARGEST_FILE))
+    kind = file.suffix.lower().removeprefix(".")
+    return trimesh.load(data, file_type=kind, resolver=Beside(str(file)), force="scene", process=False)
+
+
+def mesh(shape: Shape) -> Any | None:
+    """A trimesh.Trimesh in the link's axes, coloured as the URDF or the file says; None if unreadable."""
+    import trimesh  # noqa: PLC0415
+
+    if shape.file is None:
+        return None
+    try:
+        whole = _read(shape.file).to_mesh().copy()
+    except Exception:
+        return None
+    if not isinstance(whole, trimesh.Trimesh) or not len(whole.faces):
+        return None
+    whole.apply_transform(shape.T_link_shape @ np.diag([*shape.size, 1.0]))
+    if shape.colour is not None:
+        whole.visual = trimesh.visual.ColorVisuals(whole, face_colors=[round(255 * x) for x in shape.colour])
+    elif shape.file.suffix.lower() == ".stl":
+        whole.visual = trimesh.visual.ColorVisuals(whole, face_colors=[round(255 * x) for x in GREY])
+    return whole
+
+
+#: The colour of what has none, as people expect metal.
+GREY = (0.72, 0.74, 0.78, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """One visual of a link.
+
+    Attributes:
+        link: The link's name.
+        kind: "box", "cylinder", "sphere" or "mesh".
+        size: Box: x, y, z; cylinder: radius, length; sphere: radius; mesh: scale x, y, z. Metres.
+        T_link_shape: (4, 4).
+        colour: Red, green, blue, opacity in 0 to 1; None leaves it to a mesh's own.
+        file: The mesh's file; None for the others, and where it cannot be found.
+    """
+
+    link: str
+    kind: str
+    size: tuple[float, ...]
+    T_link_shape: FloatArray
+    colour: tuple[float, float, float, float] | None
+    file: Path | None = None
+
+    @property
+    def missing(self) -> bool:
+        """Whether it is a mesh whose file is not there."""
+        return self.kind == "mesh" and self.file is None
+
+
+def shapes(robot: Robot) -> list[Shape]:
+    """Every visual of a robot that was loaded: its text passed every check, so that it can be read plainly.
+
+    What is malformed about a visual is skipped: it says nothing about motion.
+    """
+    root = plain_xml(robot.urdf)
+    beside = _file_of(robot)
+    materials = {m.get("name"): _rgba(m) for m in root.findall("material") if m.find("color") is not None}
+    found = []
+    for link in root.findall("link"):
+        for visual in link.findall("visual"):
+            shape = _shape(link.get("name", ""), visual, materials, beside)
+            if shape is not None:
+                found.append(shape)
+    return found
+
+
+def _file_of(robot: Robot) -> Path | None:
+    """The file a robot came from, beside which meshes are looked for."""
+    entry = catalogue().get(robot.source)
+    path = entry.path if entry is not None else Path(robot.source)
+    try:
+        return path if path.is_file() else None
+    except OSError:
+        return None
+
+
+def _shape(
+    link: str,
+    visual: Element,
+    materials: dict[str | None, tuple[float, float, float, float] | None],
+    beside: Path | None,
+) -> Shape | None:
+    geometry = visual.find("geometry")
+    if geometry is None or len(geometry) == 0:
+        return None
+    element, T = geometry[0], _pose(visual.find("origin"))
+    material = visual.find("material")
+    colour = None if material is None else _rgba(material) or materials.get(material.get("name"))
+    size = _size(element)
+    if T is None or size is None:
+        return None
+    file = mesh_file(element.get("filename", ""), beside) if element.tag == "mesh" else None
+    return Shape(link, element.tag, size, T, colour, file)
+
+
+def _size(element: Element) -> tuple[float, ...] | None:
+    names = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
+    if element.tag == "mesh":
+        return _numbers(element.get("scale", "1 1 1"), 3)
+    if element.tag not in names:
+        return None
+    words = " ".join(element.get(name, "") for name in names[element.tag])
+    return _numbers(words, 3 if element.tag == "box" else len(names[element.tag]))
+
+
+def _numbers(words: str, count: int) -> tuple[float, ...] | None:
+    try:
+        values = tuple(float(word) for word in words.split())
+    except ValueError:
+        return None
+    return values if len(values) == count and all(map(math.isfinite, values)) else None
+
+
+def _pose(origin: Element | None) -> FloatArray | None:
+    if origin is None:
+        return pose()
+    xyz, rpy = (_numbers(origin.get(name, "0 0 0"), 3) for name in ("xyz", "rpy"))
+    return None if xyz is None or rpy is None else pose(rotation_from_rpy(rpy), xyz)
+
+
+def _rgba(material: Element) -> tuple[float, float, float, float] | None:
+    color = material.find("color")
+    values = None if color is None else _numbers(color.get("rgba", ""), 4)
+    if values is None:
+        return None
+    r, g, b, a = (min(1.0, max(0.0, x)) for x in values)
+    return r, g, b, a
+
+
+def mesh_file(address: str, beside: Path | None) -> Path | None:
+    """The file of a mesh's address, or None: `package://`, `file://`, or a path beside the URDF."""
+    candidates = list(_candidates(address, beside))
+    try:
+        return next((path for path in candidates if path.is_file()), None)
+    except OSError:
+        return None
+
+
+def _candidates(address: str, beside: Path | None) -> Iterator[Path]:
+    if not address or "\0" in address:
+        return
+    if (parts := split_uri(address)) is not None:
+        # Some files write a third slash before the package's name.
+        name, path = parts if parts[0] else parts[1].partition("/")[::2]
+        package = find_package(name, beside)
+        if package is not None:
+            yield package / path
+    elif address.startswith("file://"):
+        yield Path(unquote(urlsplit(address).path))
+    elif "://" not in address:
+        yield (beside.parent if beside is not None else Path()) / address
