@@ -12,6 +12,7 @@ import pytest
 
 import urdfkin
 from tests.cli.running import urdfkin as run
+from tests.comparison.test_pairs import FOLLOWING
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Question, Verdict
 from urdfkin.robot import Robot
@@ -255,3 +256,10 @@ def test_a_link_that_moved_on_a_body_without_joints_is_a_difference() -> None:
     assert found.verdict is Verdict.DIFFERS
     assert found.worst is not None
     assert found.worst.lower == pytest.approx(0.5)
+
+
+def test_metres_that_are_only_bounded_are_given_as_a_bound() -> None:
+    words = headline(FOLLOWING.format(0.5, 0.1), FOLLOWING.format(0.5, 0.1 + 6e-13))
+    assert words.startswith("DIFFERS by up to ")
+    assert "0 m" not in words
+    assert "at most" in words

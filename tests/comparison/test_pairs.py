@@ -160,3 +160,25 @@ def test_standard_and_modified_rows_of_one_robot_are_the_same() -> None:
     found = urdfkin.same(*tables)
     assert found, found.differences
     assert all(line.startswith("frame ") for line in found.after)
+
+
+#: A joint that follows another one; multiplier and offset are to be filled in.
+FOLLOWING = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="k" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="j" multiplier="{}" offset="{}"/></joint>
+<joint name="e" type="fixed"><parent link="c"/><child link="d"/><origin xyz="0.3 0 0"/></joint></robot>"""
+
+
+def test_a_rule_that_differs_by_less_than_the_rounding_of_the_zeros_is_no_difference() -> None:
+    found = urdfkin.same(FOLLOWING.format(0.5, 0.1), FOLLOWING.format(0.5, 0.1 + 2.5e-13))
+    assert found.verdict is Verdict.SAME
+    worst = max(frame.radians for frame in found.frames)
+    assert 2.5e-13 < worst < 1e-12, "the rule's difference is part of the stated rounding"
+
+
+@pytest.mark.parametrize(("multiplier", "offset"), [(0.5, 0.1 + 1e-12), (0.5 + 1e-12, 0.1)])
+def test_a_rule_that_differs_by_more_than_that_is_a_difference(multiplier: float, offset: float) -> None:
+    found = urdfkin.same(FOLLOWING.format(0.5, 0.1), FOLLOWING.format(multiplier, offset))
+    assert found.verdict is Verdict.DIFFERS

@@ -243,8 +243,16 @@ class Comparator:
         ]
         ways += [WIDEST for step in found.steps if step.kind in ("planar", "floating")]
         reach = max(self.mechanisms[0].size, self.mechanisms[1].size) + sum(ways)
-        deepest = 1 + max((len(found.path(i)) for i in range(len(found.steps))), default=0)
-        return deepest * (self.tolerance.way + self.tolerance.angle * reach), deepest * self.tolerance.angle
+        slides, turns = (
+            sum(
+                pair.rounding
+                for step, pair in zip(found.steps, variables.pairs, strict=True)
+                if pair is not None and (step.kind == "prismatic") is slide
+            )
+            for slide in (True, False)
+        )
+        way, angle = found.deepest * self.tolerance.way, found.deepest * self.tolerance.angle + turns
+        return way + slides + angle * reach, angle
 
     def _intervals(self, found: Alignment, variables: Variables) -> tuple[Interval, ...]:
         frames = found.frames

@@ -100,7 +100,11 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
     if any(math.isinf(most) for _, _, most in parts):
         least = " and ".join(f"{words(low)} or more" for words, low, _ in parts if low)
         return f" by {least} (no bound is proven)" if least else ", and no bound is proven"
-    return f" by up to {' and '.join(up_to(*one) for one in parts)}" if parts else ""
+    seen_some = [up_to(*one) for one in parts if one[1] > 0.0]
+    bounded = [words(most) for words, low, most in parts if low <= 0.0]
+    texts = [f"up to {' and '.join(seen_some)}"] if seen_some else []
+    texts += [f"at most {' and '.join(bounded)}"] if bounded else []
+    return f" by {', and '.join(texts)}" if texts else ""
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:

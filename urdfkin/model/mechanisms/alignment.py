@@ -220,6 +220,11 @@ class Alignment:
         """The same as steps."""
         return [self.steps[i] for i in self.indices(previous)]
 
+    @property
+    def deepest(self) -> int:
+        """The most steps on a path, and one for the base."""
+        return 1 + max((len(self.indices(i)) for i in range(len(self.steps))), default=0)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gauge:

@@ -41,6 +41,8 @@ class Pair:
     b: Line
     #: What B's file calls the value: sense * b + offset.
     written: Line
+    #: Difference of the constants (rad or m) that counts as rounding, beyond that of one step.
+    rounding: float = 0.0
 
     @property
     def variable(self) -> str | None:
@@ -100,6 +102,7 @@ class _Maker:
         self.trees = found.a.tree, found.b.tree
         self.step_of_b = {step.b: i for i, step in enumerate(found.steps)}
         self.leaders = self._leaders()
+        self.deepest = found.deepest
 
     def _leaders(self) -> dict[str, Line]:
         """Each coordinate of B as a line in A's, or as a variable of its own: A's own coordinates first."""
@@ -153,21 +156,31 @@ class _Maker:
             follow = [
                 tree.joints[j].mimic is not None for tree, j in zip(self.trees, (step.a, step.b), strict=True)
             ]
+            beyond = 0.0
             if self._alike(a, b):
+                beyond = max(0.0, abs(a.constant - b.constant) - self._one_step(a))
                 b = a
             elif not step.unlike:
                 (
                     freer_a if follow == [False, True] else freer_b if follow == [True, False] else rules
                 ).append(i)
-            pairs.append(Pair(a, b, written))
+            pairs.append(Pair(a, b, written, beyond))
         ranges = self._ranges(pairs)
         return Variables(tuple(pairs), ranges, tuple(freer_a), tuple(freer_b), tuple(rules), self.leaders)
 
     def _alike(self, a: Line, b: Line) -> bool:
-        """Whether two lines differ by what is rounding; a slope counts for a turn or a metre."""
+        """Whether two lines differ by rounding only; a slope counts for a turn or a metre.
+
+        A rule's constant compares the zeros of two joints. Each zero is found from poses at the end of a path,
+        which are as inexact as all steps of the path together. A slope depends on no zero: the rounding of one
+        step is its bound.
+        """
         same = a.variable == b.variable or not (a.slope or b.slope)
-        off = abs(a.slope - b.slope), abs(a.constant - b.constant)
-        return same and max(off) <= self.tolerance.angle * max(1.0, abs(a.slope), abs(a.constant))
+        one = self._one_step(a)
+        return same and abs(a.slope - b.slope) <= one and abs(a.constant - b.constant) <= self.deepest * one
+
+    def _one_step(self, line: Line) -> float:
+        return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[Pair | None]) -> dict[str, tuple[float, float]]:
         """The limits of each coordinate, in both models where it moves both; A's where they share nothing.
