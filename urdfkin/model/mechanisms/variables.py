@@ -171,9 +171,9 @@ class _Maker:
     def _alike(self, a: Line, b: Line) -> bool:
         """Whether two lines differ by rounding only; a slope counts for a turn or a metre.
 
-        A rule's constant compares the zeros of two joints. Each zero is found from poses at the end of a path,
-        which are as inexact as all steps of the path together. A slope depends on no zero: the rounding of one
-        step is its bound.
+        A rule's constant compares the zeros of two joints. Each zero is found from poses at the end of a
+        path, which are as inexact as all steps of the path together. A slope depends on no zero: the
+        rounding of one step is its bound.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._one_step(a)
