@@ -49,18 +49,14 @@ from urdfkin.urdf.sources import Origin
 
 #: Where a user's numbers pass on their way to the result, and on their way to Pinocchio.
 MODULES = (
-    "verify.asked", "verify.call", "model.chain", "model.configuration", "model.coupling", "dh.to_tree",
-    "model.given", "verify.followers", "model.frame_names", "verify.made_of_table",
-    "kinematics.bodies.representation",
-    "verify.pinocchio", "verify.pinocchio_base", "verify.pinocchio_frames", "verify.pinocchio_layout",
-    "model.base_motion", "compiled.batch", "compiled.evaluate", "compiled.plan", "compiled.program",
-    "model.reference", "robot", "kinematics.rotation.aligning", "kinematics.inputs",
-    "kinematics.rotation.euler", "kinematics.rotation.euler_rates", "kinematics.rotation.nearest",
-    "kinematics.rotation.quaternion", "kinematics.rotation.quaternion_rates", "model.tree", "urdf.reader",
-    "urdf.skeleton", "urdf.writer", "verify.bounds", "verify.analytical", "verify.certificate",
-    "verify.choosing", "verify.line_of_nodes",
-    "verify.magnitudes", "verify.quantities", "verify.tables",
-    "verify.verifier",
+    "verify.oracle_query", "verify.call", "model.chain", "model.configuration", "model.mimic",
+    "dh.convert", "model.configuration_like", "verify.pinocchio_inputs", "model.frame_names",
+    "verify.table_check", "kinematics.bodies", "verify.pinocchio", "model.base_motion", "compiled.batch",
+    "compiled.evaluate", "compiled.plan", "compiled.program", "model.reference", "robot",
+    "kinematics.rotation.matrix", "kinematics.inputs", "kinematics.rotation.euler",
+    "kinematics.rotation.quaternion", "model.tree", "urdf.reader", "urdf.writer", "verify.bounds",
+    "verify.derived", "verify.certificate", "verify.sampling", "verify.analytical_reference",
+    "verify.quantities", "verify.tables", "verify.verifier",
 )  # fmt: skip
 
 #: A result is the right one when it is off by less than this share of the largest number.
