@@ -116,7 +116,8 @@ def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
 def test_a_worker_ends_at_the_end_of_its_pipe_alone(tmp_path: Path) -> None:
     """Where the kernel does not do it: the parent lives, the pipe has ended."""
     code = (
-        "import os, sys, time; from multiprocessing import Pipe; from urdfkin.validation import worker_processes as worker\n"
+        "import os, sys, time; from multiprocessing import Pipe\n"
+        "from urdfkin.validation import worker_processes as worker\n"
         "ours, theirs = Pipe()\n"
         "child = os.fork()\n"
         "if not child:\n"
