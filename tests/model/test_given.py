@@ -68,20 +68,20 @@ def test_every_way_of_writing_means_the_same_numbers_to_the_bit(text: Any, arm: 
         ("0,0,0,0", "load with mimic=False"),
         ("shoulder=1,lift=0", "q: no value for elbow; name it too, or begin with a pose"),
         ("elbo=1,shoulder=1,lift=0", "unknown coordinate 'elbo'; did you mean elbow?"),
-        ("echo=1,elbow=1,shoulder=1,lift=0", "'echo' is no coordinate; it follows elbow: give that"),
+        ("echo=1,elbow=1,shoulder=1,lift=0", "'echo' is no coordinate; it mimics elbow: give that joint's value"),
         ("elbow=1,elbow=2,shoulder=1,lift=0", "found 'elbow' twice"),
         ("0.1,shoulder=1,elbow=1", "q: unknown pose '0.1'"),
         ("neutral,0,0", "q, lift: not a finite number: found 'neutral'"),
-        ("0,0,5mm", "q, elbow: a unit that does not fit: found '5mm'; it is in rad or deg"),
-        ("pi,0,0", "q, lift: a unit that does not fit: found 'pi'; it is in m or mm"),
-        ("0,0,1 deg/s", "q, elbow: a unit that does not fit"),
+        ("0,0,5mm", "q, elbow: wrong unit: found '5mm'; use rad or deg"),
+        ("pi,0,0", "q, lift: wrong unit: found 'pi'; use m or mm"),
+        ("0,0,1 deg/s", "q, elbow: wrong unit"),
         ("0,0,1-2", "q, elbow: not a finite number: found '1-2'"),
         ("0,0,1/0", "q, elbow: not a finite number"),
         ("0,0,30dge", "q, elbow: not a finite number: found '30dge'; write 0.5, 30deg, pi/2 or 5mm"),
         ("rady", "q: unknown pose 'rady'; did you mean ready"),
         ({}, "q: no value for lift, shoulder, elbow"),
         ({"lift": [0.0, 1.0], "shoulder": [0.0] * 3, "elbow": 0}, "q: batches of different shapes"),
-        ({1: 0.0}, "q: a coordinate is called by its name: found 1"),
+        ({1: 0.0}, "q: the name of a coordinate must be text: found 1"),
         ({"lift": None, "shoulder": 0, "elbow": 0}, "q, lift must be real numbers: found None"),
     ],
 )  # fmt: skip
@@ -107,7 +107,7 @@ def test_rates_take_their_unit_with_the_seconds_or_without(arm: Robot) -> None:
             "ready", f"neutral,shoulder={rate},elbow=0.1", f"neutral,elbow={second}", "e"
         )
         np.testing.assert_array_equal(found, arm.acceleration("ready", v, a, "e"))
-    with pytest.raises(InputError, match="v, elbow: a unit that does not fit: found '1 rad/s"):
+    with pytest.raises(InputError, match="v, elbow: wrong unit: found '1 rad/s"):
         arm.velocity("ready", "neutral,elbow=1 rad/s^2", "e")
 
 
@@ -168,7 +168,7 @@ def test_a_prepared_frame_and_a_table_take_them_too(arm: Robot) -> None:
     np.testing.assert_array_equal(table.placement(text), table.placement(Q))
     with pytest.raises(InputError, match="no value for lift, shoulder"):
         table.placement({"elbow": 1.0})
-    with pytest.raises(InputError, match="lift: a unit that does not fit"):
+    with pytest.raises(InputError, match="lift: wrong unit"):
         table.placement("lift=5deg, shoulder=0, elbow=0")
 
 
@@ -286,8 +286,8 @@ def test_labels_that_only_count_stand_for_the_order(arm: Robot) -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (Series([1.25, 0.1, -0.5], [2, 0, 1]), "a coordinate is called by its name: found 2"),
-        (Series([0.1, -0.5, 1.25], ["lift", "shoulder", "lift"]), "q: a label stands twice: found 'lift'"),
+        (Series([1.25, 0.1, -0.5], [2, 0, 1]), "the name of a coordinate must be text: found 2"),
+        (Series([0.1, -0.5, 1.25], ["lift", "shoulder", "lift"]), "q: a label occurs twice: found 'lift'"),
         ([Series([1.25, 0.1, -0.5], SHUFFLED)] * 2, "q: a list of tables with labels"),
     ],
     ids=["numbers in another order", "a label twice", "a list of them"],

@@ -52,7 +52,7 @@ def test_an_unknown_frame_offers_the_nearest_names(hand: KinematicTree) -> None:
 
 def test_a_name_of_a_link_and_of_a_joint_elsewhere_must_be_told_apart() -> None:
     tree = build_tree("r", "a", [(joint("b"), "a", "c"), (joint("d"), "c", "b")])
-    with pytest.raises(InputError, match=r"say 'link:b' or 'joint:b'"):
+    with pytest.raises(InputError, match=r"write 'link:b' or 'joint:b'"):
         tree.frame_link("b")
     assert (tree.frame_link("link:b"), tree.frame_link("joint:b")) == (2, 1)
     assert [tree.frame_name(link) for link in range(3)] == ["a", "c", "link:b"]

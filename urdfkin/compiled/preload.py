@@ -41,7 +41,7 @@ def _on_disk(name: str) -> bool:
 
 def _compile_elsewhere(names: Sequence[str]) -> subprocess.Popen[bytes]:
     """Another interpreter that does nothing but compile; what it fails to do is done here after all."""
-    code = f"from urdfkin.compiled import ahead; ahead._compile({tuple(names)!r})"
+    code = f"from urdfkin.compiled import preload; preload._compile({tuple(names)!r})"
     return subprocess.Popen(
         own_python(code),
         stdin=subprocess.DEVNULL,
