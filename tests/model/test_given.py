@@ -68,7 +68,7 @@ def test_every_way_of_writing_means_the_same_numbers_to_the_bit(text: Any, arm: 
         ("0,0,0,0", "load with mimic=False"),
         ("shoulder=1,lift=0", "q: no value for elbow; name it too, or begin with a pose"),
         ("elbo=1,shoulder=1,lift=0", "unknown coordinate 'elbo'; did you mean elbow?"),
-        ("echo=1,elbow=1,shoulder=1,lift=0", "'echo' is no coordinate; it mimics elbow: give that joint's value"),
+        ("echo=1,elbow=1,shoulder=1,lift=0", "'echo' is no coordinate; it mimics elbow: give that value"),
         ("elbow=1,elbow=2,shoulder=1,lift=0", "found 'elbow' twice"),
         ("0.1,shoulder=1,elbow=1", "q: unknown pose '0.1'"),
         ("neutral,0,0", "q, lift: not a finite number: found 'neutral'"),
@@ -152,7 +152,7 @@ def test_a_q_of_pinocchios_length_is_told_what_makes_it_one_of_ours() -> None:
         with pytest.raises(InputError, match=rf"robot.from_pinocchio\(q, {word}\)"):
             robot.placement(np.zeros(length), "e")
     for call in (robot.velocity, robot.jacobian_rate):
-        with pytest.raises(InputError, match="Pinocchio's v has that length: mimic joints follow"):
+        with pytest.raises(InputError, match="Pinocchio's v has that length: leave out the mimic joints"):
             call(robot.neutral(), np.zeros(4), "e")
     with pytest.raises(InputError, match=r"mimic=True is for one of buildModelFromUrdf\(..., mimic=True\)"):
         robot.from_pinocchio(np.zeros(5))

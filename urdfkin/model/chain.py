@@ -66,7 +66,7 @@ class FrameChain(Displayable):
         T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base if no joint moves).
         lengths: (n + 1,) path lengths between joint origins, m, summed over the folded fixed joints. Entry k
             bounds the distance from joint k's origin to the next, for any rotations.
-        folded: (n + 1,) number of URDF joints, fixed ones too, whose poses each constant is a product of.
+        folded: (n + 1,) number of URDF joint poses, fixed joints' too, that are multiplied in each constant.
     """
 
     robot: str

@@ -100,7 +100,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
     """Return the joints without a coordinate, each with a hint for the message."""
     return {
         joint.name: Hint(
-            f"it mimics {joint.mimic.leader}: give that joint's value, or load with mimic=False (--no-mimic)",
+            f"it mimics {joint.mimic.leader}: give that value, or load with mimic=False (--no-mimic)",
             Question.MIMIC_JOINTS,
         )
         if joint.mimic
@@ -114,7 +114,7 @@ def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
     """Return Pinocchio's lengths where they differ from urdfkin's, each with a hint for the message."""
     follow = any(joint.mimic for joint in tree.joints)
     free = Hint(
-        "a mimic joint has no coordinate: leave it out, or load with mimic=False (--no-mimic)",
+        "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
         Question.MIMIC_JOINTS,
     )
     of_followers = sum(joint.kind.nv for joint in tree.joints if joint.mimic)

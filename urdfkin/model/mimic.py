@@ -66,7 +66,7 @@ class Coupling:
         # A mimicked joint that is not on the path may be of any kind: its unit is unknown here.
         own = tuple(map(units.get, self.names))
         follow = {
-            joint: Hint(f"it mimics {mimic.leader}: give that joint's value", Question.MIMIC_JOINTS)
+            joint: Hint(f"it mimics {mimic.leader}: give that value", Question.MIMIC_JOINTS)
             for joint, mimic, _ in rules
             if mimic
         }

@@ -1,8 +1,8 @@
 """Joint zeros that only mimic rules determine, because no axis and no link frame does.
 
-A rule v = m w + c of A and a rule v' = m' w' + c' of B are equivalent if v' = s v + o and w' = s' w + o' turn
-one into the other. If nothing is attached to a joint's link, its offset o is free, and the rule determines
-it. For a revolute joint o is free by full turns in any case.
+Let v = m w + c be a rule of A and v' = m' w' + c' one of B. They are equivalent if v' = s v + o and
+w' = s' w + o' turn one into the other. If nothing is attached to a joint's link, its offset o is free, and
+the rule determines it. For a revolute joint o is free by full turns in any case.
 """
 
 from __future__ import annotations

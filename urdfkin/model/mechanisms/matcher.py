@@ -518,7 +518,7 @@ def better(score: Score, than: Score) -> bool:
 
 
 def _value_of(screw: Screw, T: FloatArray, *, turns: bool) -> float:
-    """Return the value of a joint whose motion is the rigid motion T."""
+    """Return the value at which a joint makes the rigid motion T."""
     if turns:
         return turn_about(screw.direction, T[:3, :3])
     return float(screw.direction @ T[:3, 3])

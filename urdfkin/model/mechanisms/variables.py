@@ -57,9 +57,9 @@ class Variables:
     Attributes:
         pairs: For each step; None for planar and floating joints.
         ranges: Of each variable, rad or m; infinite without a limit.
-        freer_a: Steps (indices) whose joint is independent in A and a mimic joint in B.
-        freer_b: Steps (indices) whose joint is independent in B and a mimic joint in A.
-        rules: Steps whose mimic rules differ.
+        freer_a: Steps (indices) with a joint that is independent in A and a mimic joint in B.
+        freer_b: Steps (indices) with a joint that is independent in B and a mimic joint in A.
+        rules: Steps (indices) with different mimic rules in A and B.
         leaders: B's coordinates, by joint name.
     """
 
