@@ -64,11 +64,11 @@ def test_every_way_of_writing_means_the_same_numbers_to_the_bit(text: Any, arm: 
     ("text", "message"),
     [
         ("0,0", "q: 3 numbers are expected (lift, shoulder, elbow): found 2, none for elbow"),
-        ("0,0,0,0", "Pinocchio's q has that length: robot.from_pinocchio(q, mimic=False) gives urdfkin's"),
+        ("0,0,0,0", "Pinocchio's q has that length: robot.from_pinocchio(q, mimic=False) converts it to urdfkin's"),
         ("0,0,0,0", "load with mimic=False"),
         ("shoulder=1,lift=0", "q: no value for elbow; name it too, or begin with a pose"),
         ("elbo=1,shoulder=1,lift=0", "unknown coordinate 'elbo'; did you mean elbow?"),
-        ("echo=1,elbow=1,shoulder=1,lift=0", "'echo' is no coordinate; it mimics elbow: give that value"),
+        ("echo=1,elbow=1,shoulder=1,lift=0", "'echo' is not a coordinate; it mimics elbow: give that value"),
         ("elbow=1,elbow=2,shoulder=1,lift=0", "found 'elbow' twice"),
         ("0.1,shoulder=1,elbow=1", "q: unknown pose '0.1'"),
         ("neutral,0,0", "q, lift: not a finite number: found 'neutral'"),
@@ -80,7 +80,7 @@ def test_every_way_of_writing_means_the_same_numbers_to_the_bit(text: Any, arm: 
         ("0,0,30dge", "q, elbow: not a finite number: found '30dge'; write 0.5, 30deg, pi/2 or 5mm"),
         ("rady", "q: unknown pose 'rady'; did you mean ready"),
         ({}, "q: no value for lift, shoulder, elbow"),
-        ({"lift": [0.0, 1.0], "shoulder": [0.0] * 3, "elbow": 0}, "q: batches of different shapes"),
+        ({"lift": [0.0, 1.0], "shoulder": [0.0] * 3, "elbow": 0}, "q: the batches have different shapes"),
         ({1: 0.0}, "q: the name of a coordinate must be text: found 1"),
         ({"lift": None, "shoulder": 0, "elbow": 0}, "q, lift must be real numbers: found None"),
     ],
@@ -154,7 +154,9 @@ def test_a_q_of_pinocchios_length_is_told_what_makes_it_one_of_ours() -> None:
     for call in (robot.velocity, robot.jacobian_rate):
         with pytest.raises(InputError, match="Pinocchio's v has that length: leave out the mimic joints"):
             call(robot.neutral(), np.zeros(4), "e")
-    with pytest.raises(InputError, match=r"mimic=True is for one of buildModelFromUrdf\(..., mimic=True\)"):
+    with pytest.raises(
+        InputError, match=r"use mimic=True for a model of buildModelFromUrdf\(..., mimic=True\)"
+    ):
         robot.from_pinocchio(np.zeros(5))
 
 
@@ -177,7 +179,7 @@ def test_no_moving_joint_takes_no_number() -> None:
     nothings: list[Any] = ["", "[]", "neutral", "ready", {}]
     for nothing in nothings:
         assert q_of(robot, nothing) == []
-    with pytest.raises(InputError, match="none: nothing moves"):
+    with pytest.raises(InputError, match="none: no joint moves"):
         q_of(robot, "0")
 
 

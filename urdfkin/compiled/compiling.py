@@ -141,7 +141,7 @@ class _Part(_Library):  # type: ignore[misc]
     """LLVM code of a function, to be linked into a kernel together with the functions that it calls."""
 
     def finalize(self) -> None:
-        """Do nothing: a part is completed in the kernel that contains it."""
+        """Complete the library without machine code of its own."""
         self._finalize_dynamic_globals()
         self._finalized = True
 

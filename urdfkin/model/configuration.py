@@ -124,7 +124,7 @@ def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
             length = _pinocchio_length(tree, mimic=mimic)
             asks = f", mimic={mimic}" if follow else ""
             found[length] = Hint(
-                f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) gives urdfkin's",
+                f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) converts it to urdfkin's",
                 Question.CONTINUOUS_JOINTS,
             )
         if follow:
@@ -205,7 +205,7 @@ def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
         return places(tree, what).read(named)
     array, width = floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv
     if array.shape[-1:] != (width,):
-        names = ", ".join(_names(tree, what)) or "none, nothing moves"
+        names = ", ".join(_names(tree, what)) or "none, no joint moves"
         instead = _other_lengths(tree, what).get(array.shape[-1]) if array.ndim else None
         raise InputError(
             f"{what} needs {width} numbers for {tree.name}: {names}",
@@ -342,7 +342,7 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
             "a Pinocchio configuration has the wrong length",
             where=tree.name,
             found=f"{q.shape}, expected (..., {length})",
-            remedy=f"mimic={not mimic} is for one of buildModelFromUrdf(..., mimic={not mimic})"
+            remedy=f"use mimic={not mimic} for a model of buildModelFromUrdf(..., mimic={not mimic})"
             if other
             else None,
             question=Question.MIMIC_JOINTS if other else Question.CONTINUOUS_JOINTS,
@@ -390,6 +390,6 @@ def _check_mimic_rule(joint: Joint, leader: FloatArray, values: FloatArray) -> N
             f"the mimic joint must be {rule.multiplier:g} * {rule.leader} + {rule.offset:g}",
             where=f"joint {joint.name}",
             found=f"it is off by {np.abs(off).max():.3g}",
-            remedy="load with mimic=False to move it freely",
+            remedy="load with mimic=False to give it its own coordinate",
             question=Question.MIMIC_JOINTS,
         )

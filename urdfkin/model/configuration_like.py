@@ -138,7 +138,9 @@ keeps: 'neutral, elbow=...'
         try:
             shape = np.broadcast_shapes(*shapes)
         except ValueError:
-            raise InputError("batches of different shapes", where=where, found=safe_repr(shapes)) from None
+            raise InputError(
+                "the batches have different shapes", where=where, found=safe_repr(shapes)
+            ) from None
         out = np.empty((*shape, len(self.names)))
         out[...] = 0.0 if rest is None else rest
         for i, x in found.items():
@@ -151,7 +153,7 @@ keeps: 'neutral, elbow=...'
         if not isinstance(name, str):
             raise InputError(f"the name of a {kind} must be text", where=where, found=safe_repr(name))
         if (instead := self.otherwise().get(name)) is not None:
-            raise InputError(f"{name!r} is no {kind}", where=where, **instead._asdict())
+            raise InputError(f"{name!r} is not a {kind}", where=where, **instead._asdict())
         if name not in self.spans:
             raise UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
         at, size = self.spans[name]
@@ -213,10 +215,10 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
     if isinstance(value, list | tuple):
         if any(_labels(item) for item in value):
             raise InputError(
-                "a list of tables with labels",
+                "a list of tables with labels is not accepted",
                 where=where,
                 found=f"{len(value)} of them",
-                remedy="give one table of them all, or numbers in order",
+                remedy="give one table, or numbers in order",
             )
         return None
     labels = _labels(value)
@@ -248,7 +250,7 @@ def wrong_count(
     """Return the error for a wrong count of numbers."""
     without = f", none for {listed(names[count:])}" if count < len(names) else ""
     return InputError(
-        f"{len(names)} numbers are expected ({listed(names) or 'none: nothing moves'})",
+        f"{len(names)} numbers are expected ({listed(names) or 'none: no joint moves'})",
         where=where,
         found=f"{count}{without}",
         remedy=remedy,

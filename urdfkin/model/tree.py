@@ -208,9 +208,9 @@ class KinematicTree:
         leader = self.joints[self.joint_index(mimic.leader)]
         if leader.mimic is not None or leader.kind.nq != 1 or joint.kind.nq != 1:
             raise InputError(
-                "a mimic joint and its mimicked joint need one coordinate each, and no chain of mimic joints",
+                "a joint with one coordinate can mimic only an independent joint with one coordinate",
                 where=f"joint {joint.name}",
-                found=f"{joint.kind.value} following {leader.kind.value} {leader.name}",
+                found=f"{joint.kind.value} mimicking {leader.kind.value} {leader.name}",
             )
 
     # -- coordinates ---------------------------------------------------------------------------------
@@ -301,7 +301,7 @@ class KinematicTree:
             InputError: a link and a joint at different places share the name.
         """
         if not isinstance(name, str):
-            raise InputError("a frame is the name of a link or joint", where=self.name, found=safe_repr(name))
+            raise InputError("the name of a frame must be text", where=self.name, found=safe_repr(name))
         if isinstance(name, FrameName):
             return self._frame_index(name)
         link, joint = self._link_index.get(name), self._joint_index.get(name)
