@@ -82,16 +82,16 @@ class FrameChain(Displayable):
 
     def _sheet(self) -> TextDocument:
         heads = ("joint", "kind", "lower", "upper", "x", "y", "z", "axis x", "axis y", "axis z")
-        stand = zip(self.joints, self.origins().tolist(), self.axes().tolist(), strict=False)
+        geometry = zip(self.joints, self.origins().tolist(), self.axes().tolist(), strict=False)
         rows = [
             (
                 joint.name,
-                " ".join([joint.kind.value, *["backwards"] * joint.backwards, *_follows(joint)]),
+                " ".join([joint.kind.value, *["backwards"] * joint.backwards, *_rule_text(joint)]),
                 *("" if joint.limit is None else f"{x:.6g}" for x in _bounds(joint.limit)),
                 *origin,
                 *axis,
             )
-            for joint, origin, axis in stand
+            for joint, origin, axis in geometry
         ]
         x, y, z = (self.origins()[-1].round(12) + 0.0).tolist()
         return TextDocument(
@@ -157,7 +157,7 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(np.diff(self.origins(q), axis=-2))
 
 
-def _follows(joint: ChainJoint) -> list[str]:
+def _rule_text(joint: ChainJoint) -> list[str]:
     """Return the mimic rule of a joint as text, in a list; empty without a rule."""
     return [f"= {joint.mimic}"] if joint.mimic else []
 
@@ -182,7 +182,7 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0
     lengths, folded, count = list[float](), list[int](), 0
     for joint, backwards in steps_between(tree, tip, base_name):
-        _refuse_many_coordinates(tree, joint, base_name, tip)
+        _check_single_axis(tree, joint, base_name, tip)
         to_joint, from_joint = _poses_around(joint, backwards)
         A = A @ to_joint
         length += 0.0 if backwards else _norm(joint)
@@ -241,7 +241,7 @@ def _norm(joint: Joint) -> float:
     return math.hypot(*joint.T_parent_joint[:3, 3])
 
 
-def _refuse_many_coordinates(tree: KinematicTree, joint: Joint, base: str, tip: str) -> None:
+def _check_single_axis(tree: KinematicTree, joint: Joint, base: str, tip: str) -> None:
     if joint.kind not in (JointKind.PLANAR, JointKind.FLOATING):
         return
     child = tree.links[tree.joint_index(joint.name) + 1]
