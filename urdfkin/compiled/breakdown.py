@@ -198,8 +198,8 @@ def _contributions(
     of_base = _rigid(base, levers[:, 0])
     if reference is Reference.LOCAL:
         back = Ts[:, -1, :3, :3].swapaxes(-1, -2)
-        of_base = _turned(back, of_base)
-        terms[...] = _turned(back[:, np.newaxis, np.newaxis], terms)
+        of_base = _rotate(back, of_base)
+        terms[...] = _rotate(back[:, np.newaxis, np.newaxis], terms)
     if not (np.isfinite(of_base).all() and np.isfinite(terms).all()):
         raise RangeError(
             "a part of the acceleration leaves the range of double precision", remedy="give smaller numbers"
@@ -263,7 +263,7 @@ def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)
 
 
-def _turned(R: FloatArray, six: FloatArray) -> FloatArray:
+def _rotate(R: FloatArray, six: FloatArray) -> FloatArray:
     pairs = six.reshape(*six.shape[:-1], 2, 3)
     turned: FloatArray = (R[..., np.newaxis, :, :] @ pairs[..., np.newaxis])[..., 0]
     return turned.reshape(six.shape)

@@ -57,7 +57,7 @@ class How(TypedDict, total=False):
 def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[How]) -> FloatArray:
     """Return T_world_frame (n, frames, 4, 4): 7.77 with the rotations."""
     program = program_of(plan, turned=True)
-    return _computed(_cores().placements, plan, program, [q], _ALIGNED, (4, 4), **how)
+    return _compute(_cores().placements, plan, program, [q], _ALIGNED, (4, 4), **how)
 
 
 def velocities(
@@ -66,7 +66,7 @@ def velocities(
     """Return velocities (n, frames, 6), [linear; angular]: 7.127, 7.128."""
     local = reference is Reference.LOCAL
     core = _cores().local_velocities if local else _cores().velocities
-    return _computed(core, plan, program_of(plan, turned=local), [q, v], reference, (6,), **how)
+    return _compute(core, plan, program_of(plan, turned=local), [q, v], reference, (6,), **how)
 
 
 def accelerations(
@@ -80,7 +80,7 @@ def accelerations(
     """Return classical accelerations (n, frames, 6), [linear; angular]: 7.129, 7.130."""
     local = reference is Reference.LOCAL
     core = _cores().local_accelerations if local else _cores().accelerations
-    return _computed(core, plan, program_of(plan, turned=local), [q, v, a], reference, (6,), **how)
+    return _compute(core, plan, program_of(plan, turned=local), [q, v, a], reference, (6,), **how)
 
 
 def jacobians(
@@ -88,7 +88,7 @@ def jacobians(
 ) -> FloatArray:
     """Return Jacobians (n, frames, 6, nv): 7.85."""
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
-    return _computed(_cores().jacobians, plan, program, [q], reference, (6, plan.nv), **how)
+    return _compute(_cores().jacobians, plan, program, [q], reference, (6, plan.nv), **how)
 
 
 def jacobian_rates(
@@ -96,7 +96,7 @@ def jacobian_rates(
 ) -> FloatArray:
     """Return time derivatives of the Jacobians (n, frames, 6, nv): the J-dot of 7.126."""
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
-    return _computed(_cores().jacobian_rates, plan, program, [q, v], reference, (6, plan.nv), **how)
+    return _compute(_cores().jacobian_rates, plan, program, [q, v], reference, (6, plan.nv), **how)
 
 
 def hessians(
@@ -104,7 +104,7 @@ def hessians(
 ) -> FloatArray:
     """Return derivatives of the Jacobians (n, frames, 6, nv, nv): [..., i, j] of column i by velocity j."""
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True, pairs=True)
-    return _computed(_cores().hessians, plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
+    return _compute(_cores().hessians, plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
 
 
 def imus(
@@ -123,10 +123,10 @@ def imus(
     """
     how["base"] = against_gravity(how.get("base", STILL_STATE), gravity)
     program = program_of(plan, turned=True)
-    return _computed(_cores().imus, plan, program, [q, v, a], Reference.LOCAL, (6,), **how)
+    return _compute(_cores().imus, plan, program, [q, v, a], Reference.LOCAL, (6,), **how)
 
 
-def _computed(
+def _compute(
     core: Core,
     plan: CompiledTree,
     program: Program,
@@ -146,7 +146,7 @@ def _computed(
     """
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
-    inputs = [x[:1] if _is_the_same_for_all(x) else x for x in inputs]
+    inputs = [x[:1] if _is_broadcast(x) else x for x in inputs]
     staged = is_staged(out)
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
@@ -156,7 +156,7 @@ def _computed(
         return outcome
 
     if in_blocks(compute, [base, *inputs], out, threads) or plan.is_large or _is_large(base):
-        _demand_finite([base, *inputs], out)
+        _check_finite([base, *inputs], out)
     return out
 
 
@@ -194,7 +194,7 @@ def task_of(
     return task, (memory, stage)
 
 
-def _is_the_same_for_all(x: FloatArray) -> bool:
+def _is_broadcast(x: FloatArray) -> bool:
     """Return whether all rows are one row that was broadcast."""
     return len(x) > 1 and x.strides[0] == 0
 
@@ -203,7 +203,7 @@ def _is_large(base: FloatArray) -> bool:
     return base is not STILL_STATE and not float(np.abs(base).max(initial=0.0)) < LARGE
 
 
-def _demand_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
+def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
     """Raise an error for non-finite inputs or results; called only if an input is not ordinary."""
     if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")

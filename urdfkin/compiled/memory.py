@@ -125,7 +125,7 @@ def _piece(builder: Any, vector: Any, start: int, width: int) -> Any:
     return builder.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), mask)
 
 
-def _joined(builder: Any, pieces: Sequence[Any]) -> Any:
+def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
     """Concatenate vectors of equal width; their number is a power of two."""
     while len(pieces) > 1:
         width = 2 * pieces[0].type.count
@@ -134,7 +134,7 @@ def _joined(builder: Any, pieces: Sequence[Any]) -> Any:
     return pieces[0]
 
 
-def _transposed(builder: Any, vectors: Sequence[Any]) -> list[Any]:
+def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
     """Transpose square blocks, which are side by side in the vectors.
 
     For w = 1, 2, 4: in each block of 2w by 2w, exchange the upper right and the lower left w by w block.
@@ -160,7 +160,7 @@ def _plus(builder: Any, number: Any, constant: int) -> Any:
     return builder.add(number, ir.Constant(number.type, constant))
 
 
-def _reading(width: int) -> Any:
+def _make_reader(width: int) -> Any:
     """Return a function that reads `width` numbers of each of eight configurations into rows."""
 
     @intrinsic
@@ -171,7 +171,7 @@ def _reading(width: int) -> Any:
             for _ in range(LANES):
                 pieces.append(builder.load(_vector_at(builder, x, at, width), align=8))
                 at = builder.add(at, stride)
-            rows = _transposed(builder, [_joined(builder, pieces[i::width]) for i in range(width)])
+            rows = _transpose_blocks(builder, [_concatenate(builder, pieces[i::width]) for i in range(width)])
             to = builder.mul(row, ir.Constant(row.type, LANES))
             for i, vector in enumerate(rows):
                 place = _vector_at(builder, s, _plus(builder, to, LANES * i), LANES)
@@ -183,7 +183,7 @@ def _reading(width: int) -> Any:
     return read
 
 
-def _writing(width: int) -> Any:
+def _make_writer(width: int) -> Any:
     """Return a function that writes `width` rows, with any indices, to the memory of eight configurations."""
 
     @intrinsic
@@ -195,7 +195,7 @@ def _writing(width: int) -> Any:
                 row = builder.load(builder.gep(rows, [_plus(builder, first, i)]))
                 begin = builder.mul(row, ir.Constant(row.type, LANES))
                 vectors.append(builder.load(_vector_at(builder, s, begin, LANES), align=64))
-            blocks = _transposed(builder, vectors)
+            blocks = _transpose_blocks(builder, vectors)
             for k in range(LANES):
                 numbers = _piece(builder, blocks[k % width], k // width * width, width)
                 builder.store(numbers, _vector_at(builder, to, at, width), align=8)
@@ -208,8 +208,8 @@ def _writing(width: int) -> Any:
     return write
 
 
-_read_8, _read_4, _read_2, _read_1 = map(_reading, (8, 4, 2, 1))
-_write_8, _write_4, _write_2, _write_1 = map(_writing, (8, 4, 2, 1))
+_read_8, _read_4, _read_2, _read_1 = map(_make_reader, (8, 4, 2, 1))
+_write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 
 
 @compiled

@@ -242,7 +242,7 @@ def _lower_add(context: Any, builder: Any, signature: Any, arguments: Any) -> An
     return builder.fadd(x.number(width), y.number(width))
 
 
-def _negated(context: Any, builder: Any, x: _Value) -> Any:
+def _negate(context: Any, builder: Any, x: _Value) -> Any:
     if isinstance(x.type, Known):
         return context.get_dummy_value()
     if x.is_product:
@@ -258,7 +258,7 @@ def _lower_sub(context: Any, builder: Any, signature: Any, arguments: Any) -> An
     if _known(y.type, 0):
         return x.value
     if _known(x.type, 0):
-        return _negated(context, builder, y)
+        return _negate(context, builder, y)
     width = signature.return_type.width
     if y.is_product:
         first, second = y.factors()
@@ -270,7 +270,7 @@ def _lower_sub(context: Any, builder: Any, signature: Any, arguments: Any) -> An
 
 def _lower_neg(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     (x,) = _values(context, builder, signature, arguments)
-    return _negated(context, builder, x)
+    return _negate(context, builder, x)
 
 
 _KINDS = (Lanes, Product, Known, types.Integer)
@@ -285,11 +285,11 @@ for _x in (Lanes, Product, Known):
     lower_builtin(operator.neg, _x)(_lower_neg)
 
 
-def _multiplied(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
+def _multiply(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
     return _Value(context, builder, fromty, value).number(toty.width)
 
 
-lower_cast(Product, Lanes)(_multiplied)
+lower_cast(Product, Lanes)(_multiply)
 
 
 def _known_number(kind: Known) -> Any:

@@ -198,7 +198,7 @@ class _Writer:
             op = Op.CARRY_X + along[0] if len(along) == 1 else Op.CARRY
             self._put(Op(op), at=self._constants(*p))
         if turned and (np.eye(3) != R).any():
-            about = [axis for axis in range(3) if _leaves_alone(R, axis)]
+            about = [axis for axis in range(3) if _is_rotation_about(R, axis)]
             self._put(Op(Op.TURN_X + about[0]) if about else Op.TURN, at=self._constants(*R.ravel()))
         return len(self.code) > before
 
@@ -236,7 +236,7 @@ class _Writer:
         if self.columns:
             self._columns(f)
             sources = len(self.head) + len(self.lists)
-            self.lists += self._paired(f) if self.pairs else self._sources(f, self.results)
+            self.lists += self._pairs(f) if self.pairs else self._sources(f, self.results)
         self._put(Op.EMIT, int(plan.frames[f, 1]), sources)
         return moved
 
@@ -259,7 +259,7 @@ class _Writer:
         found: list[int] = sources.ravel().tolist()
         return found
 
-    def _paired(self, f: int) -> list[int]:
+    def _pairs(self, f: int) -> list[int]:
         """Return the number of the frame's columns, each column (`PAIR_WIDTH`), and the row of its sums."""
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
@@ -268,7 +268,7 @@ class _Writer:
         return [len(own), *pairs.ravel().tolist(), *self._sources(f, self.sums)]
 
 
-def _leaves_alone(R: FloatArray, axis: int) -> bool:
+def _is_rotation_about(R: FloatArray, axis: int) -> bool:
     """Return whether R is exactly a rotation about this axis."""
     one = np.eye(3)[axis]
     return bool((R[axis] == one).all() and (R[:, axis] == one).all())

@@ -218,7 +218,7 @@ def _save(s, row, state):
 
 
 @compiled
-def _resumed(s, row, state):
+def _resume(s, row, state):
     """Return the saved state, without the parts that this recursion does not need."""
     R, p, w, vel, alpha, acc = state
     return (
@@ -358,7 +358,7 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
         elif op == _SAVE:
             _save(s, x, state)
         elif op == _RESUME:
-            state = _resumed(s, x, state)
+            state = _resume(s, x, state)
         elif op == _KEEP:
             keep(s, x, y, state)
         elif op == _COLUMN:

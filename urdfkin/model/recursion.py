@@ -141,13 +141,13 @@ class Recursion:
     def jacobian(self, s: State, columns: Sequence[Column], nv: int, reference: Reference) -> list[Six]:
         """Return the columns of the Jacobian (7.85), one for each joint velocity."""
         to = ZERO if reference is Reference.WORLD else s.p
-        return self._summed(s, reference, nv, ((one, *self._column(one, to)) for one in columns))
+        return self._add_mimic_columns(s, reference, nv, ((one, *self._column(one, to)) for one in columns))
 
     def jacobian_rate(self, s: State, columns: Sequence[Column], nv: int, reference: Reference) -> list[Six]:
         """Return the columns of the Jacobian's time derivative (7.126)."""
         to, to_rate = (ZERO, ZERO) if reference is Reference.WORLD else (s.p, s.vel)
         rates = ((one, *self._rate(s, one, to, to_rate, reference)) for one in columns)
-        return self._summed(s, reference, nv, rates)
+        return self._add_mimic_columns(s, reference, nv, rates)
 
     def _rate(
         self, s: State, column: Column, to: Vector, to_rate: Vector, reference: Reference
@@ -162,7 +162,7 @@ class Recursion:
             turning = eq.rate_in_turning_axes(turning, s.w, angular)
         return rate, turning
 
-    def _summed(
+    def _add_mimic_columns(
         self, s: State, reference: Reference, nv: int, found: Iterator[tuple[Column, Vector, Vector]]
     ) -> list[Six]:
         """Add the columns of mimic joints to the column of their mimicked joint."""
