@@ -227,7 +227,7 @@ def test_a_wrong_length_names_the_joints(panda: Robot) -> None:
         panda.placement(np.zeros(7), "panda_hand")
     with pytest.raises(InputError, match=r"a needs 8 numbers for panda: panda_joint1"):
         panda.acceleration(np.zeros(8), np.zeros(8), np.zeros((3, 9)), "panda_hand")
-    with pytest.raises(InputError, match="none, nothing moves"):
+    with pytest.raises(InputError, match="none, no joint moves"):
         urdfkin.load(urdf_of("single_link")).placement([1.0], "base")
     with pytest.raises(InputError, match="wrong length"):
         panda.from_pinocchio(np.zeros(8))

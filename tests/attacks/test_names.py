@@ -158,7 +158,7 @@ def test_all_links_are_had_without_naming_them(name: str) -> None:
 def test_the_remedy_for_an_ambiguous_name_works() -> None:
     crossed = [("b", "fixed", "a", "link:b", (1.0, 0.0, 0.0)), ("c", "fixed", "link:b", "b", (0.0, 1.0, 0.0))]
     robot = loaded(urdf(crossed, "a"))
-    with pytest.raises(InputError, match=r"say 'joint:c' or 'joint:b'$"):
+    with pytest.raises(InputError, match=r"write 'joint:c' or 'joint:b'$"):
         robot.placement([], "b")
     assert robot.placement([], "joint:c")[:2, 3].tolist() == [1.0, 1.0]
     assert robot.placement([], "joint:b")[:2, 3].tolist() == [1.0, 0.0]

@@ -121,7 +121,7 @@ def test_any_of_many_trees_agrees(seed: int) -> None:
 def test_a_name_of_two_places_must_be_told_apart_and_then_gives_both() -> None:
     robot = load(urdf_of("same_names"))
     q = robot.sample(1, 5)[0]
-    with pytest.raises(urdfkin.InputError, match=r"say 'link:elbow' or 'joint:elbow'"):
+    with pytest.raises(urdfkin.InputError, match=r"write 'link:elbow' or 'joint:elbow'"):
         robot.placement(q, "elbow")
     assert (robot.placement(q, "joint:elbow") == robot.placement(q, "forearm")).all()
     assert (robot.placement(q, "link:elbow") == robot.placement(q, "slide")).all()

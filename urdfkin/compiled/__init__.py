@@ -1,8 +1,8 @@
-"""The text's recursion, sections 7.4 and 7.7, once, compiled, for whole batches.
+"""The textbook's recursion (sections 7.4 and 7.7), written once and compiled, for batches.
 
-Numba would take settings from a file `.numba_config.yaml` in the current folder, when it is imported and
-before each compilation: among them the folder of its cache, whose files are run. Here they come from the
-environment alone, unless a program imported Numba before.
+Numba reads settings from a file `.numba_config.yaml` in the current folder, when it is imported and before
+each compilation. One of them is the folder of its cache, whose files are executed. To avoid that, this
+package reads Numba's settings from the environment only, unless a program imported Numba before.
 """
 
 from __future__ import annotations

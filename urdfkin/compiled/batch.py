@@ -1,6 +1,6 @@
-"""A batch spread over threads.
+"""Compute a batch with several threads.
 
-No configuration depends on its neighbours: results are equal for any number of threads, to the last bit.
+Configurations are independent: results have the same bits for any number of threads.
 """
 
 from __future__ import annotations
@@ -15,37 +15,38 @@ from urdfkin.compiled.memory import LANES
 from urdfkin.errors.validators import whole_number
 from urdfkin.model.tree import FloatArray
 
-#: A batch is spread over threads by itself only from here on: a thread costs some ten microseconds.
+#: Smallest batch for several threads by default; starting a thread costs about ten microseconds.
 _WORTH_THREADS = 4096
 
-#: As many rows are computed at a time where NumPy does it: what it keeps meanwhile fits a cache.
+#: Number of rows that NumPy computes at a time, so that intermediate results fit into a cache.
 PART = 2048
 
-#: Computes rows of inputs into rows of an output, (inputs, out); 0, or 1 where an input is not ordinary.
+#: Computes rows of inputs into rows of an output, (inputs, out); returns 1 for an input that is not ordinary,
+#: else 0.
 Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
 def default_threads(n: int) -> int:
-    """One thread for each processor this process may use, for batches that are worth it."""
+    """Return the number of processors that this process may use, for large batches; 1 for small ones."""
     return _processors() if n >= _WORTH_THREADS else 1
 
 
 def _processors() -> int:
-    """How many this process may use: more threads would wait for each other."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0))
 
 
 def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> int:
-    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...) for all; whether any is not ordinary.
+    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...); return 1 if any is not ordinary.
 
     Args:
-        compute: Releases the interpreter's lock.
+        compute: The computation; it must release the interpreter's lock.
         inputs: C-contiguous.
         out: C-contiguous.
-        threads: How many at most; None for `default_threads`.
+        threads: Largest number of threads; None for `default_threads`.
 
     Raises:
-        InputError: `threads` is no whole number from 1 on.
+        InputError: `threads` is not an integer of at least 1.
     """
     n = len(out)
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
@@ -59,15 +60,15 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
 
 
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
-    """Have NumPy compute `n` rows part by part: what it needs meanwhile does not grow with `n`.
+    """Compute `n` rows with NumPy, part by part, so that the memory for intermediate results stays constant.
 
     Args:
         compute: Computes some rows. An empty batch is one empty part.
-        n: How many rows.
-        threads: As `in_blocks`.
+        n: Number of rows.
+        threads: Largest number of threads, as in `in_blocks`.
 
     Raises:
-        InputError: `threads` is no whole number from 1 on.
+        InputError: `threads` is not an integer of at least 1.
     """
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
     parts = [slice(i, min(i + PART, n)) for i in range(0, max(n, 1), PART)]
@@ -81,14 +82,14 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
     if len(shares) == 1:
         return compute_all(parts)
     work = [_pool().submit(compute_all, share) for share in shares]
-    wait(work)  # nobody writes any more when an error is told
+    wait(work)  # before an error is raised, all threads have finished writing
     for future in work:
         future.result()
     return None
 
 
 def _parts(n: int, threads: int) -> list[tuple[int, int]]:
-    """Cut `n` rows between blocks, into at most `threads` runs of a block or more."""
+    """Cut `n` rows at block boundaries into at most `threads` runs of one block or more."""
     blocks = n // LANES
     edges = [*(LANES * (blocks * i // threads) for i in range(threads)), n]
     return [(a, b) for a, b in pairwise(edges) if a < b]
@@ -100,7 +101,7 @@ def _rows(inputs: Sequence[FloatArray], n: int, start: int, stop: int) -> list[F
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    """The threads, which a forked child does not have: it starts its own."""
+    """Return the thread pool; a forked child process starts its own."""
     return ThreadPoolExecutor(_processors(), thread_name_prefix="urdfkin")
 
 

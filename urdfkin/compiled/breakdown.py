@@ -1,19 +1,23 @@
-"""Whose doing a frame's acceleration is: each joint's, part by part.
+"""The acceleration of a frame as a sum of contributions by joint and kind.
 
-Sections 7.6 and 7.7. Seen from link k-1, the frame moves about or along the axis of joint k, with velocity
-u_k = v_k z x d (or v_k z), while link k-1 itself turns with w_{k-1}. That is a moving point in a moving
-frame, and 7.125 names its terms; applied joint by joint from the last inwards they add up to 7.130:
+Sections 7.6 and 7.7. Relative to link k-1, the frame moves about or along the axis of joint k, with velocity
+u_k = v_k z x d (or v_k z). Link k-1 itself rotates with w_{k-1}. This is a moving point in a moving frame,
+and 7.125 names its terms. Summed over the joints, from the last joint inwards, they give 7.130:
 
-    transverse   a_k z x d              a rotary joint speeds up
-    centripetal  v_k z x (v_k z x d)    it turns
-    coriolis     2 w_{k-1} x u_k        what it does while the joints before it turn the link it sits on
-    sliding      a_k z                  a prismatic joint speeds up
+| kind | term | cause |
+|---|---|---|
+| transverse | a_k z x d | acceleration of a revolute joint |
+| centripetal | v_k z x (v_k z x d) | velocity of a revolute joint |
+| coriolis | 2 w_{k-1} x u_k | velocity of the joint while its link rotates |
+| sliding | a_k z | acceleration of a prismatic joint |
 
-with d from the joint's origin to the frame: not a difference of two places, which has lost its digits far
-from the world's origin and behind a long link, but the sum of the interorigin vectors behind the joint, as in
-7.110. The angular rows are those of 7.129: a_k z, and v_k w_{k-1} x z under coriolis. A planar or floating
-joint slides and turns at once, along axes that turn with it: its sliding velocity s then adds o x s, with o
-its own angular velocity, under coriolis.
+The vector d leads from the joint's origin to the frame. It is the sum of the interorigin vectors behind the
+joint, as in 7.110: a difference of two positions would lose digits far from the world's origin and behind a
+long link.
+
+The angular rows are those of 7.129: a_k z, and v_k w_{k-1} x z under coriolis. A planar or floating joint
+translates and rotates at once, along axes that rotate with it. Its linear velocity s then adds o x s under
+coriolis, with its own angular velocity o.
 """
 
 from __future__ import annotations
@@ -36,11 +40,11 @@ from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: The kinds of contribution, in the order in which they are kept.
+#: The kinds of contribution, in the order in which they are stored.
 KINDS = ("transverse", "centripetal", "coriolis", "sliding")
 
 
-#: How many samples of a batch are shown.
+#: Number of samples of a batch that are displayed.
 _SHOWN = 2
 
 
@@ -49,8 +53,8 @@ class AccelerationBreakdown(Displayable):
     """A frame's acceleration as a sum over joints and kinds.
 
     Attributes:
-        joints: Moving joints from the base to the frame.
-        base: (..., 6) what a moving base contributes, as if all joints stood still.
+        joints: Names of the moving joints from the base to the frame.
+        base: (..., 6) contribution of a moving base with all joints fixed.
         terms: (..., joints, 4, 6) contributions, kinds in the order of `KINDS`, [linear; angular].
     """
 
@@ -62,7 +66,7 @@ class AccelerationBreakdown(Displayable):
         return f"<AccelerationBreakdown of {len(self.joints)} joints, batch {self.base.shape[:-1]}>"
 
     def contributions(self, sample: tuple[int, ...] = ()) -> Iterator[tuple[str, str, FloatArray]]:
-        """(joint, kind, six numbers) of one sample; what is exactly zero is left out."""
+        """Yield (joint, kind, six numbers) of one sample, without contributions that are exactly zero."""
         if self.base[sample].any():
             yield "base", "moving base", self.base[sample]
         for j, joint in enumerate(self.joints):
@@ -84,25 +88,25 @@ class AccelerationBreakdown(Displayable):
 
     @cached_property
     def total(self) -> FloatArray:
-        """(..., 6) the acceleration: the sum of everything else here."""
+        """The acceleration (..., 6): the sum of the base's and all joints' contributions."""
         total: FloatArray = self.base + self.by_joint.sum(axis=-2)
         return total
 
     @cached_property
     def by_joint(self) -> FloatArray:
-        """(..., joints, 6) what each joint contributes."""
+        """The contribution of each joint (..., joints, 6)."""
         summed: FloatArray = self.terms.sum(axis=-2)
         return summed
 
     @cached_property
     def by_kind(self) -> FloatArray:
-        """(..., 4, 6) what the joints contribute in each kind."""
+        """The contribution of each kind (..., 4, 6), summed over the joints."""
         summed: FloatArray = self.terms.sum(axis=-3)
         return summed
 
 
 class _Moves(NamedTuple):
-    """Sliding and turning of the moved frame relative to the link before it, in world axes: (n, 3) each."""
+    """Linear and angular part (n, 3) of a joint's motion relative to its parent link, in world axes."""
 
     slide: FloatArray
     turn: FloatArray
@@ -120,7 +124,7 @@ def acceleration_breakdown(
     out: FloatArray | None = None,
     threads: int | None = None,
 ) -> AccelerationBreakdown:
-    """The contributions to the classical acceleration of a link's frame.
+    """Return the contributions to the classical acceleration of a link's frame.
 
     Args:
         tree: The robot.
@@ -128,22 +132,22 @@ def acceleration_breakdown(
         q: (n, nq).
         v: (n, nv).
         a: (n, nv).
-        reference: For which point and in which axes.
+        reference: The reference frame of the result.
         base: (1 or n, 24) state of the base, see `BaseMotion.state`.
-        out: (n, joints, 4, 6) to write the terms into.
-        threads: How many compute at most; None for `batch.default_threads`.
+        out: (n, joints, 4, 6) array for the terms.
+        threads: Largest number of threads; None for `batch.default_threads`.
 
     Returns:
-        Contributions with one leading axis n.
+        The contributions, with one leading axis n.
 
     Raises:
         NotFiniteError: a number of q, v or a is not finite.
-        RangeError: a part leaves the range of double precision.
+        RangeError: a contribution exceeds the range of double precision.
     """
-    if not np.isfinite(a).all():  # the walks below, which look at their inputs themselves, take q and v
+    if not np.isfinite(a).all():  # the recursions below check q and v themselves
         raise NotFiniteError("q, v and a must be finite")
     moving = moving_joints(tree, link)
-    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # the links on the way
+    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # the links on the path
     n = len(q)
     terms = np.empty((n, len(moving), len(KINDS), 6)) if out is None else out
     of_base = np.empty((n, 6))
@@ -165,11 +169,11 @@ def acceleration_breakdown(
 
 
 def moving_joints(tree: KinematicTree, link: int) -> list[int]:
-    """The joints that contribute, from the base to the link."""
+    """Return the joints that contribute, from the base to the link."""
     return [i for i in tree.path(link) if tree.joints[i].kind.nv]
 
 
-@np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite is refused at the end
+@np.errstate(over="ignore", under="ignore", invalid="ignore")  # non-finite results raise at the end
 def _contributions(
     tree: KinematicTree,
     link: int,
@@ -181,7 +185,7 @@ def _contributions(
     base: FloatArray,
     terms: FloatArray,
 ) -> FloatArray:
-    """Fill in the terms; what the base contributes. Joint k of the path carries link k + 1 of the plan."""
+    """Fill in the terms; return the base's contribution. Joint k of the path carries link k + 1."""
     path = tree.path(link)
     Ts = placements(plan, q, base=base, threads=1)
     velocity = velocities(plan, q, v, base=base, threads=1)
@@ -194,8 +198,8 @@ def _contributions(
     of_base = _rigid(base, levers[:, 0])
     if reference is Reference.LOCAL:
         back = Ts[:, -1, :3, :3].swapaxes(-1, -2)
-        of_base = _turned(back, of_base)
-        terms[...] = _turned(back[:, np.newaxis, np.newaxis], terms)
+        of_base = _rotate(back, of_base)
+        terms[...] = _rotate(back[:, np.newaxis, np.newaxis], terms)
     if not (np.isfinite(of_base).all() and np.isfinite(terms).all()):
         raise RangeError(
             "a part of the acceleration leaves the range of double precision", remedy="give smaller numbers"
@@ -204,7 +208,7 @@ def _contributions(
 
 
 def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatArray) -> FloatArray:
-    """(n, links, 3) from each link's origin to the path's end, in world axes, added up from there."""
+    """Return the vectors (n, links, 3) from each link's origin to the end of the path, in world axes."""
     levers = np.zeros(Rs.shape[:-1])
     for k in reversed(range(len(path))):
         joint, at = tree.joints[path[k]], tree.q_index[path[k]]
@@ -214,7 +218,7 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
 
 
 def _slide(joint: Joint, q: FloatArray) -> FloatArray:
-    """(n, 3) how far a joint has slid, in its own axes; its coordinates come first in q."""
+    """Return a joint's displacement (n, 3) in its own axes; its coordinates come first in q."""
     slide = np.zeros((len(q), 3))
     if joint.kind is JointKind.PLANAR:
         slide[:, :2] = q[:, :2]
@@ -227,7 +231,7 @@ def _slide(joint: Joint, q: FloatArray) -> FloatArray:
 
 
 def _terms(rate: _Moves, rate_2: _Moves, w_before: FloatArray, d: FloatArray) -> FloatArray:
-    """(n, 4, 6) what one joint contributes."""
+    """Return the contributions (n, 4, 6) of one joint."""
     nothing = np.zeros_like(d)
     u = eq.point_velocity(rate.slide, rate.turn, d)
     kinds = (
@@ -240,7 +244,7 @@ def _terms(rate: _Moves, rate_2: _Moves, w_before: FloatArray, d: FloatArray) ->
 
 
 def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
-    """Rates, or their rates, of one joint as vectors in world axes."""
+    """Return a joint's velocity or acceleration as vectors in world axes."""
     slide, turn = np.zeros((len(x), 3)), np.zeros((len(x), 3))
     if joint.kind is JointKind.PLANAR:
         slide[:, :2], turn[:, 2] = x[:, :2], x[:, 2]
@@ -253,13 +257,13 @@ def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
 
 
 def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
-    """The acceleration of a point that rides on the base, d from its origin (7.123)."""
+    """Return the acceleration of a point fixed to the base, at d from its origin (7.123)."""
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)
 
 
-def _turned(R: FloatArray, six: FloatArray) -> FloatArray:
+def _rotate(R: FloatArray, six: FloatArray) -> FloatArray:
     pairs = six.reshape(*six.shape[:-1], 2, 3)
     turned: FloatArray = (R[..., np.newaxis, :, :] @ pairs[..., np.newaxis])[..., 0]
     return turned.reshape(six.shape)

@@ -1,4 +1,4 @@
-"""The chapter's equations, compiled for whatever kind of number they are called with."""
+"""The textbook's equations, compiled for each kind of number that they are called with."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ globals().update(vars(bound(made=compiled)))
 
 
 def __getattr__(name: str) -> Any:
-    # Only a name that `equations` does not have comes here.
+    # Python calls this only for names that are not in `equations`.
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,21 +1,15 @@
-"""Who is told that a kernel is compiled, which takes seconds; to read one from disk takes none.
+"""Compile kernels with Numba and cache them on disk.
 
-Compiled kernels on disk, sealed: a damaged one is compiled again, and where none can be kept, none is.
+Cache. Each machine compiles a kernel once. The name of the cache folder contains a digest of every source
+file of `compiled` and of `kinematics`, because kernels consist of functions from all of them. Numba's own
+cache files have no digest: a truncated file stops every later run, and a changed bit is executed. Here each
+file has a digest. A damaged file is compiled again; without a writable folder, nothing is cached.
 
-Numba's own files have no digest: half a file ends every later run, and a flipped bit is run as it is.
+Parts. A function that is only a part of kernels is inlined and never called by itself. It needs no machine
+code, no optimization before it is inlined, and no passes for closures, `with`, literal loops, inlining by
+Numba, or rewriting of array expressions. Skipping them halves the compile time.
 
-
-How Numba compiles what is only ever a part of a kernel: no further than it has to, which halves the wait.
-
-A part is inlined and never called by itself. It needs no machine code of its own, no optimization before it
-stands where it is inlined, and of Numba's passes none for what no part has: closures, `with`, literal loops,
-inlining on Numba's own level, rewriting of array expressions.
-
-
-Compile once a machine: kernels are kept on disk, under a digest of the sources they are made from.
-
-Every source file of `compiled` and of `kinematics` enters the folder's name: a kernel is made of all that it
-is inlined from.
+Events. Compiling takes seconds, reading from disk almost no time. Listeners are informed of each compilation.
 """
 
 from __future__ import annotations
@@ -50,16 +44,16 @@ from urdfkin.system.cache import get, kept_folder, put, report_damaged
 from urdfkin.system.files import read_bytes
 from urdfkin.system.processes import lock_over_forks
 
-#: Told a kernel's name when it begins to be compiled, with None, and when it is there, with the seconds.
+#: Called with a kernel's name and None when its compilation begins, and with the seconds when it is ready.
 Listener = Callable[[str, float | None], None]
 
 
 def _log(name: str, seconds: float | None) -> None:
-    """Programs and notebooks: one warning a process, on standard error unless logging is set otherwise."""
+    """Log one warning in each process, which goes to standard error by default."""
     if seconds is None and not _logged:
         _logged.append(name)
         logging.getLogger("urdfkin").warning(
-            "urdfkin: compiling %s once; kept from now on, 'urdfkin warm' compiles all kernels at once",
+            "urdfkin: compiling %s once, then cached on disk; 'urdfkin warm' compiles all kernels at once",
             name,
         )
 
@@ -70,7 +64,7 @@ _listeners: list[Listener] = [_log]
 
 @contextmanager
 def listen_to_compile_events(listener: Listener) -> Iterator[None]:
-    """While open, `listener` is told, and nobody else."""
+    """Send compile events to `listener` only, while the context is open."""
     _listeners.append(listener)
     try:
         yield
@@ -80,7 +74,7 @@ def listen_to_compile_events(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def compile_event(name: str) -> Iterator[Callable[[], None]]:
-    """Around what may compile: yields what is to be called if it does."""
+    """Report a compilation. The context yields a function that must be called if a compilation begins."""
     begun: list[float] = []
 
     def missed() -> None:
@@ -97,12 +91,12 @@ _Result: Any = CompileResult
 _dumps: Any = dumps
 
 
-class KeptKernel(_Null):  # type: ignore[misc]
-    """Where Numba looks for one function before it compiles it, and leaves it afterwards.
+class KernelCache(_Null):  # type: ignore[misc]
+    """Numba's cache of one function, used before and after its compilation.
 
-    The folder stands for the sources that all kernels share; a file's name for the function and the file that
-    it is in, which may lie elsewhere, its arguments and the processor.
-    `missed` is called where there is nothing of use.
+    The folder's name stands for the sources that all kernels share. A file's name stands for the function,
+    its own source file (which may be elsewhere), its argument types and the processor. `missed` is called if
+    no file is usable.
     """
 
     def __init__(self, function: Callable[..., int], folder: Path, missed: Callable[[], None]) -> None:
@@ -110,20 +104,20 @@ class KeptKernel(_Null):  # type: ignore[misc]
         self._source = read_bytes(Path(function.__code__.co_filename))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What was kept for these arguments; None where there is nothing of use."""
+        """Return the cached result for these arguments; None if there is no usable file."""
         target_context.refresh()
         place = self._place(sig, target_context.codegen())
         if (content := get(place)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            except Exception as error:  # whole, but of another time: it may fail in any way
+            except Exception as error:  # complete, but from another version: any error is possible
                 report_damaged(place, f"{type(error).__name__}: {error}")
         self._missed()
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
-        """Keep what was compiled."""
-        if not cres.library.has_dynamic_globals:  # addresses of this process
+        """Write the compiled result to the cache."""
+        if not cres.library.has_dynamic_globals:  # these are addresses of this process
             put(self._place(sig, cres.library.codegen), _dumps(cres._reduce()))
 
     def _place(self, signature: Any, codegen: Any) -> Path:
@@ -132,7 +126,7 @@ class KeptKernel(_Null):  # type: ignore[misc]
 
 
 def function_name(function: Callable[..., int]) -> str:
-    """The module's name without its packages, and the function's."""
+    """Return the last part of the module's name, and the function's name."""
     return f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
 
 
@@ -144,16 +138,16 @@ _register: Any = register_pass
 
 
 class _Part(_Library):  # type: ignore[misc]
-    """LLVM's code for a function, to be linked into a kernel's; what it calls is linked there too."""
+    """LLVM code of a function, to be linked into a kernel together with the functions that it calls."""
 
     def finalize(self) -> None:
-        """Done."""
+        """Complete the library without machine code of its own."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
     @property
     def all(self) -> list[Any]:
-        """With those of all that it calls."""
+        """This library and those of all functions that it calls."""
         return [self, *dict.fromkeys(self._linking_libraries)]
 
 
@@ -162,11 +156,11 @@ class _PartLowering(_Lowering):  # type: ignore[misc]
     _name = "part_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        """To LLVM's code, and no further."""
+        """Translate to LLVM code only."""
         state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba tells functions from one another by what Python would call: of a part, nothing.
+        # Numba registers functions by the pointers that Python would call; a part has none.
         what, environment = state.cr.fndesc, state.cr.env
         handle = make_function(what.lookup_module(), what.qualname, "", 0, environment, (state.library,))
         state.targetctx.insert_user_function(handle, what, state.library.all)
@@ -175,10 +169,10 @@ class _PartLowering(_Lowering):  # type: ignore[misc]
 
 
 class PartCompiler(_Compiler):  # type: ignore[misc]
-    """Numba's passes, those that a part needs."""
+    """The passes of Numba that a part needs."""
 
     def define_pipelines(self) -> list[Any]:
-        """One pipeline."""
+        """Return the single pipeline."""
         passes = _Passes("part")
         for each in (
             untyped_passes.TranslateByteCode,
@@ -201,11 +195,11 @@ class PartCompiler(_Compiler):  # type: ignore[misc]
 
 _config: Any = numba.config  # settings that numba sets at run time
 
-#: How everything here is compiled. Nothing is reordered, and what is fused says so itself (`numbers`):
-#: results must not depend on the compiler's choices. Division by zero gives inf as in C, so that no loop
-#: carries a branch that raises. Nothing is allocated, so that arrays need no reference counts.
+#: Options of every compiled function. Nothing is reordered, and only explicit products are fused (`numbers`):
+#: results must not depend on the compiler's choices. Division by zero gives inf as in C, so that loops
+#: contain no branch that raises. Nothing is allocated, so arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-#: Of a part that is only ever inlined, no form of its own is made that Python or C could call.
+#: Options of a part, which is only inlined: no entry point for Python or C.
 _PART: dict[str, Any] = {
     "forceinline": True,
     "no_cpython_wrapper": True,
@@ -216,7 +210,7 @@ _PART: dict[str, Any] = {
 
 @contextmanager
 def compiling_allowed() -> Iterator[None]:
-    """NUMBA_DISABLE_JIT is not obeyed: it is meant for functions that Python could run instead."""
+    """Allow compilation even with NUMBA_DISABLE_JIT, which is meant for functions that Python could run."""
     before, _config.DISABLE_JIT = _config.DISABLE_JIT, 0
     try:
         yield
@@ -224,11 +218,11 @@ def compiling_allowed() -> Iterator[None]:
         _config.DISABLE_JIT = before
 
 
-def _believe_in_blas() -> None:
-    """Keep Numba from importing SciPy's linear algebra to see that it is there: a fifth of a command's time.
+def _skip_blas_check() -> None:
+    """Prevent Numba from importing SciPy's linear algebra for a check, a fifth of a command's time.
 
-    No kernel calls it. Compiled code that does imports it then, and has it checked as ever. A Numba that
-    keeps it elsewhere imports it, and all is as it would be without this.
+    No kernel calls linear algebra. Compiled code that does imports and checks it as usual. If a version of
+    Numba has this check elsewhere, this function has no effect.
     """
     if "numba.np.arraymath" in sys.modules or find_spec("scipy") is None:
         return
@@ -242,7 +236,7 @@ def _believe_in_blas() -> None:
 
 
 def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator: Numba's, with the options of every function here, and those given."""
+    """Return Numba's decorator with the options of this package and the given ones."""
 
     def decorate(function: Callable[..., Any]) -> Any:
         with compiling_allowed():
@@ -251,17 +245,17 @@ def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return decorate
 
 
-#: Decorator for functions that kernels are made of.
+#: Decorator for functions that are parts of kernels.
 compiled = jitted(**_PART)
 
-# Inputs may be read-only; a writable array converts without a copy. One signature, compiled once.
+# Inputs may be read-only; a writable array converts without a copy. So one signature is enough.
 NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 PLACES = types.Array(types.int64, 1, "C", readonly=True)
 SCRATCH = types.Array(types.float64, 1, "C")
 
-#: One kernel after the other, as Numba compiles them anyway. A fork waits for the one that is being compiled:
-#: in the child nobody would finish it.
+#: Kernels are compiled one after the other, as in Numba. A fork waits for the current compilation, because
+#: the child process could not finish it.
 _compiling = lock_over_forks()
 
 
@@ -269,7 +263,7 @@ class Kernel:
     """A function that is compiled, or read from disk, when it is first called.
 
     Attributes:
-        compiled: The compiled function itself: a call through it takes a tenth of a microsecond.
+        compiled: The compiled function itself; calling it directly costs a tenth of a microsecond.
     """
 
     compiled: Any
@@ -279,8 +273,8 @@ class Kernel:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
-        # Asked for what is not there yet. A cached property has a lock of its own until Python 3.12, which a
-        # forked child might find closed.
+        # Called for attributes that do not exist yet. Before Python 3.12 a cached property has a lock of its
+        # own, which could be locked forever in a forked child.
         if name != "compiled":
             raise AttributeError(name)
         with _compiling:
@@ -290,29 +284,29 @@ class Kernel:
 
     def _compile(self) -> Any:
         dispatcher = jitted(nogil=self._nogil)(self._function)
-        self._make(dispatcher, lambda: dispatcher.compile(types.int64(*self._arguments)))
+        self._compile_or_load(dispatcher, lambda: dispatcher.compile(types.int64(*self._arguments)))
         dispatcher.disable_compile()
         return dispatcher
 
-    def _make(self, made: Any, make: Callable[[], object]) -> None:
-        """Compile, or read from disk; whoever listens is told which takes so long."""
+    def _compile_or_load(self, made: Any, make: Callable[[], object]) -> None:
+        """Compile, or read from disk; listeners receive the events of a compilation."""
         with compile_event(self.__name__.strip("_").replace("_", " ")) as missed, compiling_allowed():
-            _believe_in_blas()
+            _skip_blas_check()
             if (folder := cache_folder()) is None:
                 missed()
             else:
-                made._cache = KeptKernel(self._function, folder, missed)
+                made._cache = KernelCache(self._function, folder, missed)
             make()
 
     def __call__(self, *arguments: Any) -> int:
-        """Compute."""
+        """Call the compiled function."""
         return int(self.compiled(*arguments))
 
 
 class Core(Kernel):
-    """A function of addresses, with C's calling convention: kernels call it, and Python by ctypes.
+    """A function of addresses, with C's calling convention.
 
-    Python calls it without the interpreter's lock.
+    Kernels call it, and Python by ctypes. Python calls it without the interpreter's lock.
     """
 
     def __init__(self, function: Callable[..., int]) -> None:
@@ -320,42 +314,42 @@ class Core(Kernel):
 
     def _compile(self) -> Any:
         core: Any = CFunc(self._function, (self._arguments, types.int64), {}, COMPILED)
-        self._make(core, core.compile)
+        self._compile_or_load(core, core.compile)
         return core
 
     @property
     def address(self) -> int:
-        """Where it lies in this process."""
+        """Its address in this process."""
         return int(self.compiled.address)
 
     def __call__(self, *arguments: Any) -> int:
-        """Compute."""
+        """Call the compiled function."""
         return int(self.compiled.ctypes(*arguments))
 
 
 def core(function: Callable[..., int]) -> Core:
-    """Decorator: compile when first called, keep the result on disk."""
+    """Decorator for a kernel of addresses: compiled at the first call, cached on disk."""
     return Core(function)
 
 
 def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator for what kernels call; options are Numba's, beside those of every kernel."""
+    """Decorator for a part of kernels, with extra options of Numba."""
     return jitted(**_PART, **options)
 
 
 def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
-    """Decorator: compile for these argument types when first called, keep the result on disk.
+    """Decorator for a kernel with these argument types: compiled at the first call, cached on disk.
 
     Args:
         arguments: Numba's types.
-        nogil: Whether the interpreter's lock is released meanwhile; for a microsecond it is not worth it.
+        nogil: Whether a call releases the interpreter's lock; a call of a microsecond is too short for that.
     """
     return lambda function: Kernel(function, arguments, nogil)
 
 
 @cache
 def cache_folder() -> Path | None:
-    """Where compiled kernels are kept; None if no folder can be written."""
+    """Return the cache folder of compiled kernels; None if no folder is writable."""
     root = Path(_config.CACHE_DIR) if _config.CACHE_DIR else None
     versions = numba.__version__, llvmlite.__version__, sys.implementation.cache_tag + sys.abiflags
     sources = [*Path(__file__).parent.glob("*.py"), *Path(equations.__file__).parent.glob("*.py")]

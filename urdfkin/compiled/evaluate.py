@@ -1,8 +1,7 @@
-"""Arrays in, arrays out: the compiled walks behind plain functions.
+"""The compiled recursions as plain functions of arrays.
 
-Inputs are flat batches, (n, nq) and (n, nv), already checked; `urdfkin.robot` checks, reshapes and verifies.
-One row that was broadcast to n is read again for each configuration, and never copied.
-A core is loaded when it is first needed, so that a first use compiles only what it needs.
+Inputs are checked flat batches, (n, nq) and (n, nv); `urdfkin.robot` checks, reshapes and verifies. A row
+that was broadcast to n is not copied. A kernel is compiled or loaded when it is first needed.
 """
 
 from __future__ import annotations
@@ -27,9 +26,9 @@ from urdfkin.system.processes import importing
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Bytes of an output that no near cache keeps until it is read: it is written past them.
+#: Output size (bytes) from which results are written past the caches, because no near cache could keep them.
 _STREAMED = 2 << 20
-#: Numbers of a block that stay in half of the nearest cache until it is full.
+#: Number of values of a block that fit into half of the nearest cache.
 _MOST_STAGED = 3072
 
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -42,12 +41,12 @@ def _cores() -> Any:
 
 
 class How(TypedDict, total=False):
-    """What every function here takes by name.
+    """Keyword arguments of every function of this module.
 
     Attributes:
         base: (n, 24) or (1, 24) the base's state.
-        out: C-contiguous float64 array of the result's size to write into.
-        threads: How many compute; None: every processor from a number of configurations on.
+        out: C-contiguous float64 array of the result's size, for the result.
+        threads: Largest number of threads; None: all processors for large batches.
     """
 
     base: FloatArray
@@ -56,18 +55,18 @@ class How(TypedDict, total=False):
 
 
 def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[How]) -> FloatArray:
-    """(n, frames, 4, 4) T_world_frame: 7.77 with the rotations alongside."""
+    """Return T_world_frame (n, frames, 4, 4): 7.77 with the rotations."""
     program = program_of(plan, turned=True)
-    return _computed(_cores().placements, plan, program, [q], _ALIGNED, (4, 4), **how)
+    return _compute(_cores().placements, plan, program, [q], _ALIGNED, (4, 4), **how)
 
 
 def velocities(
     plan: CompiledTree, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
-    """(n, frames, 6) [linear; angular]: 7.127, 7.128."""
+    """Return velocities (n, frames, 6), [linear; angular]: 7.127, 7.128."""
     local = reference is Reference.LOCAL
     core = _cores().local_velocities if local else _cores().velocities
-    return _computed(core, plan, program_of(plan, turned=local), [q, v], reference, (6,), **how)
+    return _compute(core, plan, program_of(plan, turned=local), [q, v], reference, (6,), **how)
 
 
 def accelerations(
@@ -78,34 +77,34 @@ def accelerations(
     reference: Reference = _ALIGNED,
     **how: Unpack[How],
 ) -> FloatArray:
-    """(n, frames, 6) [linear; angular], classical: 7.129, 7.130."""
+    """Return classical accelerations (n, frames, 6), [linear; angular]: 7.129, 7.130."""
     local = reference is Reference.LOCAL
     core = _cores().local_accelerations if local else _cores().accelerations
-    return _computed(core, plan, program_of(plan, turned=local), [q, v, a], reference, (6,), **how)
+    return _compute(core, plan, program_of(plan, turned=local), [q, v, a], reference, (6,), **how)
 
 
 def jacobians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
-    """(n, frames, 6, nv) velocity Jacobians: 7.85."""
+    """Return Jacobians (n, frames, 6, nv): 7.85."""
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
-    return _computed(_cores().jacobians, plan, program, [q], reference, (6, plan.nv), **how)
+    return _compute(_cores().jacobians, plan, program, [q], reference, (6, plan.nv), **how)
 
 
 def jacobian_rates(
     plan: CompiledTree, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
-    """(n, frames, 6, nv) time derivatives of the velocity Jacobians: the J-dot of 7.126."""
+    """Return time derivatives of the Jacobians (n, frames, 6, nv): the J-dot of 7.126."""
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
-    return _computed(_cores().jacobian_rates, plan, program, [q, v], reference, (6, plan.nv), **how)
+    return _compute(_cores().jacobian_rates, plan, program, [q, v], reference, (6, plan.nv), **how)
 
 
 def hessians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
-    """(n, frames, 6, nv, nv) derivatives of the velocity Jacobians: [..., i, j] of column i by rate j."""
+    """Return derivatives of the Jacobians (n, frames, 6, nv, nv): [..., i, j] of column i by velocity j."""
     program = program_of(plan, turned=reference is Reference.LOCAL, columns=True, pairs=True)
-    return _computed(_cores().hessians, plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
+    return _compute(_cores().hessians, plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
 
 
 def imus(
@@ -117,16 +116,17 @@ def imus(
     gravity: FloatArray,
     **how: Unpack[How],
 ) -> FloatArray:
-    """(n, frames, 6) [proper acceleration; angular velocity] in each frame's own axes.
+    """Return [proper acceleration; angular velocity] (n, frames, 6) in each frame's own axes.
 
-    An accelerometer cannot tell gravity from a world that is accelerated against it, and so the base is.
+    For an accelerometer, gravity is the same as an acceleration of the base against gravity. So the base is
+    accelerated by -gravity.
     """
     how["base"] = against_gravity(how.get("base", STILL_STATE), gravity)
     program = program_of(plan, turned=True)
-    return _computed(_cores().imus, plan, program, [q, v, a], Reference.LOCAL, (6,), **how)
+    return _compute(_cores().imus, plan, program, [q, v, a], Reference.LOCAL, (6,), **how)
 
 
-def _computed(
+def _compute(
     core: Core,
     plan: CompiledTree,
     program: Program,
@@ -138,15 +138,15 @@ def _computed(
     out: FloatArray | None = None,
     threads: int | None = None,
 ) -> FloatArray:
-    """(n, frames, *shape) by a core, of q, and v, and a.
+    """Return (n, frames, *shape), computed by a kernel from q, or q and v, or q, v and a.
 
     Raises:
         NotFiniteError: an input is not finite.
-        RangeError: a result is not, although the inputs are.
+        RangeError: a result is not finite, although the inputs are.
     """
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
-    inputs = [x[:1] if _is_the_same_for_all(x) else x for x in inputs]
+    inputs = [x[:1] if _is_broadcast(x) else x for x in inputs]
     staged = is_staged(out)
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
@@ -156,14 +156,15 @@ def _computed(
         return outcome
 
     if in_blocks(compute, [base, *inputs], out, threads) or plan.is_large or _is_large(base):
-        _demand_finite([base, *inputs], out)
+        _check_finite([base, *inputs], out)
     return out
 
 
 def is_staged(out: FloatArray) -> bool:
-    """Whether results are put together block by block, then written past the caches, whole lines at a time.
+    """Return whether results are collected block by block and then written past the caches, in whole lines.
 
-    A line that is written in pieces is read before, and an output beyond a cache's size is nowhere near.
+    A processor reads a cache line before it writes a part of it. For an output larger than the cache that
+    read is slow.
     """
     return out.nbytes >= _STREAMED and LANES * out[0].size <= _MOST_STAGED
 
@@ -171,14 +172,14 @@ def is_staged(out: FloatArray) -> bool:
 def task_of(
     program: Program, reference: Reference, inputs: Sequence[FloatArray], out: FloatArray, *, staged: bool
 ) -> tuple[NDArray[np.int64], object]:
-    """A core's task, and the memory that has to live until it is done.
+    """Return a kernel's arguments, and the arrays that must live until it has finished.
 
     Args:
-        program: The walk's.
-        reference: Of the results.
-        inputs: The base's state, q, and v, and a as far as they are wanted; of one row, or as many as `out`.
-        out: (n, ...) to be filled.
-        staged: Whether its blocks are (`is_staged`).
+        program: The program of the recursion.
+        reference: The reference frame of the results.
+        inputs: The base's state, q and, if needed, v and a; each with one row or as many as `out`.
+        out: (n, ...) array for the result.
+        staged: Whether blocks are collected before output (`is_staged`).
     """
     width, memory, task = out[0].size, scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
     stage = lines(LANES * width if staged else 0)
@@ -193,8 +194,8 @@ def task_of(
     return task, (memory, stage)
 
 
-def _is_the_same_for_all(x: FloatArray) -> bool:
-    """Whether rows are one row that was broadcast."""
+def _is_broadcast(x: FloatArray) -> bool:
+    """Return whether all rows are one row that was broadcast."""
     return len(x) > 1 and x.strides[0] == 0
 
 
@@ -202,8 +203,8 @@ def _is_large(base: FloatArray) -> bool:
     return base is not STILL_STATE and not float(np.abs(base).max(initial=0.0)) < LARGE
 
 
-def _demand_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Results that are finite, from inputs that are; where all is ordinary nothing needs to be looked at."""
+def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
+    """Raise an error for non-finite inputs or results; called only if an input is not ordinary."""
     if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")
     finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))

@@ -1,4 +1,4 @@
-"""What a core is told, as one row of whole numbers: addresses, sizes, and what is wanted."""
+"""The arguments of a kernel as one row of integers: addresses, sizes and options."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from urdfkin.compiled.memory import LANES
 from urdfkin.compiled.program import Program
 from urdfkin.model.tree import FloatArray
 
-#: Bytes of a cache line, over two of which no vector may reach: that halves the speed.
+#: Bytes of a cache line. A vector across two lines would halve the speed.
 _LINE = 64
 
 
 class KernelArgs(IntEnum):
-    """Places in the row; the last ones are for who computes one configuration after the other (`single`)."""
+    """Indices in the row; those from CORE on are for calls with one configuration (`single`)."""
 
     @staticmethod
     def _generate_next_value_(name: str, start: int, count: int, last_values: list[int]) -> int:
@@ -29,17 +29,17 @@ class KernelArgs(IntEnum):
     Q = auto()
     V = auto()
     A = auto()
-    #: The base's state (rows of 24 numbers); 0 where it stands still at the world's origin.
+    #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: From the numbers of one configuration to those of the next; 0 where they are the same for all.
+    #: Step from one configuration's numbers to the next one's; 0 if all configurations share them.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()
     STRIDE_BASE = auto()
     OUT = auto()
-    #: Numbers that one configuration puts there.
+    #: Number of output numbers for one configuration.
     WIDTH = auto()
-    #: Where a block's results come together on their way there; 0 where they go there at once.
+    #: Address of a buffer that collects a block's results before output; 0 for direct output.
     STAGE = auto()
 
     CORE = auto()
@@ -54,12 +54,12 @@ class KernelArgs(IntEnum):
 
 
 def scratch(program: Program) -> FloatArray:
-    """Memory for a walk to work in."""
+    """Return scratch memory for a run of a program."""
     return lines(program.rows * LANES)
 
 
 def lines(count: int) -> FloatArray:
-    """Memory for so many numbers, whose address is a cache line's."""
+    """Return memory for `count` numbers, aligned to a cache line."""
     numbers = np.empty(count + _LINE // 8)
     first = -numbers.ctypes.data % _LINE // 8
     return numbers[first : first + count]

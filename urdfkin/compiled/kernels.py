@@ -1,7 +1,7 @@
-"""The compiled walks, one for each quantity: functions of the address of a task (`task`).
+"""The compiled recursions, one for each quantity. Each takes the address of its arguments (`kernel_args`).
 
-The same one computes a batch, eight configurations at a time, and a single configuration, which then stands
-in all eight lanes: one result for a configuration, to the last bit, wherever it stands.
+The same kernel computes a batch, eight configurations at a time, and a single configuration in all eight
+lanes. So the result of a configuration has the same bits at every position of a batch.
 """
 
 from __future__ import annotations
@@ -30,25 +30,25 @@ from urdfkin.compiled.recursion import forward_recursion
 
 @core
 def placements(task):
-    """Places of frames: 7.77 with the rotations alongside."""
+    """Placements of frames: 7.77 with the rotations."""
     return forward_recursion(task, world_axes, 1, follow_place, keep_none, column_none, emit_place)
 
 
 @core
 def velocities(task):
-    """7.127, 7.128 in the world's axes."""
+    """Velocities, 7.127 and 7.128, in the world's axes."""
     return forward_recursion(task, world_axes, 2, follow_velocity, keep_none, column_none, emit_velocity)
 
 
 @core
 def local_velocities(task):
-    """7.127, 7.128 in each frame's own axes."""
+    """Velocities, 7.127 and 7.128, in each frame's own axes."""
     return forward_recursion(task, link_axes, 2, follow_velocity, keep_none, column_none, emit_velocity)
 
 
 @core
 def accelerations(task):
-    """7.129, 7.130 in the world's axes."""
+    """Accelerations, 7.129 and 7.130, in the world's axes."""
     return forward_recursion(
         task, world_axes, 3, follow_acceleration, keep_none, column_none, emit_acceleration
     )
@@ -56,7 +56,7 @@ def accelerations(task):
 
 @core
 def local_accelerations(task):
-    """7.129, 7.130 in each frame's own axes."""
+    """Accelerations, 7.129 and 7.130, in each frame's own axes."""
     return forward_recursion(
         task, link_axes, 3, follow_acceleration, keep_none, column_none, emit_acceleration
     )
@@ -64,23 +64,23 @@ def local_accelerations(task):
 
 @core
 def jacobians(task):
-    """7.85."""
+    """Jacobians, 7.85."""
     return forward_recursion(task, world_axes, 1, follow_place, keep_axis, column_jacobian, emit_matrix)
 
 
 @core
 def jacobian_rates(task):
-    """The J-dot of 7.126."""
+    """Time derivatives of the Jacobians: J-dot of 7.126."""
     return forward_recursion(task, world_axes, 2, follow_velocity, keep_moving_axis, column_rate, emit_matrix)
 
 
 @core
 def hessians(task):
-    """The derivatives of 7.85 by each rate: a kernel that only those wait for who ask for it."""
+    """Derivatives of 7.85 by each joint velocity; a kernel of its own, compiled only when it is needed."""
     return forward_recursion(task, world_axes, 1, follow_place, keep_axis, column_jacobian, emit_pairs)
 
 
 @core
 def imus(task):
-    """7.127, 7.129, 7.130 in each frame's own axes: acceleration and angular velocity."""
+    """Accelerometer and gyroscope readings, 7.127, 7.129 and 7.130, in each frame's own axes."""
     return forward_recursion(task, link_axes, 3, follow_acceleration, keep_none, column_none, emit_imu)

@@ -1,14 +1,11 @@
-"""Eight configurations side by side in one register: numbers from memory, and back.
+"""Transfer of numbers between arrays in memory and scratch memory, eight configurations at a time.
 
-Scratch memory holds *rows* of `LANES` doubles, one for each configuration of a block.
+Scratch memory consists of *rows* of `LANES` doubles, one double for each configuration of a block.
 
-
-From memory to rows of scratch and back: eight configurations at a time, eight numbers at a time.
-
-In memory the numbers of one configuration lie together; in scratch those of one row do, one for each
-configuration. Going from one to the other is a transposition. Number by number it took a third of the time
-of a Jacobian; in blocks of eight by eight it is a few shuffles. What is left of a width that eight does not
-divide goes in blocks of four, two and one.
+In an array, all numbers of one configuration are adjacent. In scratch memory, one number of all eight
+configurations is adjacent. The transfer is a transposition. Number by number it would take a third of the
+time of a Jacobian; in blocks of eight by eight it takes a few shuffles. The remainder of a width that is not
+a multiple of eight is transferred in blocks of four, two and one.
 """
 
 from __future__ import annotations
@@ -24,7 +21,7 @@ from urdfkin.compiled.compiling import compiled, helper
 from urdfkin.compiled.numbers import NOTHING, Known, Lanes, as_number, in_all_lanes
 from urdfkin.compiled.plan import LARGE
 
-#: Configurations side by side: one AVX-512 register, two of AVX2.
+#: Number of configurations in a row: one AVX-512 register, or two of AVX2.
 LANES = 8
 NUMBER = Lanes(LANES)
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
@@ -38,7 +35,7 @@ def _in_row(builder: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number(context: Any, s: Any, row: Any) -> Any:
-    """The number in a row of scratch."""
+    """Return the number in a row of scratch memory."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.load(_in_row(builder, *arguments), align=64)
@@ -48,7 +45,7 @@ def number(context: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
-    """The number in a row; nothing where `wanted` is nothing."""
+    """Return the number in a row; nothing if `wanted` is nothing."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if isinstance(wanted, Known):
@@ -60,7 +57,7 @@ def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def put(context: Any, s: Any, row: Any, x: Any) -> Any:
-    """Write a number to a row of scratch; nothing is not written."""
+    """Write a number to a row of scratch memory; for nothing, do nothing."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         s, row, value = arguments
@@ -74,7 +71,7 @@ def put(context: Any, s: Any, row: Any, x: Any) -> Any:
 
 @intrinsic
 def constant(context: Any, g: Any, i: Any) -> Any:
-    """The number `g[i]`, the same for all configurations."""
+    """Return `g[i]` as a number, the same for all configurations."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, builder.load(builder.gep(arguments[0], [arguments[1]])), LANES)
@@ -84,7 +81,7 @@ def constant(context: Any, g: Any, i: Any) -> Any:
 
 @intrinsic
 def same(context: Any, x: Any) -> Any:
-    """A double as a number."""
+    """Return a double as a number, the same for all configurations."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, arguments[0], LANES)
@@ -94,7 +91,7 @@ def same(context: Any, x: Any) -> Any:
 
 @intrinsic
 def numbers_of(context: Any, array: Any) -> Any:
-    """The numbers of an array without its shape: no test for a negative index for each of them."""
+    """Return a pointer to an array's numbers; access by it has no test for negative indices."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return context.make_array(signature.args[0])(context, builder, arguments[0]).data
@@ -113,23 +110,23 @@ def _at_address(kind: Any) -> Any:
     return at_address
 
 
-#: The numbers, or whole numbers, at an address.
+#: Pointers to doubles, or to integers, at an address.
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 
-#: Numbers in half of a first-level cache.
+#: Number of doubles in half of a first-level cache.
 _MOST_FETCHED = 3072
 _NUMBERS = types.CPointer(types.float64)
 
 
 def _piece(builder: Any, vector: Any, start: int, width: int) -> Any:
-    """`width` elements of a vector."""
+    """Return `width` elements of a vector."""
     mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(start, start + width)))
     return builder.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), mask)
 
 
-def _joined(builder: Any, pieces: Sequence[Any]) -> Any:
-    """Vectors of equal width, a power of two of them, one behind the other."""
+def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
+    """Concatenate vectors of equal width; their number is a power of two."""
     while len(pieces) > 1:
         width = 2 * pieces[0].type.count
         mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(width)))
@@ -137,10 +134,10 @@ def _joined(builder: Any, pieces: Sequence[Any]) -> Any:
     return pieces[0]
 
 
-def _transposed(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Square blocks, side by side in the vectors, each turned over: its own inverse.
+def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
+    """Transpose square blocks, which are side by side in the vectors.
 
-    For w = 1, 2, 4: in each block of 2w by 2w, the upper right and the lower left w by w change rows.
+    For w = 1, 2, 4: in each block of 2w by 2w, exchange the upper right and the lower left w by w block.
     """
     x, w = list(vectors), 1
     while w < len(x):
@@ -155,7 +152,7 @@ def _transposed(builder: Any, vectors: Sequence[Any]) -> list[Any]:
 
 
 def _vector_at(builder: Any, numbers: Any, at: Any, width: int) -> Any:
-    """The address of `width` numbers that begin at `numbers[at]`."""
+    """Return the address of `width` numbers that begin at `numbers[at]`."""
     return builder.bitcast(builder.gep(numbers, [at]), ir.VectorType(ir.DoubleType(), width).as_pointer())
 
 
@@ -163,8 +160,8 @@ def _plus(builder: Any, number: Any, constant: int) -> Any:
     return builder.add(number, ir.Constant(number.type, constant))
 
 
-def _reading(width: int) -> Any:
-    """A block of eight configurations, `width` numbers of each, into rows."""
+def _make_reader(width: int) -> Any:
+    """Return a function that reads `width` numbers of each of eight configurations into rows."""
 
     @intrinsic
     def read(context: Any, x: Any, at: Any, stride: Any, s: Any, row: Any) -> Any:
@@ -174,7 +171,7 @@ def _reading(width: int) -> Any:
             for _ in range(LANES):
                 pieces.append(builder.load(_vector_at(builder, x, at, width), align=8))
                 at = builder.add(at, stride)
-            rows = _transposed(builder, [_joined(builder, pieces[i::width]) for i in range(width)])
+            rows = _transpose_blocks(builder, [_concatenate(builder, pieces[i::width]) for i in range(width)])
             to = builder.mul(row, ir.Constant(row.type, LANES))
             for i, vector in enumerate(rows):
                 place = _vector_at(builder, s, _plus(builder, to, LANES * i), LANES)
@@ -186,8 +183,8 @@ def _reading(width: int) -> Any:
     return read
 
 
-def _writing(width: int) -> Any:
-    """`width` rows, wherever they are, into the memory of eight configurations."""
+def _make_writer(width: int) -> Any:
+    """Return a function that writes `width` rows, with any indices, to the memory of eight configurations."""
 
     @intrinsic
     def write(context: Any, s: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
@@ -198,7 +195,7 @@ def _writing(width: int) -> Any:
                 row = builder.load(builder.gep(rows, [_plus(builder, first, i)]))
                 begin = builder.mul(row, ir.Constant(row.type, LANES))
                 vectors.append(builder.load(_vector_at(builder, s, begin, LANES), align=64))
-            blocks = _transposed(builder, vectors)
+            blocks = _transpose_blocks(builder, vectors)
             for k in range(LANES):
                 numbers = _piece(builder, blocks[k % width], k // width * width, width)
                 builder.store(numbers, _vector_at(builder, to, at, width), align=8)
@@ -211,15 +208,15 @@ def _writing(width: int) -> Any:
     return write
 
 
-_read_8, _read_4, _read_2, _read_1 = map(_reading, (8, 4, 2, 1))
-_write_8, _write_4, _write_2, _write_1 = map(_writing, (8, 4, 2, 1))
+_read_8, _read_4, _read_2, _read_1 = map(_make_reader, (8, 4, 2, 1))
+_write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 
 
 @compiled
 def read_rows(m, x, at, stride, count, s, row):
-    """`count` numbers, from `x[at]` on, of each of eight configurations `stride` apart, into rows.
+    """Read `count` numbers, from `x[at]` on, of each of eight configurations into rows.
 
-    Where `m` is 1, those of one configuration, which then stands in all lanes.
+    The configurations are `stride` apart. If `m` is 1, read one configuration into all lanes.
     """
     i = 0
     if m == 1:
@@ -241,7 +238,7 @@ def read_rows(m, x, at, stride, count, s, row):
 
 @compiled
 def write_rows(m, s, rows, first, count, to, at, stride):
-    """Rows `rows[first]`, ... as `count` numbers, from `to[at]` on, of eight configurations, or of one."""
+    """Write rows `rows[first]`, ... from `to[at]` on: `count` numbers of eight configurations, or of one."""
     i = 0
     if m == 1:
         for i in range(count):
@@ -262,9 +259,9 @@ def write_rows(m, s, rows, first, count, to, at, stride):
 
 @helper(fastmath={"reassoc"})
 def ordinary(x, at, count):
-    """Whether `count` numbers are: none that is no number or infinite, and their sizes no more than `LARGE`.
+    """Return whether `count` numbers are ordinary: none is nan or infinite, and sizes are at most `LARGE`.
 
-    The order of this sum is left to the compiler.
+    The compiler may reorder this sum.
     """
     total = 0.0
     for i in range(count):
@@ -274,7 +271,7 @@ def ordinary(x, at, count):
 
 @intrinsic
 def _fetch(context: Any, x: Any, at: Any) -> Any:
-    """Have the memory around `x[at]` brought near; an address beyond the end does no harm."""
+    """Prefetch the memory around `x[at]`; an address beyond the end is harmless."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), ir.IntType(8).as_pointer())
@@ -290,7 +287,7 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
 
 @compiled
 def fetch(x, at, count):
-    """Ask for the `count` numbers from `x[at]` on: the next block's inputs, while this one is computed."""
+    """Prefetch the `count` numbers from `x[at]` on: the next block's inputs, during this block."""
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):
             _fetch(x, number)
@@ -298,7 +295,7 @@ def fetch(x, at, count):
 
 @intrinsic
 def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
-    """A whole cache line of `x` to one of `to`, past the caches."""
+    """Copy a cache line of `x` to a line of `to`, past the caches."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, i, to, at = arguments
@@ -312,7 +309,7 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
 @compiled
 def stream(x, count, to, at, address):
-    """`count` numbers to `to[at]` on, past the caches: a line that is written whole is not read before.
+    """Copy `count` numbers to `to[at]` and after it, past the caches: a whole line is not read before.
 
     `address` is that of `to[0]`.
     """
@@ -328,7 +325,7 @@ def stream(x, count, to, at, address):
 
 @intrinsic
 def all_written(context: Any) -> Any:
-    """Wait until what was streamed is in memory, for whoever reads it on another processor."""
+    """Wait until the copied lines are in memory, so that another processor can read them."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         builder.fence("seq_cst")

@@ -1,14 +1,14 @@
-"""Numbers for compiled code: one or several doubles that are computed with as if they were one.
+"""Number types for compiled code: one double or several doubles as one number.
 
-`Lanes(8)` is eight doubles in one vector register, `Lanes(1)` is one: each a Numba type over LLVM's vectors,
-so that a number lives in a register from one equation to the next. A product is kept as its two factors
-until it meets a sum: x y + z is then one fused multiply-add, rounded once. The fusing is said here and left
-to nobody, so that results are the same bits for one lane and for eight, whatever the machine.
+`Lanes(8)` is eight doubles in one vector register, `Lanes(1)` is one. Both are Numba types over LLVM's
+vectors, so a number stays in a register from one equation to the next. A product is stored as its two factors
+until it is added: x y + z is then one fused multiply-add, rounded once. The code specifies each fusion and
+leaves none to the compiler. So results have the same bits for one lane and for eight, on every machine.
 
-`zero()` and `one()` are numbers that are known before anything runs: what is multiplied by them, or added
-to zero, costs nothing. With z = (0, 0, 1) so written, the equations of any axis become those of the axis z,
-and a turn about x leaves x alone. `nothing()` is a number that nobody asks for: what is computed from it is
-nothing either, and costs as much.
+`zero()` and `one()` are numbers known at compile time: a product with them, or a sum with zero, is free.
+With z = (0, 0, 1) in this form, the equations of any axis become those of the axis z, and a rotation about x
+leaves x unchanged. `nothing()` is an unused number: everything computed from it is also nothing, and costs
+nothing.
 """
 
 from __future__ import annotations
@@ -29,35 +29,35 @@ _DOUBLE = ir.DoubleType()
 
 
 class Lanes(types.Type):
-    """Doubles side by side."""
+    """Several doubles in one vector."""
 
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"Lanes({width})")
 
     def can_convert_from(self, context: Any, other: Any) -> Any:
-        """A product can stand wherever a number can."""
+        """Convert a product to a number."""
         return Conversion.safe if isinstance(other, Product) and other.width == self.width else None
 
     def unify(self, context: Any, other: Any) -> Any:
-        """A number and a product are a number."""
+        """Return the common type of a number and a product: a number."""
         return self if isinstance(other, Product) and other.width == self.width else None
 
 
 class Product(types.Type):
-    """Two numbers that are yet to be multiplied."""
+    """Two numbers that are not yet multiplied."""
 
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"Product({width})")
 
     def unify(self, context: Any, other: Any) -> Any:
-        """A number and a product are a number."""
+        """Return the common type of a number and a product: a number."""
         return other if isinstance(other, Lanes) and other.width == self.width else None
 
 
 class Known(types.Type):
-    """0 or 1, known when a kernel is compiled; None for what nobody asks for."""
+    """0 or 1, known when a kernel is compiled; None for an unused number."""
 
     def __init__(self, value: int | None) -> None:
         self.value = value
@@ -85,11 +85,11 @@ class _KnownModel(models.OpaqueModel):
     pass
 
 
-# -- arithmetic: what an operation gives, and how ---------------------------------------------------
+# -- arithmetic: result types and code generation ---------------------------------------------------
 
 
 class _Value:
-    """A number on its way through the compiler: its type, and what LLVM knows it by."""
+    """A number during compilation: its type and its LLVM value."""
 
     def __init__(self, context: Any, builder: Any, type_: Any, value: Any) -> None:
         self.context, self.builder, self.type = context, builder, type_
@@ -104,7 +104,7 @@ class _Value:
         return pair.x, pair.y
 
     def number(self, width: int) -> Any:
-        """The number itself as a vector; a product is multiplied and rounded."""
+        """Return the number as a vector; a product is multiplied and rounded."""
         if self.is_product:
             return self.builder.fmul(*self.factors())
         if isinstance(self.type, Known):
@@ -115,7 +115,7 @@ class _Value:
 
 
 def in_all_lanes(builder: Any, double: Any, width: int) -> Any:
-    """One double in every lane."""
+    """Return a vector with one double in every lane."""
     empty = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
     first = builder.insert_element(empty, double, ir.Constant(ir.IntType(32), 0))
     mask = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
@@ -123,7 +123,7 @@ def in_all_lanes(builder: Any, double: Any, width: int) -> Any:
 
 
 def fused(builder: Any, x: Any, y: Any, z: Any) -> Any:
-    """`x y + z`, rounded once."""
+    """Return `x y + z`, rounded once."""
     function = builder.module.globals.get(name := f"llvm.fma.v{x.type.count}f64")
     if function is None:
         function = ir.Function(builder.module, ir.FunctionType(x.type, [x.type] * 3), name)
@@ -139,7 +139,7 @@ def _known(kind: Any, value: int | None) -> bool:
 
 
 def _ours(*kinds: Any) -> bool:
-    """Numbers of ours, among which a whole number may stand, as in 2 w x u."""
+    """Return whether all are types of this module; integers are allowed too, as in 2 w x u."""
     ours = [isinstance(kind, Lanes | Product | Known) for kind in kinds]
     return any(ours) and all(
         mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)
@@ -222,7 +222,7 @@ def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> An
 
 
 def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> Any:
-    """Any number but nothing, as LLVM's vector."""
+    """Return any number except nothing as an LLVM vector."""
     return _Value(context, builder, kind, value).number(width)
 
 
@@ -242,7 +242,7 @@ def _lower_add(context: Any, builder: Any, signature: Any, arguments: Any) -> An
     return builder.fadd(x.number(width), y.number(width))
 
 
-def _negated(context: Any, builder: Any, x: _Value) -> Any:
+def _negate(context: Any, builder: Any, x: _Value) -> Any:
     if isinstance(x.type, Known):
         return context.get_dummy_value()
     if x.is_product:
@@ -258,7 +258,7 @@ def _lower_sub(context: Any, builder: Any, signature: Any, arguments: Any) -> An
     if _known(y.type, 0):
         return x.value
     if _known(x.type, 0):
-        return _negated(context, builder, y)
+        return _negate(context, builder, y)
     width = signature.return_type.width
     if y.is_product:
         first, second = y.factors()
@@ -270,7 +270,7 @@ def _lower_sub(context: Any, builder: Any, signature: Any, arguments: Any) -> An
 
 def _lower_neg(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     (x,) = _values(context, builder, signature, arguments)
-    return _negated(context, builder, x)
+    return _negate(context, builder, x)
 
 
 _KINDS = (Lanes, Product, Known, types.Integer)
@@ -285,11 +285,11 @@ for _x in (Lanes, Product, Known):
     lower_builtin(operator.neg, _x)(_lower_neg)
 
 
-def _multiplied(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
+def _multiply(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
     return _Value(context, builder, fromty, value).number(toty.width)
 
 
-lower_cast(Product, Lanes)(_multiplied)
+lower_cast(Product, Lanes)(_multiply)
 
 
 def _known_number(kind: Known) -> Any:
@@ -305,7 +305,7 @@ zero, one, nothing = map(_known_number, (ZERO, ONE, NOTHING))
 
 @intrinsic
 def rounded(context: Any, x: Any) -> Any:
-    """A product multiplied and rounded, any other number as it is: where two sides must round alike."""
+    """Multiply and round a product; return other numbers unchanged. So two sides are rounded alike."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = signature.args[0]

@@ -1,8 +1,8 @@
-"""What a walk hands out: places, velocities, accelerations, Jacobians and what they change by, by reference.
+"""Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-Each output says what it follows of a state, and what it makes of the state of a frame. Velocities and
-accelerations come in the axes that their reference asks for (`axes`); columns are made in the world's, and
-LOCAL turns them to the frame's own.
+Each output has a function that selects the parts of the state that it needs, and one that writes the result
+of a frame. Velocities and accelerations are computed in the axes of their reference frame (`axes`). Columns
+are computed in the world's axes; for LOCAL they are rotated to the frame's own.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ _POSE = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, O
 _SIX = np.arange(OUT_ROW, OUT_ROW + 6)
 
 
-# -- what is followed ------------------------------------------------------------------------------------
+# -- needed parts of the state ---------------------------------------------------------------------------
 
 
 @compiled
-def _unfollowed():
+def _unused_vector():
     return nothing(), nothing(), nothing()
 
 
 @compiled
 def follow_place(state):
-    """R and p."""
-    return state[0], state[1], _unfollowed(), _unfollowed(), _unfollowed(), _unfollowed()
+    """Keep R and p."""
+    return state[0], state[1], _unused_vector(), _unused_vector(), _unused_vector(), _unused_vector()
 
 
 @compiled
 def follow_velocity(state):
-    """R, p, w and vel."""
-    return state[0], state[1], state[2], state[3], _unfollowed(), _unfollowed()
+    """Keep R, p, w and vel."""
+    return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
 @compiled
 def follow_acceleration(state):
-    """R, p, w, alpha and acc: 7.130 asks nobody for vel."""
-    return state[0], state[1], state[2], _unfollowed(), state[4], state[5]
+    """Keep R, p, w, alpha and acc; 7.130 does not need vel."""
+    return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
 @compiled
@@ -55,12 +55,12 @@ def _no_vector():
     return zero(), zero(), zero()
 
 
-# -- one frame's numbers ---------------------------------------------------------------------------------
+# -- the result of one frame -----------------------------------------------------------------------------
 
 
 @compiled
 def emit_place(m, s, program, place, sources, b, reference, state, to):
-    """The 4 by 4 pose."""
+    """Write the 4 by 4 pose."""
     R, p = state[0], state[1]
     _pose_row(s, OUT_ROW, R[0], p[0])
     _pose_row(s, OUT_ROW + 4, R[1], p[1])
@@ -71,23 +71,23 @@ def emit_place(m, s, program, place, sources, b, reference, state, to):
 
 @compiled
 def _pose_row(s, row, x, last):
-    """A row of a pose."""
+    """Write a row of a pose."""
     put_vector(s, row, x)
     put(s, row + 3, last)
 
 
 @compiled
 def emit_velocity(m, s, program, place, sources, b, reference, state, to):
-    """[linear; angular]: 7.127, 7.128 in a reference."""
+    """Write [linear; angular] velocity, 7.127 and 7.128, in a reference frame."""
     p, w, vel = state[1], state[2], state[3]
-    if reference == _WORLD:  # the point of the body that is at the world's origin now
+    if reference == _WORLD:  # the point of the body that is now at the world's origin
         vel = eq.point_velocity(vel, w, eq.minus(_no_vector(), p))
     _emit_six(m, s, program, place, b, vel, w, to)
 
 
 @compiled
 def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
-    """[linear; angular]: 7.129, 7.130 in a reference."""
+    """Write [linear; angular] acceleration, 7.129 and 7.130, in a reference frame."""
     p, w, alpha, acc = state[1], state[2], state[4], state[5]
     if reference == _WORLD:
         acc = eq.point_acceleration(acc, alpha, w, eq.minus(_no_vector(), p))
@@ -96,7 +96,7 @@ def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
 
 @compiled
 def emit_imu(m, s, program, place, sources, b, reference, state, to):
-    """What an accelerometer and a gyroscope read, on a base that is accelerated against gravity."""
+    """Write accelerometer and gyroscope readings; the base is accelerated against gravity."""
     _emit_six(m, s, program, place, b, state[5], state[2], to)
 
 
@@ -110,7 +110,7 @@ def _emit_six(m, s, program, place, b, linear, angular, to):
 
 @compiled
 def emit_matrix(m, s, program, place, sources, b, reference, state, to):
-    """The columns that were computed, and zeros for the rates that do not move the frame."""
+    """Write the computed columns, and zeros for the joint velocities that do not move the frame."""
     frames, size = program[_FRAMES], 6 * program[_NV]
     write_rows(m, s, program, sources, size, to, (b * frames + place) * size, frames * size)
 
@@ -120,17 +120,17 @@ def emit_matrix(m, s, program, place, sources, b, reference, state, to):
 
 @compiled
 def keep_none(s, row, axis, state):
-    """Outputs without columns."""
+    """Do nothing: the output has no columns."""
 
 
 @compiled
 def column_none(s, row, to, how, g, c, reference, state):
-    """Outputs without columns."""
+    """Do nothing: the output has no columns."""
 
 
 @compiled
 def keep_axis(s, row, axis, state):
-    """The axis z_{i-1} and the origin O_{i-1} of a rate, in the world's axes: what 7.85 needs."""
+    """Store the axis z_{i-1} and the origin O_{i-1} of a joint, in the world's axes, as 7.85 needs them."""
     R, p = state[0], state[1]
     if axis == 2:
         put_vector(s, row, (R[0][2], R[1][2], R[2][2]))
@@ -143,7 +143,7 @@ def keep_axis(s, row, axis, state):
 
 @compiled
 def keep_moving_axis(s, row, axis, state):
-    """And how they move: the w and vel of the link that the axis rides on."""
+    """Store the axis and the origin, and w and vel of the link that carries the axis."""
     keep_axis(s, row, axis, state)
     put_vector(s, row + 6, state[2])
     put_vector(s, row + 9, state[3])
@@ -151,7 +151,7 @@ def keep_moving_axis(s, row, axis, state):
 
 @compiled
 def column_jacobian(s, row, to, how, g, c, reference, state):
-    """[z x d_{i-1,n}; z] for a turning rate, [z; 0] for a sliding one (7.85), in a reference."""
+    """Compute [z x d_{i-1,n}; z] of a revolute joint, [z; 0] of a prismatic one (7.85), in a reference."""
     z, R = vector(s, row), state[0]
     if how & 1:
         d = eq.minus(_end(reference, state[1]), vector(s, row + 3))
@@ -163,7 +163,7 @@ def column_jacobian(s, row, to, how, g, c, reference, state):
 
 @compiled
 def column_rate(s, row, to, how, g, c, reference, state):
-    """The rate of that column (7.126). In the frame's own axes it is the rate of the numbers there."""
+    """Compute the time derivative of that column (7.126); for LOCAL, of its numbers in the frame's axes."""
     R, p, w, vel = state[0], state[1], state[2], state[3]
     z = vector(s, row)
     z_rate = eq.axis_rate(vector(s, row + 6), z)
@@ -184,7 +184,7 @@ def column_rate(s, row, to, how, g, c, reference, state):
 
 @compiled
 def _end(reference, x):
-    """To where a column's moment arm reaches: the frame's origin, or the world's."""
+    """Return the reference point of a column: the frame's origin, or the world's."""
     if reference == _WORLD:
         nil = same(0.0)
         x = nil, nil, nil
@@ -193,7 +193,7 @@ def _end(reference, x):
 
 @compiled
 def _put_column(s, to, how, g, c, reference, R, linear, angular):
-    """Seen in the reference's axes; times a follower's multiplier, added to what its leader's rate does."""
+    """Write a column in the reference's axes; add that of a mimic joint, scaled, to its mimicked joint's."""
     if reference == _LOCAL:
         back = eq.transposed(R)
         linear, angular = eq.rotate(back, linear), eq.rotate(back, angular)
@@ -224,7 +224,7 @@ def _add_six(s, to, linear, angular):
 
 @compiled
 def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
-    """How each column changes with each rate, (6, nv, nv), from the columns themselves."""
+    """Write the derivative of each column by each joint velocity, (6, nv, nv), from the columns."""
     count, nv = program[pairs], program[_NV]
     first, end = pairs + 1, pairs + 1 + PAIR_WIDTH * count
     frames, size = program[_FRAMES], nv * nv
@@ -234,7 +234,7 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
             put_vector(s, program[j + 3], _no_vector())
             put_vector(s, program[j + 3] + 3, _no_vector())
         for i in range(first, end, PAIR_WIDTH):
-            if program[i + 2] == rate:  # a leader's own column, and those of its followers
+            if program[i + 2] == rate:  # a joint's own column, and those of its mimic joints
                 _add_changes(s, program, i, first, end, reference)
         for row in range(6):
             at = begin + row * size + rate * nv
@@ -243,10 +243,11 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
 
 @compiled
 def _add_changes(s, program, i, first, end, reference):
-    """What each rate does to column i.
+    """Add the derivatives of column i by each joint velocity.
 
-    A rate before the column turns all of it; one behind it moves the end of its arm. From the world's origin
-    there is no end that moves; the frame's own axes move as all that is before them does.
+    A joint before the column rotates the whole column. A joint behind it moves only the frame's origin, the
+    reference point of the column. For WORLD that point is fixed. For LOCAL the frame's axes move with all
+    joints before the column, so these do not change it.
     """
     v_i, w_i = vector(s, program[i]), vector(s, program[i] + 3)
     for j in range(first, end, PAIR_WIDTH):

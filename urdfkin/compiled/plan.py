@@ -1,8 +1,8 @@
-"""What the recursion does for a tree, as plain arrays: one step a moving joint, one row a frame.
+"""A tree as plain arrays for the recursion: one step for each moving joint, one row for each frame.
 
-Every joint frame is turned so that its axis is z (`A` below), as in the text: then each revolute joint is
-Rz and each prismatic one Tz. Fixed joints are folded into the offsets. A plan for one frame holds the
-frame's ancestors alone; a plan for several frames holds every joint one of them needs.
+Every joint frame is rotated so that its axis is z (`A` below), as in the textbook. Then each revolute joint
+is Rz and each prismatic joint Tz. Fixed joints are folded into the offsets. A plan contains only the joints
+that its frames need.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 IntArray = NDArray[np.int64]
 
 
-#: Where coordinates, rates, lengths and multipliers are smaller than this, no result overflows: with N joints
-#: a rate is less than LARGE^2, the path N LARGE^2, and so w^2 d, the largest product, N^3 LARGE^6.
+#: If coordinates, velocities, lengths and multipliers are below this, no result overflows. With N joints, a
+#: velocity is below LARGE^2 and the path below N LARGE^2. So w^2 d, the largest product, is below
+#: N^3 LARGE^6.
 LARGE = 1e45
 
 
 class Step(IntEnum):
-    """Columns of `CompiledTree.steps` (whole numbers)."""
+    """Columns of `CompiledTree.steps` (integers)."""
 
     KIND = 0
     Q = 1
@@ -37,7 +38,7 @@ class Step(IntEnum):
 
 
 class Motion(IntEnum):
-    """What a step does; the value in column `Step.KIND`."""
+    """The kinds of a step: the values of column `Step.KIND`."""
 
     TURN = 0
     SLIDE = 1
@@ -46,7 +47,7 @@ class Motion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Columns of `CompiledTree.geometry`: R (9), the offset in the axes before (3), then the mimic rule."""
+    """Columns of `CompiledTree.geometry`: R (9), the offset in the previous axes (3), then the mimic rule."""
 
     R = 0
     OFFSET = 9
@@ -55,7 +56,7 @@ class Geometry(IntEnum):
 
 
 class Column(IntEnum):
-    """Columns of `CompiledTree.columns`: a column of eq. 7.85 each row."""
+    """Columns of `CompiledTree.columns`; each row is one column of eq. 7.85."""
 
     STEP = 0
     AXIS = 1
@@ -71,7 +72,7 @@ _MOTION = {
     JointKind.FLOATING: Motion.FLOATING,
 }
 
-#: Which axis of the moved frame each rate of a joint acts along, and whether it turns about it.
+#: For each joint velocity of a joint: the axis of the moved frame, and whether it is a rotation.
 _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
     Motion.TURN: ((2, True),),
     Motion.SLIDE: ((2, False),),
@@ -82,28 +83,28 @@ _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class CompiledTree:
-    """The steps of a walk from the base outwards, and the frames met on the way.
+    """The steps of the recursion from the base outwards, and the frames on the way.
 
     Attributes:
         nq: Length of `q`.
         nv: Length of `v` and `a`.
         joints: The moving joint of each step, as an index into the tree's joints.
-        steps: (steps, 3) whole numbers, columns `Step`.
+        steps: (steps, 3) integers, columns `Step`.
         geometry: (steps, 14), columns `Geometry`.
-        frames: (frames, 2): the step after which a frame is met (-1: the base), and its place in the
-            output; ordered by step.
+        frames: (frames, 2): the step after which a frame comes (-1: the base), and its index in the output;
+            sorted by step.
         offsets: (frames, 12): rotation (9) and offset (3) from the step's frame to the frame, the offset
             in the axes of the step.
-        columns: (columns, 4), columns `Column`: every rate of every step.
+        columns: (columns, 4), columns `Column`: every joint velocity of every step.
         multipliers: (columns,) the mimic multiplier of each column.
-        leaders: (frames, columns): -1 where the column is not the frame's ancestor, else the column that
-            it is added to: itself, but for followers.
-        places_q: Which coordinates the walk needs.
-        parents: (steps,) the step that each step goes on from, -1 for the base.
-        lengths: (steps + frames,) metres: the sum of the lengths of all URDF offsets, fixed joints' too,
-            from a step's parent to it, then from a frame's step to the frame (in the order of `frames`).
-        depth: (frames,) in output order, how many URDF joints lie between a frame and the root.
-        tilts: (frames,) likewise, rad: their `Joint.tilt` added up.
+        leaders: (frames, columns): -1 if the column's joint does not move the frame; else the index of the
+            column to which it is added: its own, or that of the mimicked joint.
+        places_q: Indices of the coordinates that the recursion needs.
+        parents: (steps,) the step before each step, -1 for the base.
+        lengths: (steps + frames,) metres: sum of the lengths of all URDF offsets, fixed joints' too, from a
+            step's parent to it, then from a frame's step to the frame (in the order of `frames`).
+        depth: (frames,) in output order: number of URDF joints between a frame and the root.
+        tilts: (frames,) in output order, rad: sum of the `Joint.tilt` of these joints.
     """
 
     nq: int
@@ -132,12 +133,12 @@ class CompiledTree:
 
     @cached_property
     def made(self) -> dict[object, Any]:
-        """What was made of the plan once: programs, the weights of bounds; by whoever made it."""
+        """Cache of objects derived from the plan, such as programs and weights of bounds, by their makers."""
         return {}
 
     @cached_property
     def is_large(self) -> bool:
-        """Whether results may overflow although coordinates and rates are ordinary."""
+        """Whether results may overflow for ordinary coordinates and velocities, because of the geometry."""
         numbers = self.geometry, self.offsets, self.lengths
         return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
@@ -146,11 +147,11 @@ class CompiledTree:
 
 
 def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
-    """The walk that meets the frames of the given links.
+    """Return the compiled tree with the frames of the given links.
 
     Args:
         tree: The robot.
-        links: Indices into `tree.links`, in the order in which results are wanted.
+        links: Indices into `tree.links`, in the order of the results.
     """
     depths = _depths(tree, links)
     tilts = {0: 0.0}
@@ -192,9 +193,9 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 
 
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
-    """Every link on the way to the given ones, root outwards, and how many joints lie before it.
+    """Return the links on the paths to the given ones, root first, with the number of joints before each.
 
-    Each joint is met once: the paths themselves, one for each link, would be as long as the tree's depth.
+    Each joint is visited once; separate paths for each link would cost time proportional to the tree's depth.
     """
     met = {0}
     for end in links:
@@ -209,7 +210,7 @@ def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
 
 
 class _Anchor(NamedTuple):
-    """Where a link hangs: its step (-1: the base), its pose in that step's turned frame, and how far off."""
+    """A link's step (-1: the base), its pose in that step's rotated frame, and its path length from it."""
 
     step: int
     T: FloatArray
@@ -231,12 +232,12 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
 
 
 def _length(joint: Joint) -> float:
-    # hypot neither under- nor overflows where squares would: a URDF may hold 1e-200 or 1e200.
+    # hypot does not under- or overflow where squares would: a URDF may contain 1e-200 or 1e200.
     return math.hypot(*joint.T_parent_joint[:3, 3].tolist())
 
 
 def turned(joint: Joint) -> FloatArray:
-    """(4, 4) `A`: the pose, in the joint's URDF frame, of the frame whose z is the joint's axis."""
+    """Return `A` (4, 4): pose, in the joint's URDF frame, of the frame with the joint's axis as z."""
     A = np.eye(4)
     if joint.kind.has_axis:
         A[:3, :3] = axis_aligning(joint.axis)
@@ -244,7 +245,7 @@ def turned(joint: Joint) -> FloatArray:
 
 
 def _flat(T: FloatArray) -> FloatArray:
-    """R row by row, then the offset in the axes before."""
+    """Return R row by row, then the offset in the previous axes."""
     return np.concatenate((T[:3, :3].ravel(), T[:3, 3]))
 
 
@@ -276,7 +277,7 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
 
 
 def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
-    """For each frame, known by its last step: the columns of the steps it hangs from, and their leaders."""
+    """For each frame, given its last step, return the columns that move it, and their mimicked columns."""
     leaders = np.full((len(ends), len(columns)), -1, dtype=np.int64)
     rows = columns.tolist()
     for frame, end in enumerate(ends):

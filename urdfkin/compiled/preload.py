@@ -1,4 +1,4 @@
-"""Have kernels compiled before they are needed, by two processors."""
+"""Compile all kernels in advance, with two processes."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from collections.abc import Sequence
 from urdfkin.compiled.compiling import cache_folder
 from urdfkin.system.processes import own_python
 
-#: The cores: half of the work each.
+#: The kernels in two groups of equal compile time.
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
 _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
 
 def load_kernels() -> None:
-    """Compile every core, or read it from disk: before processes start that would all compile.
+    """Compile every kernel, or read it from disk.
 
-    Compiling takes one processor; a second process does half of it, and this one then reads it from disk.
+    Call it before processes start that would each compile. A process compiles on one processor. So a second
+    process compiles half of the kernels, and this process then reads them from disk.
     """
     helper = None if all(map(_on_disk, _OTHER_HALF)) else _compile_elsewhere(_OTHER_HALF)
     try:
@@ -40,8 +41,8 @@ def _on_disk(name: str) -> bool:
 
 
 def _compile_elsewhere(names: Sequence[str]) -> subprocess.Popen[bytes]:
-    """Another interpreter that does nothing but compile; what it fails to do is done here after all."""
-    code = f"from urdfkin.compiled import ahead; ahead._compile({tuple(names)!r})"
+    """Start another interpreter that compiles; this process compiles all kernels that it fails to compile."""
+    code = f"from urdfkin.compiled import preload; preload._compile({tuple(names)!r})"
     return subprocess.Popen(
         own_python(code),
         stdin=subprocess.DEVNULL,

@@ -1,8 +1,8 @@
-"""One frame in one configuration after the other, as fast as Python can ask: for control loops and solvers.
+"""Fast calls for one frame and one configuration at a time, for control loops and solvers.
 
-The walk is that of `Robot`, with the configuration in every lane. The functions are bound to a program and to
-scratch memory of their own, so that a call hands over nothing but its arrays. Where another thread is at
-work in one, a call goes the robot's way, with the same result.
+The recursion is that of `Robot`, with the configuration in every lane. Each function is bound to its program
+and its scratch memory, so a call passes only its arrays. If another thread is using the same function, the
+call uses `Robot` instead, with the same result.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.processes import importing
 
-#: q, or q and v, or q, v and a, and where to write or None: the result. For what it does not take as it is it
-#: returns None; the robot's way then does it all the same, or says what is wrong.
+#: Takes q, or q and v, or q, v and a, then the output array or None; returns the result. It returns None for
+#: arguments that it does not support; `Robot` then computes the result or raises the error.
 Fast = Callable[..., FloatArray | None]
 
 
 class _Robot(Protocol):
-    """Who is asked where a kernel does not take what it is given."""
+    """The robot that computes if a fast function does not support its arguments."""
 
     tree: Any
     verifier: Any
@@ -46,15 +46,15 @@ class _Robot(Protocol):
 
 
 class PreparedFrame:
-    """One frame of a robot in one reference; make one with `Robot.prepare`.
+    """Fast evaluation of one frame in one reference frame; create it with `Robot.prepare`.
 
-    Results are those of `Robot` with `verify=False`, to the last bit, and the ledger counts them as not
-    checked. Contiguous float64 arrays are taken as they are; anything else goes the robot's way, with the
-    same result or the same error. Several threads may share one, on Python without its lock as well.
+    Results have the same bits as those of `Robot` with `verify=False`, and the ledger counts them as not
+    checked. Contiguous float64 arrays are used directly. For other arguments the robot computes, with the
+    same result or the same error. Several threads may share one object, also on free-threaded Python.
 
     Attributes:
         frame: The frame's name.
-        reference: For velocities, Jacobians, Hessians and accelerations.
+        reference: The reference frame of velocities, Jacobians, Hessians and accelerations.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("panda")
@@ -74,7 +74,7 @@ class PreparedFrame:
     def __init__(self, robot: _Robot, frame: str, reference: Reference, plan: CompiledTree) -> None:
         self.frame, self.reference = frame, reference
         self._robot, self._plan = robot, plan
-        # Compiled, or read from disk, when they are first called.
+        # Compiled, or read from disk, at the first call.
         self._placement: Fast = partial(self._first, "placement")
         self._velocity: Fast = partial(self._first, "velocity")
         self._jacobian: Fast = partial(self._first, "jacobian")
@@ -82,47 +82,47 @@ class PreparedFrame:
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
-        # It holds addresses of this process: a copy prepares itself anew.
+        # The object holds addresses of this process: a copy is prepared again.
         return self._robot.prepare, (self.frame, self.reference)
 
-    # The functions count what they hand out themselves, for the ledger.
+    # The functions count their results for the ledger themselves.
 
     def placement(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """(4, 4) T_world_frame: eq. 7.77."""
+        """Return T_world_frame (4, 4): eq. 7.77."""
         if (pose := self._placement(q, out)) is not None:
             return pose
         return self._robot.placement(q, self.frame, out=out, verify=False, threads=1)
 
     def velocity(self, q: Given, v: Given, out: FloatArray | None = None) -> FloatArray:
-        """(6,) [linear; angular] m/s, rad/s: eq. 7.127, 7.128."""
+        """Return the velocity (6,), [linear; angular], m/s and rad/s: eq. 7.127, 7.128."""
         if (six := self._velocity(q, v, out)) is not None:
             return six
         return self._robot.velocity(q, v, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def jacobian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """(6, nv): eq. 7.85."""
+        """Return the Jacobian (6, nv): eq. 7.85."""
         if (J := self._jacobian(q, out)) is not None:
             return J
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def hessian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """(6, nv, nv): the derivatives of `jacobian` by each rate."""
+        """Return the derivatives (6, nv, nv) of `jacobian` by each joint velocity."""
         if (H := self._hessian(q, out)) is not None:
             return H
         return self._robot.hessian(q, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def acceleration(self, q: Given, v: Given, a: Given, out: FloatArray | None = None) -> FloatArray:
-        """(6,) [linear; angular] m/s^2, rad/s^2, classical: eq. 7.129, 7.130."""
+        """Return the classical acceleration (6,), [linear; angular], m/s^2 and rad/s^2: eq. 7.129, 7.130."""
         if (six := self._acceleration(q, v, a, out)) is not None:
             return six
         return self._robot.acceleration(q, v, a, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
-        """Make what computes a quantity, and compute."""
+        """Create the function of a quantity, and call it."""
         with importing:
             from urdfkin.compiled.single import arrays_are_known, single  # noqa: PLC0415  loads Numba
 
-        # Quaternions are brought to norm 1 first, and what may overflow is looked at: the robot's business.
+        # The robot handles quaternions, which are normalised first, and trees whose results may overflow.
         robots = self._robot.tree.floating_joints or self._plan.is_large
         if robots or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
             return None

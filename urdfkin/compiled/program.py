@@ -1,8 +1,8 @@
-"""A plan as a program: the few instructions that a kernel carries out for every block of configurations.
+"""A plan as a program: the instructions that a kernel executes for every block of configurations.
 
-What is known of the robot is told apart here, once: an offset along one axis and a turn about one axis have
-instructions of their own, which cost a third of the general ones; what is zero costs nothing. The walk goes
-on from one link to the next in registers; where the tree branches, the state is saved and resumed.
+The instructions are chosen for the robot once. A translation along one axis and a rotation about one axis
+have their own instructions, which cost a third of the general ones; a zero translation has none. The state
+passes from one link to the next in registers. At a branch of the tree, the state is saved and resumed later.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from urdfkin.model.tree import FloatArray
 
 
 class Op(IntEnum):
-    """The instructions; those with an axis have it in their order: along or about x, y, z, or any."""
+    """The instructions. Those with an axis are in the order x, y, z, any axis."""
 
     END = 0
-    CARRY_X = 1  # along a rigid link
+    CARRY_X = 1  # translation along a rigid link
     CARRY_Y = 2
     CARRY_Z = 3
     CARRY = 4
-    TURN_X = 5  # by a constant rotation
+    TURN_X = 5  # constant rotation
     TURN_Y = 6
     TURN_Z = 7
     TURN = 8
@@ -36,37 +36,37 @@ class Op(IntEnum):
     FLOATING = 12
     SAVE = 13
     RESUME = 14
-    KEEP = 15  # what a column of the Jacobian needs of its joint
+    KEEP = 15  # store the joint's data for its column of the Jacobian
     COLUMN = 16
     EMIT = 17
 
 
 class Head(IntEnum):
-    """What stands before the instructions, one number each."""
+    """The head of the program: numbers before the instructions."""
 
-    CODE = 0  # where the first instruction stands
+    CODE = 0  # index of the first instruction
     NQ = 1
     NV = 2
     FRAMES = 3
-    BLOCKS_Q = 4  # where the list of blocks of eight coordinates begins of which some are needed
+    BLOCKS_Q = 4  # index of the list of needed blocks of eight coordinates
     BLOCKS_V = 5
     BLOCKS_END = 6
-    ANGLES = 7  # where the list of angles begins
+    ANGLES = 7  # index of the list of angles
     ANGLES_END = 8
-    Q = 9  # rows of scratch where the coordinates begin, and so on
+    Q = 9  # first scratch rows of the coordinates, and so on
     V = 10
     A = 11
     BASE = 12
 
 
-#: Numbers in an instruction: what, three operands, and where its constants begin.
+#: Length of an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Numbers of an angle: its row, that of its sine, where a follower's rule begins, and whether there is one.
+#: Length of an angle: its row, the row of its sine, the index of a mimic rule, and whether there is one.
 ANGLE_WIDTH = 4
-#: Rows of scratch with a place of their own: 0, 1, a result on its way out, an angle.
+#: Reserved scratch rows: 0, 1, a result before output, an angle.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Numbers of a column that is paired with others: its row, its step, its rate, the row of the rate's sums.
+#: Length of a column for pairs: its row, its step, its index in v, the first row of the sums of that index.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -79,12 +79,12 @@ _JOINTS = {
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """What a kernel is handed.
+    """The program of a kernel.
 
     Attributes:
         words: Head, lists and instructions.
-        constants: What the instructions refer to.
-        rows: How many rows of scratch a run needs.
+        constants: The constants of the instructions.
+        rows: Number of scratch rows of a run.
     """
 
     words: IntArray
@@ -93,18 +93,18 @@ class Program:
 
     @cached_property
     def addresses(self) -> tuple[int, int]:
-        """Of words and constants; good while the program lives."""
+        """Addresses of words and constants; valid while the program exists."""
         return self.words.ctypes.data, self.constants.ctypes.data
 
 
 def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False) -> Program:
-    """The program that meets a plan's frames, made once.
+    """Return the program for a plan's frames; it is made once.
 
     Args:
-        plan: The walk.
-        turned: Whether frames are turned to their own axes: for places, and for what is seen in these axes.
-        columns: Whether Jacobians are wanted.
-        pairs: Whether their columns are wanted one by one, followers' too, to be paired with each other.
+        plan: The compiled tree.
+        turned: Whether frames are rotated to their own axes: for placements, and for results in these axes.
+        columns: Whether Jacobian columns are needed.
+        pairs: Whether the columns are needed one by one, also those of mimic joints, for pairs of columns.
     """
     key = turned, columns, pairs
     made: Program | None = plan.made.get(key)
@@ -144,7 +144,7 @@ class _Writer:
         return Program(np.array(words, dtype=np.int64), np.array(self.constants), rows)
 
     def _write(self) -> None:
-        """Steps and frames in the order in which they are met."""
+        """Write steps and frames in the order of the recursion."""
         events = list(self._events())
         last = {origin: k for k, (origin, _, _) in enumerate(events)}
         now, c = -1, 0
@@ -162,10 +162,10 @@ class _Writer:
                     c += 1
                 self._save(step, last, k + 1)
             elif frame is not None and self._frame(frame):
-                now = -2  # the state is the frame's now
+                now = -2  # the state is now that of the frame
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
-        """(the step it goes on from, the step or None, the frame or None)."""
+        """Yield (previous step, the step or None, the frame or None)."""
         f = 0
         for i in range(-1, len(self.plan.steps)):
             if i >= 0:
@@ -175,7 +175,7 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the state that was just reached, if something goes on from it after the following event."""
+        """Save the current state if a later event than the next one starts from it."""
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
 
@@ -191,24 +191,24 @@ class _Writer:
         return len(self.constants) - len(numbers)
 
     def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
-        """Along a rigid link by p, then turned by R; whether that is anything."""
+        """Write a translation by p, then a rotation by R; return whether there was any."""
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
             op = Op.CARRY_X + along[0] if len(along) == 1 else Op.CARRY
             self._put(Op(op), at=self._constants(*p))
         if turned and (np.eye(3) != R).any():
-            about = [axis for axis in range(3) if _leaves_alone(R, axis)]
+            about = [axis for axis in range(3) if _is_rotation_about(R, axis)]
             self._put(Op(Op.TURN_X + about[0]) if about else Op.TURN, at=self._constants(*R.ravel()))
         return len(self.code) > before
 
     def _rule(self, i: int) -> int:
-        """Where a follower's multiplier and offset stand; 0 for a joint that leads."""
+        """Return the index of a mimic joint's multiplier and offset; 0 for other joints."""
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         return 0 if (multiplier, constant) == (1.0, 0.0) else self._constants(multiplier, constant)
 
     def _angles(self) -> list[int]:
-        """The angles that steps turn by."""
+        """Return the rotation angles of the steps."""
         angles = []
         for i, step in enumerate(self.plan.steps):
             kind, q = Motion(step[Step.KIND]), self.q + int(step[Step.Q])
@@ -229,14 +229,14 @@ class _Writer:
         self._put(op, first, int(step[Step.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule)
 
     def _frame(self, f: int) -> bool:
-        """Go to a frame, hand out its results, and whether the state is now another."""
+        """Move to a frame and output its results; return whether the state has changed."""
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._rigid(offsets[:9].reshape(3, 3), offsets[9:], turned=self.turned)
         sources = 0
         if self.columns:
             self._columns(f)
             sources = len(self.head) + len(self.lists)
-            self.lists += self._paired(f) if self.pairs else self._sources(f, self.results)
+            self.lists += self._pairs(f) if self.pairs else self._sources(f, self.results)
         self._put(Op.EMIT, int(plan.frames[f, 1]), sources)
         return moved
 
@@ -251,7 +251,7 @@ class _Writer:
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
     def _sources(self, f: int, row: int) -> list[int]:
-        """For each number of the frame's (6, nv), the row of scratch that holds it; `row` is the first."""
+        """Return the scratch row of each number of the frame's (6, nv); `row` is the first row."""
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.leaders[f] == np.arange(len(plan.columns))):
@@ -259,8 +259,8 @@ class _Writer:
         found: list[int] = sources.ravel().tolist()
         return found
 
-    def _paired(self, f: int) -> list[int]:
-        """How many columns the frame has, each of them (`PAIR_WIDTH`), and where its sums stand."""
+    def _pairs(self, f: int) -> list[int]:
+        """Return the number of the frame's columns, each column (`PAIR_WIDTH`), and the row of its sums."""
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
         rows = self.results + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]
@@ -268,12 +268,12 @@ class _Writer:
         return [len(own), *pairs.ravel().tolist(), *self._sources(f, self.sums)]
 
 
-def _leaves_alone(R: FloatArray, axis: int) -> bool:
-    """Whether it is a turn about this axis, to the last bit."""
+def _is_rotation_about(R: FloatArray, axis: int) -> bool:
+    """Return whether R is exactly a rotation about this axis."""
     one = np.eye(3)[axis]
     return bool((R[axis] == one).all() and (R[:, axis] == one).all())
 
 
 def _blocks(places: Sequence[int]) -> list[int]:
-    """Where the blocks of eight begin that hold any of the places."""
+    """Return the first index of each block of eight that contains any of the indices."""
     return sorted({int(place) // 8 * 8 for place in places})

@@ -1,12 +1,18 @@
-"""The walk from the base outwards: section 7.7's recursion, link by link, for a block of configurations.
+"""The forward recursion of section 7.7 from the base outwards, link by link, for a block of configurations.
 
-The state of a link is the rotation R and the origin p of its frame in the world's axes, its angular velocity
-w, its origin's velocity vel, its angular acceleration alpha and its origin's acceleration acc. These four are
-seen in the axes in which they are asked for, the world's or the link's own (`axes`): results that are turned
-at the end have the rounding of two rotations. The equations are those of `urdfkin.kinematics.equations`, and
-the same in either axes.
+The state of a link consists of:
 
-What an output does not follow is nothing (`numbers.nothing`), and what is computed from it costs nothing.
+| symbol | quantity | axes |
+|---|---|---|
+| R, p | rotation and origin of its frame | the world's |
+| w, vel | angular velocity, velocity of its origin | of the recursion (`axes`) |
+| alpha, acc | angular acceleration, acceleration of its origin | of the recursion (`axes`) |
+
+The axes of the recursion are those of the requested result, the world's or the link's own. A rotation at the
+end would add the rounding of a second rotation. The equations are those of `urdfkin.kinematics.equations`;
+they are the same in both axes.
+
+A part of the state that an output does not need is `numbers.nothing`; it costs no time.
 """
 
 from __future__ import annotations
@@ -34,7 +40,7 @@ from urdfkin.compiled.numbers import one, rounded, zero
 from urdfkin.compiled.program import ANGLE_ROW, ANGLE_WIDTH, ONE_ROW, STATE_ROWS, WIDTH, ZERO_ROW, Head, Op
 from urdfkin.compiled.sine import sine_cosine
 
-# Enumerations are Python's; compiled code takes plain numbers.
+# Compiled code takes plain integers, not Python's enumerations.
 _PROGRAM, _CONSTANTS, _SCRATCH, _OUT = map(
     int, (KernelArgs.PROGRAM, KernelArgs.CONSTANTS, KernelArgs.SCRATCH, KernelArgs.OUT)
 )
@@ -53,12 +59,12 @@ _TURN_X, _TURN_Y, _TURN_Z, _TURN = map(int, (Op.TURN_X, Op.TURN_Y, Op.TURN_Z, Op
 _REVOLUTE, _PRISMATIC, _PLANAR, _FLOATING = map(int, (Op.REVOLUTE, Op.PRISMATIC, Op.PLANAR, Op.FLOATING))
 _SAVE, _RESUME, _KEEP, _COLUMN = map(int, (Op.SAVE, Op.RESUME, Op.KEEP, Op.COLUMN))
 
-# -- a link and the next ------------------------------------------------------------------------------
+# -- from one link to the next ------------------------------------------------------------------------
 
 
 @compiled
 def carried(axes, state, d):
-    """Along the rigid link, by d in its axes: 7.58, 7.128, 7.130."""
+    """Move the state along the rigid link by d, in the link's axes: 7.58, 7.128, 7.130."""
     R, p, w, vel, alpha, acc = state
     lever = seen(axes, R, d)
     return (
@@ -73,7 +79,7 @@ def carried(axes, state, d):
 
 @compiled
 def turned(axes, state, S):
-    """To a frame that is turned by S: the same motion, seen from there."""
+    """Express the same motion in a frame rotated by S."""
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),
@@ -87,13 +93,13 @@ def turned(axes, state, S):
 
 @compiled
 def _turned_about_z(axes, state, s, row):
-    """By a joint's angle (7.5), whose sine and cosine stand in a row and the one after it."""
+    """Rotate the frame by a joint's angle (7.5); its sine and cosine are in `row` and the row after it."""
     return turned(axes, state, eq.about_z(number(s, row), number(s, row + 1), zero(), one()))
 
 
 @compiled
 def revolute(axes, state, s, row, v, a):
-    """7.129, then 7.127, then the turn itself."""
+    """Pass a revolute joint: 7.129, then 7.127, then the rotation itself."""
     R, p, w, vel, alpha, acc = state
     z = seen(axes, R, (zero(), zero(), one()))
     alpha = eq.angular_acceleration(alpha, w, z, v, a)
@@ -102,7 +108,7 @@ def revolute(axes, state, s, row, v, a):
 
 @compiled
 def prismatic(axes, state, slide, v, a):
-    """The slide is a part of the interorigin vector (7.64); then 7.130 and 7.128."""
+    """Pass a prismatic joint: its displacement is in the interorigin vector (7.64); then 7.130, 7.128."""
     R, p, w, vel, alpha, acc = carried(axes, state, (zero(), zero(), slide))
     z = seen(axes, R, (zero(), zero(), one()))
     return R, p, w, eq.sliding_velocity(vel, z, v), alpha, eq.sliding_acceleration(acc, w, z, v, a)
@@ -110,7 +116,7 @@ def prismatic(axes, state, slide, v, a):
 
 @compiled
 def free(axes, state, o, u, o_rate, u_rate):
-    """A planar or floating joint that has been carried and turned: its rates are in the moved axes."""
+    """Add the joint velocity of a planar or floating joint, in the moved axes, after its displacement."""
     R, p, w, vel, alpha, acc = state
     o, u, o_rate, u_rate = seen(axes, R, o), seen(axes, R, u), seen(axes, R, o_rate), seen(axes, R, u_rate)
     return (
@@ -125,7 +131,7 @@ def free(axes, state, o, u, o_rate, u_rate):
 
 @compiled
 def _coordinate(s, row, g, c, follows):
-    """A joint's coordinate. A follower's is rounded as Pinocchio's is, in two steps."""
+    """Return a joint's coordinate. That of a mimic joint is rounded in two steps, as Pinocchio's is."""
     x = number(s, row)
     if follows:
         x = rounded(constant(g, c) * x) + constant(g, c + 1)
@@ -142,13 +148,13 @@ def _rate(wanted, s, row, g, c, follows):
 
 @compiled
 def _vector_if(wanted, s, row):
-    """Three numbers in rows that follow on one another; nothing where `wanted` is nothing."""
+    """Return the numbers of three consecutive rows; nothing if `wanted` is nothing."""
     return number_if(wanted[0], s, row), number_if(wanted[1], s, row + 1), number_if(wanted[2], s, row + 2)
 
 
 @compiled
 def _planar(axes, state, s, q, row, v, a):
-    """Slides along x and y and turns about z."""
+    """Pass a planar joint: translation along x and y, rotation about z."""
     state = carried(axes, state, (number(s, q), number(s, q + 1), zero()))
     state = _turned_about_z(axes, state, s, row)
     w, alpha = state[2][0], state[4][0]
@@ -159,7 +165,7 @@ def _planar(axes, state, s, q, row, v, a):
 
 @compiled
 def _floating(axes, state, s, q, v, a):
-    """Slides along and turns about all three axes."""
+    """Pass a floating joint: translation along and rotation about all three axes."""
     state = carried(axes, state, (number(s, q), number(s, q + 1), number(s, q + 2)))
     x, y, z, w = number(s, q + 3), number(s, q + 4), number(s, q + 5), number(s, q + 6)
     state = turned(axes, state, eq.rotation_of_quaternion(x, y, z, w))
@@ -181,7 +187,7 @@ def _rotation(g, i):
     return _vector(g, i), _vector(g, i + 3), _vector(g, i + 6)
 
 
-# -- states in scratch ---------------------------------------------------------------------------------
+# -- states in scratch memory --------------------------------------------------------------------------
 
 
 @compiled
@@ -194,7 +200,7 @@ def put_vector(s, row, x):
 
 @compiled
 def vector(s, row):
-    """The vector in three rows."""
+    """Return the vector in three rows."""
     return number(s, row), number(s, row + 1), number(s, row + 2)
 
 
@@ -212,8 +218,8 @@ def _save(s, row, state):
 
 
 @compiled
-def _resumed(s, row, state):
-    """The state that was saved, as far as this walk follows it."""
+def _resume(s, row, state):
+    """Return the saved state, without the parts that this recursion does not need."""
     R, p, w, vel, alpha, acc = state
     return (
         (_vector_if(R[0], s, row), _vector_if(R[1], s, row + 3), _vector_if(R[2], s, row + 6)),
@@ -230,7 +236,7 @@ def _resumed(s, row, state):
 
 @compiled
 def _read(m, x, b, width, stride, blocks, begin, end, s, row):
-    """The blocks of eight numbers that the walk needs of rows `b` to `b + m` of x, or of the only one."""
+    """Read the needed blocks of eight numbers of rows `b` to `b + m` of x, or of its only row."""
     for i in range(begin, end):
         at = blocks[i]
         wide = width - at
@@ -240,7 +246,7 @@ def _read(m, x, b, width, stride, blocks, begin, end, s, row):
 
 @compiled
 def _start(axes, m, s, task, row, b):
-    """The initial conditions: the state of the base (the text's frame -1 to frame 0)."""
+    """Return the initial conditions: the state of the base (the textbook's frame -1 to frame 0)."""
     nil, unit = same(0.0), same(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
     p = w = vel = alpha = acc = nil, nil, nil
@@ -255,7 +261,7 @@ def _start(axes, m, s, task, row, b):
 
 @compiled
 def _sines_and_cosines(s, program, g):
-    """Of every angle that the walk turns by, before it begins: the walk's state fills the registers."""
+    """Compute sine and cosine of all joint angles before the recursion, whose state needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _coordinate(s, program[i], g, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(s, ANGLE_ROW, angle)
@@ -263,12 +269,12 @@ def _sines_and_cosines(s, program, g):
         put(s, program[i + 1] + 1, cosine)
 
 
-# -- the walk ------------------------------------------------------------------------------------------
+# -- the recursion -------------------------------------------------------------------------------------
 
 
 @compiled
 def _along_link(axes, op, state, g, c):
-    """Carried or turned by what is constant."""
+    """Carry out an instruction with a constant translation or rotation."""
     if op == _CARRY_X:
         state = carried(axes, state, (constant(g, c), zero(), zero()))
     elif op == _CARRY_Y:
@@ -290,7 +296,7 @@ def _along_link(axes, op, state, g, c):
 
 @compiled
 def _over_joint(axes, op, state, s, x, v, a, z, g, c):
-    """Over a joint; x, z and c are its operands, v and a the rows of its rates."""
+    """Carry out a joint's instruction; x, z and c are its operands, v and a the rows of its velocities."""
     if op == _REVOLUTE:
         rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
         state = revolute(axes, state, s, x, rate, rate_2)
@@ -306,7 +312,7 @@ def _over_joint(axes, op, state, s, x, v, a, z, g, c):
 
 @compiled
 def _read_inputs(m, task, program, s, b, orders):
-    """Coordinates, and as many of their rates as are wanted."""
+    """Read the coordinates and, if needed, the joint velocities and accelerations."""
     q, nq, nv = numbers_at(task[_Q]), program[_NQ], program[_NV]
     edge, end = program[_BLOCKS_V], program[_BLOCKS_END]
     _read(m, q, b, nq, task[_STRIDE_Q], program, program[_BLOCKS_Q], edge, s, program[_ROW_Q])
@@ -320,7 +326,7 @@ def _read_inputs(m, task, program, s, b, orders):
 
 @compiled
 def _ordinary(m, task, program, b, orders):
-    """Whether all inputs of a block are, those that the walk does not need as well."""
+    """Return whether all inputs of a block are ordinary, also those that the recursion does not need."""
     good = _rows_are_ordinary(m, numbers_at(task[_Q]), b, program[_NQ], task[_STRIDE_Q])
     if orders > 1:
         good = good and _rows_are_ordinary(m, numbers_at(task[_V]), b, program[_NV], task[_STRIDE_V])
@@ -336,7 +342,7 @@ def _rows_are_ordinary(m, x, b, width, stride):
 
 @compiled
 def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, column, emit):
-    """The walk for `m` configurations from `b` on."""
+    """Run the recursion for `m` configurations, starting at `b`."""
     _read_inputs(m, task, program, s, b, orders)
     _sines_and_cosines(s, program, g)
     state = follow(_start(axes, m, s, task, program[_ROW_BASE], b))
@@ -352,7 +358,7 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
         elif op == _SAVE:
             _save(s, x, state)
         elif op == _RESUME:
-            state = _resumed(s, x, state)
+            state = _resume(s, x, state)
         elif op == _KEEP:
             keep(s, x, y, state)
         elif op == _COLUMN:
@@ -366,16 +372,16 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
 
 @compiled
 def forward_recursion(address, axes, orders, follow, keep, column, emit):
-    """Carry out a program for every block of configurations; 0, or 1 where an input is not ordinary.
+    """Execute a program for every block of configurations; return 0, or 1 if an input is not ordinary.
 
     Args:
-        address: Of a task.
-        axes: The motion's (`axes`).
+        address: Address of the kernel's arguments (`kernel_args`).
+        axes: Axes of the recursion (`axes`).
         orders: How many of q, v, a are read.
-        follow: Makes nothing of what the output does not need of a state.
-        keep: Keeps what a column needs of its joint.
+        follow: Replaces the parts of a state that the output does not need by nothing.
+        keep: Stores the data of a joint that its column needs.
         column: Computes a column.
-        emit: Hands out a frame's result.
+        emit: Writes the result of a frame.
     """
     task = whole_numbers_at(address)
     program, g, s = whole_numbers_at(task[_PROGRAM]), numbers_at(task[_CONSTANTS]), numbers_at(task[_SCRATCH])
@@ -385,7 +391,7 @@ def forward_recursion(address, axes, orders, follow, keep, column, emit):
     m = LANES if n >= LANES else 1
     good = True
     for first in range(0, n, m):
-        b = min(first, n - m)  # the last block reaches back into the one before
+        b = min(first, n - m)  # the last block overlaps the one before
         _block(axes, m, task, program, g, s, b, task[_REFERENCE], orders, follow, keep, column, emit)
         good &= _ordinary(m, task, program, b, orders)
     if task[_STAGE]:

@@ -1,10 +1,10 @@
 """Sine and cosine of several angles at once, to 0.65 units in the last place.
 
-Cody and Waite's reduction to [-pi/4, pi/4], with what it loses in rounding, then the polynomials of fdlibm
-(Sun Microsystems, k_sin.c and k_cos.c). With fused multiply-adds pi/2 in two doubles is enough while the
-number of quarter turns stays below 2^20, up to 1e-27 in the smaller of the two beside a multiple of pi/2; a
-lane beyond that takes the library's functions. It alone: what stands beside a configuration must not change
-its result.
+The angle is reduced to [-pi/4, pi/4] by Cody and Waite's method, with the rounding error of the reduction.
+The polynomials are those of fdlibm (Sun Microsystems, k_sin.c and k_cos.c). With fused multiply-adds, pi/2 in
+two doubles is enough below 2^20 quarter turns; near a multiple of pi/2, the smaller of the two results has an
+error of up to 1e-27. Beyond 2^20, that lane alone uses the functions of the C library: the result of a
+configuration must not depend on the other lanes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from urdfkin.compiled.numbers import fused
 
 _LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, _PI_2, _PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: Added to a number below 2^51, it leaves no room for a fraction: the last bits are the nearest integer.
+#: Adding it rounds a number below 2^51 to an integer: the last bits of the sum are the nearest integer.
 _NO_FRACTION = 1.5 * 2.0**52
 _SINE = (
     -1.66666666666666324348e-01,
@@ -44,7 +44,7 @@ _COSINE = (
 
 @compiled
 def sine_cosine(s, row, x):
-    """(sine, cosine) of angles; `row` is a row of scratch that may be written to."""
+    """Return (sine, cosine) of angles; `row` is a row of scratch memory that may be overwritten."""
     sine, cosine = _of_small(x)
     if _any_large(x):
         put(s, row, x)
@@ -59,7 +59,7 @@ def sine_cosine(s, row, x):
 
 @intrinsic
 def _of_small(context: Any, x: Any) -> Any:
-    """Sine and cosine for less than 2^20 quarter turns; without a branch."""
+    """Return sine and cosine for less than 2^20 quarter turns, without a branch."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments
@@ -81,18 +81,18 @@ def _of_small(context: Any, x: Any) -> Any:
         shifted = fused(builder, x, all_lanes(_2_PI), all_lanes(_NO_FRACTION))
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(_NO_FRACTION))
-        # Exact: both terms are multiples of 2^-53, and their difference is below 1. What rounding r takes
-        # from it is kept in `lost`, as what it takes from z is.
+        # Exact: both terms are multiples of 2^-53, and their difference is below 1. The rounding error of r
+        # is `lost`, that of z is `z_lost`.
         near = fused(builder, n, all_lanes(-_PI_2), x)
         r = fused(builder, n, all_lanes(-_PI_2_REST), near)
         lost = fused(builder, n, all_lanes(-_PI_2_REST), builder.fsub(near, r))
         z = builder.fmul(r, r)
         z_lost = fused(builder, r, r, builder.fneg(z))
-        # 1 - z/2, and what is lost in it.
+        # 1 - z/2, and its rounding error.
         most = fused(builder, z, all_lanes(-0.5), all_lanes(1.0))
         most_lost = fused(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), most))
-        # sin(r + lost) = sin r + lost cos r, cos(r + lost) = cos r - lost sin r; the largest term comes last,
-        # the rest is small, and so is what is lost in rounding it.
+        # sin(r + lost) = sin r + lost cos r, cos(r + lost) = cos r - lost sin r. The largest term is added
+        # last; the other terms are small, and so are their rounding errors.
         sine = fused(builder, builder.fmul(r, z), polynomial(z, _SINE), builder.fmul(lost, most))
         sine = builder.fadd(r, sine)
         rest = fused(builder, builder.fmul(z, z), polynomial(z, _COSINE), most_lost)
@@ -104,8 +104,8 @@ def _of_small(context: Any, x: Any) -> Any:
             sign = builder.shl(builder.and_(turns, bits(2)), bits(62))
             return builder.bitcast(builder.xor(builder.bitcast(value, whole), sign), x.type)
 
-        # An odd number of quarter turns swaps the two; two or three change the sine's sign, one or two the
-        # cosine's.
+        # An odd number of quarter turns exchanges the two. Two or three quarter turns change the sign of the
+        # sine, one or two that of the cosine.
         odd = builder.icmp_signed("!=", builder.and_(quarters, bits(1)), bits(0))
         pair = (
             signed(builder.select(odd, cosine, sine), quarters),
@@ -118,7 +118,7 @@ def _of_small(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _any_large(context: Any, x: Any) -> Any:
-    """Whether a lane holds an angle of 2^20 quarter turns or more, or no number."""
+    """Return whether a lane contains an angle of 2^20 quarter turns or more, or nan."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments
@@ -135,7 +135,7 @@ def _any_large(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _with_lane(context: Any, x: Any, lane: Any, value: Any) -> Any:
-    """The number with another double in one of its lanes."""
+    """Return the number with another double in one lane."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, lane, value = arguments

@@ -1,13 +1,12 @@
-"""One configuration after the other: a function that Python calls as it calls its own built-in ones.
+"""Fast calls with one configuration: a compiled function that Python calls like a built-in function.
 
-Numba's way into compiled code takes as long as the walk itself: it asks each argument for its type and
-unpacks every array. CPython hands a built-in function the addresses of its arguments and asks nothing. This
-one looks at the few words of each array that it needs, which lie where CPython and NumPy promise them to C
-code, and keeps the interpreter's lock for the microsecond. What it does not take as it is, it leaves alone,
-and says so.
+Numba's own call takes as long as the recursion itself: it checks the type of each argument and unpacks every
+array. CPython passes a built-in function the addresses of its arguments without checks. This function reads
+the few words of each array that it needs, at the offsets that CPython and NumPy guarantee to C code. It holds
+the interpreter's lock for about a microsecond. It returns None for arguments that it does not support.
 
-A task is taken in one step that no thread comes between, with the lock or without. One that is at work for
-another thread is left alone too: the caller then goes another way.
+A call marks its scratch memory as busy in one atomic operation, with or without the interpreter's lock. If
+another thread is using that memory, the function returns None too, and the caller uses another function.
 """
 
 from __future__ import annotations
@@ -41,25 +40,25 @@ _Q, _OUT, _NQ, _NV, _ORDERS = (
 )
 _AXES, _ROWS, _COLUMNS = int(KernelArgs.AXES), int(KernelArgs.ROWS), int(KernelArgs.COLUMNS)
 
-#: Words, of eight bytes, of a Python object: its type, what is its own, and the items of a tuple.
+#: Words (eight bytes) of a Python object: its type, its header, and the items of a tuple.
 _OWN = object.__basicsize__ // 8
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
-#: Of NumPy's arrays (PyArrayObject_fields; the numbers of axes and of flags fill half a word), and of their
-#: kinds of number (PyArray_Descr): one word with the byte order and NumPy's number for the kind.
+#: Words of NumPy's arrays (PyArrayObject_fields; the numbers of axes and of flags are half a word each), and
+#: of their element types (PyArray_Descr): one word contains the byte order and NumPy's type number.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
-#: C-contiguous and aligned; and writable.
+#: Flags: C-contiguous and aligned; and writable.
 _READABLE, _WRITABLE = 0x101, 0x501
 
-_keep = types.ExternalFunction("Py_IncRef", types.void(types.int64))
-_drop = types.ExternalFunction("Py_DecRef", types.void(types.int64))
-_made = types.ExternalFunction("PyObject_CallOneArg", types.int64(types.int64, types.int64))
+_incref = types.ExternalFunction("Py_IncRef", types.void(types.int64))
+_decref = types.ExternalFunction("Py_DecRef", types.void(types.int64))
+_call_one_arg = types.ExternalFunction("PyObject_CallOneArg", types.int64(types.int64, types.int64))
 
 
 @intrinsic
 def _call(context: Any, address: Any, argument: Any) -> Any:
-    """What the core at an address returns."""
+    """Call the kernel at an address and return its result."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         whole = ir.IntType(64)
@@ -70,8 +69,8 @@ def _call(context: Any, address: Any, argument: Any) -> Any:
 
 
 @intrinsic
-def _taken(context: Any, numbers: Any, place: Any) -> Any:
-    """Put 1 where 0 should stand, and say what stood there, in one step that no thread comes between."""
+def _test_and_set(context: Any, numbers: Any, place: Any) -> Any:
+    """Write 1 and return the previous value, in one atomic operation."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         one = ir.Constant(ir.IntType(64), 1)
@@ -81,7 +80,7 @@ def _taken(context: Any, numbers: Any, place: Any) -> Any:
 
 
 @intrinsic
-def _give_back(context: Any, numbers: Any, place: Any) -> Any:
+def _release(context: Any, numbers: Any, place: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         nil = ir.Constant(ir.IntType(64), 0)
         builder.store_atomic(nil, builder.gep(arguments[0], [arguments[1]]), "release", 8)
@@ -91,8 +90,8 @@ def _give_back(context: Any, numbers: Any, place: Any) -> Any:
 
 
 @compiled
-def _doubles(given, ndarray, flags, axes, rows, columns):
-    """Where an array's doubles lie; 0 where it is another kind of thing, or of another shape."""
+def _doubles_address(given, ndarray, flags, axes, rows, columns):
+    """Return the address of an array's doubles; 0 if the object is not such an array of this shape."""
     x = whole_numbers_at(given)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
         return 0
@@ -107,13 +106,15 @@ def _doubles(given, ndarray, flags, axes, rows, columns):
 
 @core
 def one_configuration(bound, arguments, count):
-    """q, or q and v, or q, v and a, then where to write or None: the result, or None where it was not taken.
+    """Compute the result for q, or q and v, or q, v and a, then the output array or None.
+
+    It returns the result, or None if the arguments are not supported or the memory is busy.
 
     Args:
-        bound: Address of the tuple it was bound to: a task, what arrays are, None, what makes an array, of
-            which shape, and what the task needs.
-        arguments: Address of theirs.
-        count: How many they are.
+        bound: Address of the bound tuple: kernel arguments, array type, None, the function that creates an
+            array, its shape, and the objects that must stay alive.
+        arguments: Address of the arguments.
+        count: Number of arguments.
     """
     items, given = whole_numbers_at(bound), whole_numbers_at(arguments)
     address, ndarray, none = whole_numbers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
@@ -121,38 +122,38 @@ def one_configuration(bound, arguments, count):
     if count == orders + 1:
         out = given[orders]
         if out == none:
-            out = _made(items[_ITEMS + 3], items[_ITEMS + 4])
+            out = _call_one_arg(items[_ITEMS + 3], items[_ITEMS + 4])
         else:
-            _keep(out)
-        if out == 0 or _done(address, given, out, ndarray):
+            _incref(out)
+        if out == 0 or _compute_into(address, given, out, ndarray):
             return out
-        _drop(out)
-    _keep(none)
+        _decref(out)
+    _incref(none)
     return none
 
 
 @compiled
-def _done(address, given, to, ndarray):
-    """Have the core compute into an array; whether it did."""
+def _compute_into(address, given, to, ndarray):
+    """Compute into an array with the kernel; return whether the array was suitable."""
     task = whole_numbers_at(address)
     orders, rows, columns, width = task[_ORDERS], task[_ROWS], task[_COLUMNS], task[_NQ]
-    out = _doubles(to, ndarray, _WRITABLE, task[_AXES], rows, columns)
+    out = _doubles_address(to, ndarray, _WRITABLE, task[_AXES], rows, columns)
     good = out != 0
     size = 8 * rows
     for _ in range(1, task[_AXES]):
         size *= columns
     for i in range(orders):
-        x = _doubles(given[i], ndarray, _READABLE, 1, width, 1) if good else 0
+        x = _doubles_address(given[i], ndarray, _READABLE, 1, width, 1) if good else 0
         apart = x + 8 * width <= out or out + size <= x
         good, width = x != 0 and apart, task[_NV]
-    if not good or _taken(task, _BUSY):
+    if not good or _test_and_set(task, _BUSY):
         return False
     for i in range(orders):
         task[_Q + i] = whole_numbers_at(given[i])[_DATA]
     task[_OUT] = out
     good = _call(task[_CORE], address) == 0
     task[_COUNT] += good
-    _give_back(task, _BUSY)
+    _release(task, _BUSY)
     return good
 
 
@@ -172,7 +173,7 @@ _FUNCTION = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.POINTER(_Method), ctypes.
 
 
 def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
-    """The code at an address as a function, which keeps alive what it is bound to."""
+    """Return the code at an address as a Python function, which keeps its bound objects alive."""
     method = _Method(name.encode(), address, _FASTCALL, None)
     new = _FUNCTION(("PyCFunction_NewEx", ctypes.pythonapi))
     function: Callable[..., FloatArray | None] = new(ctypes.byref(method), (*bound, method), None)
@@ -181,7 +182,7 @@ def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArr
 
 @cache
 def arrays_are_known() -> bool:
-    """Whether arrays are laid out as C code expects them; another NumPy's are left to NumPy."""
+    """Return whether this NumPy has the array layout that the code expects; if not, `single` is not used."""
     x = np.zeros((2, 3))
     if np.ndarray.__basicsize__ < 8 * (_FLAGS + 1) or np.dtype.__basicsize__ < 8 * (_KIND_AND_ORDER + 1):
         return False
@@ -195,8 +196,8 @@ def arrays_are_known() -> bool:
     )
 
 
-#: For each quantity: its core, that for LOCAL, how many of q, v and a they take, and how many axes of a
-#: result are the rates'.
+#: For each quantity: its kernel, its kernel for LOCAL, how many of q, v and a they take, and how many axes of
+#: the result have length nv.
 _HOW: dict[str, tuple[Core, Core, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
@@ -209,11 +210,13 @@ _HOW: dict[str, tuple[Core, Core, int, int]] = {
 def single(
     quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """What computes a quantity of a plan's only frame, compiled or read from disk; its base stands still.
+    """Return the fast function of a quantity for a plan's only frame, with a fixed base.
+
+    The function is compiled or read from disk.
 
     Returns:
-        The function, (q, ..., out or None) -> result or None where it was not taken, and its task, which
-        counts results.
+        The function, (q, ..., out or None) -> result or None if not supported, and its kernel arguments,
+        which count the results.
     """
     core, local_core, orders, columns = _HOW[quantity]
     local = reference is Reference.LOCAL
@@ -231,13 +234,13 @@ def single(
 def called(
     core: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """The same for a function of C's that takes a task, a result being of some shape.
+    """Return the same for a C function that takes kernel arguments.
 
     Args:
-        core: Of `ctypes`.
+        core: The function, from `ctypes`.
         orders: How many of q, v and a it takes.
-        shape: Of the result.
-        plan: Whose q and v they are.
+        shape: Shape of the result.
+        plan: The compiled tree of q and v.
     """
     address = ctypes.cast(core, ctypes.c_void_p).value
     return _called(address or 0, orders, shape, plan, core)
@@ -251,7 +254,7 @@ def _called(
     task[KernelArgs.NQ], task[KernelArgs.NV] = (
         plan.nq,
         plan.nv,
-    )  # strides are 0: there is no next configuration
+    )  # all strides are 0: there is one configuration
     task[KernelArgs.AXES], task[KernelArgs.ROWS], task[KernelArgs.COLUMNS] = len(shape), *(*shape, 1)[:2]
     bound = task, np.ndarray, None, np.empty, shape, *alive
     return _built_in("compute", one_configuration.address, *bound), task

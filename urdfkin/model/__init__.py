@@ -1,1 +1,1 @@
-"""What a robot is: links, joints, coordinates, frames, a base that may move."""
+"""The robot model: links, joints, coordinates, frames and the motion of the base."""

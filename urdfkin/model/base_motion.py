@@ -1,4 +1,4 @@
-"""The motion of the base: the initial conditions that start the recursion (end of section 7.7)."""
+"""The motion of the base: the initial conditions of the forward recursion (end of section 7.7)."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from urdfkin.model.tree import FloatArray, frozen
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseMotion:
-    """How the robot's root link moves in the text's frame -1, which then is the world.
+    """Motion of the robot's root link in the world, which is the textbook's frame -1.
 
-    Every field may carry leading batch axes, which broadcast against the configuration's. The fields keep
-    the numbers as they were given: Pinocchio is asked about those.
+    Every field may have leading batch axes, which broadcast with those of the configuration. The fields
+    store the numbers as given, because Pinocchio is compared at exactly these numbers.
 
     Attributes:
-        placement: (..., 4, 4) T_world_base. Its rotation may be one to nine digits; what is meant is the
-            rotation nearest to it (`urdfkin.kinematics.rotation.nearest_rotation`).
+        placement: (..., 4, 4) T_world_base. Its rotation may be rounded, with as few as one digit; the
+            computation uses the nearest rotation (`urdfkin.kinematics.rotation.nearest_rotation`).
         velocity: (..., 6) [linear; angular] of the base's origin, world axes, m/s and rad/s.
         acceleration: (..., 6) [linear; angular], classical, world axes, m/s^2 and rad/s^2.
 
     Raises:
-        InputError: a wrong shape, a number that is not finite, or a placement that is no rigid motion.
+        InputError: a field has a wrong shape or a non-finite number, or the placement is not a rigid motion.
     """
 
     placement: FloatArray = field(default_factory=lambda: np.eye(4))
@@ -39,7 +39,7 @@ class BaseMotion:
             array = frozen(getattr(self, name))
             if array.shape[-len(shape) :] != shape or not np.isfinite(array).all():
                 raise InputError(
-                    f"the base's {name} is an array (..., {', '.join(map(str, shape))}) of finite numbers",
+                    f"the base's {name} must be a finite array (..., {', '.join(map(str, shape))})",
                     found=f"shape {array.shape}" if array.shape[-len(shape) :] != shape else "nan or inf",
                     question=None if name == "placement" else Question.ROW_ORDER,
                 )
@@ -48,9 +48,9 @@ class BaseMotion:
             _ = self.batch_shape
         except ValueError:
             shapes = f"{self.placement.shape}, {self.velocity.shape}, {self.acceleration.shape}"
-            raise InputError("the batch shapes of the base's fields do not fit", found=shapes) from None
+            raise InputError("the base's batch shapes do not fit together", found=shapes) from None
         if (self.placement[..., 3, :] != [0.0, 0.0, 0.0, 1.0]).any():
-            raise InputError("the last row of the base's placement is 0 0 0 1")
+            raise InputError("the last row of the base's placement must be 0 0 0 1")
         R = nearest_rotation(self.placement[..., :3, :3], "the rotation of the base's placement")
         object.__setattr__(self, "_rotation", frozen(R))
 
@@ -59,13 +59,13 @@ class BaseMotion:
 
     @property
     def batch_shape(self) -> tuple[int, ...]:
-        """The leading axes of the three fields together."""
+        """The common batch shape of the three fields."""
         return np.broadcast_shapes(
             self.placement.shape[:-2], self.velocity.shape[:-1], self.acceleration.shape[:-1]
         )
 
     def state(self, batch_shape: tuple[int, ...]) -> FloatArray:
-        """(n, 24) rows [R, p, w, v, alpha, a] for the kernels, one row if the base is the same for all."""
+        """Return rows [R, p, w, v, alpha, a] (n, 24) for the kernels; one row without batch axes."""
         shape = batch_shape if self.batch_shape else ()
         parts = (
             self._rotation.reshape(*self.placement.shape[:-2], 9),
@@ -79,15 +79,15 @@ class BaseMotion:
         return np.ascontiguousarray(rows.reshape(-1, 24))
 
 
-#: A base that stands still at the world's origin.
+#: A fixed base at the world's origin.
 STILL = BaseMotion()
 STILL_STATE = frozen(STILL.state(()))
 
 
 def against_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
-    """The state (1 or n, 24) of the same base in a world that is accelerated by -gravity (3,).
+    """Return the base state (1 or n, 24) in a world that is accelerated by -gravity (3,).
 
-    No accelerometer can tell it from one that stands still where there is gravity.
+    An accelerometer measures the same in both cases: a fixed base under gravity, and this accelerated base.
     """
     lifted = state.copy()
     lifted[:, -3:] -= gravity

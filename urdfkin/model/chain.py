@@ -1,9 +1,10 @@
-"""A path between two frames as a row of joint axes: what a Denavit-Hartenberg table is made from.
+"""A path between two frames as a sequence of joint axes, from which Denavit-Hartenberg tables are made.
 
-Section 7.5 of the text: joint i turns about (or slides along) z_{i-1} at O_{i-1}, and d_{i-1,i} leads from
-O_{i-1} to O_i. The path may run down the tree, up, or through a common ancestor (left foot to right hand).
-Fixed joints are folded in. A joint that is passed backwards, from its child to its parent, has its axis
-reversed, so that its coordinate keeps the sign of the URDF:  (Rz(q))^-1 about z is Rz(q) about -z.
+Section 7.5 of the textbook: joint i rotates about, or translates along, z_{i-1} at O_{i-1}. The vector
+d_{i-1,i} leads from O_{i-1} to O_i. The path may run down the tree, up, or through a
+common ancestor (left foot to right hand). Fixed joints are folded into the constants. If the path passes a
+joint backwards, from child to parent, the axis is reversed, so the coordinate has the sign of the URDF:
+(Rz(q))^-1 about z is Rz(q) about -z.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.pose import inverse, pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, frozen
 
-#: Metres that a robot counts as large at least: what stands on one spot has a size to divide by, too.
+#: Smallest size (m) of a robot, so that a robot whose frames all coincide has a size to divide by.
 LEAST_SIZE = 1e-9
 
 
@@ -32,13 +33,14 @@ class ChainJoint:
     """One moving joint on a path.
 
     Attributes:
-        name: As in the URDF.
+        name: Name in the URDF.
         kind: Revolute, continuous or prismatic.
         backwards: Whether the path passes it from its child link to its parent link.
-        T_previous_joint: (4, 4) pose of the joint's frame, whose z is its (reversed, if backwards) axis, in
-            the frame of the joint before it on the path, after that one's motion; in the base for the first.
-        limit: Its bounds, None where there are none.
-        mimic: Whom it follows, None if it has a coordinate of its own.
+        T_previous_joint: (4, 4) pose of the joint's frame before its own motion. Its z is the joint's axis,
+            reversed if `backwards`. The pose is relative to the previous joint's frame after that joint's
+            motion; for the first joint, relative to the base.
+        limit: Its limits; None without limits.
+        mimic: Its mimic rule; None if it has its own coordinate.
     """
 
     name: str
@@ -53,18 +55,18 @@ class ChainJoint:
 class FrameChain(Displayable):
     """The joints between two frames, base to tip.
 
-    Placement:  T_base_tip(q) = A_0 M_1(q_1) A_1 M_2(q_2) ... M_n(q_n) A_n, with the constants A_{i-1} =
-    `joints[i-1].T_previous_joint` and A_n = `T_last_tip`, and M_i a turn about z or a slide along it.
+    Placement:  T_base_tip(q) = A_0 M_1(q_1) A_1 M_2(q_2) ... M_n(q_n) A_n. The constants are A_{i-1} =
+    `joints[i-1].T_previous_joint` and A_n = `T_last_tip`; M_i is a rotation about z or a translation along z.
 
     Attributes:
         robot: The robot's name.
-        base: Name of the frame in which everything is measured.
-        tip: Name of the frame at the other end.
+        base: Name of the first frame; results are expressed in it.
+        tip: Name of the last frame.
         joints: The moving joints in path order.
-        T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base when nothing moves).
-        lengths: (n + 1,) how long the way is between joint origins, summed over the folded fixed joints: the
-            k-th entry bounds the distance from joint k's origin to the next one's, whatever the rotations.
-        folded: How many joints of the URDF, fixed ones too, each of the n + 1 constants is a product of.
+        T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base if no joint moves).
+        lengths: (n + 1,) path lengths between joint origins, m, summed over the folded fixed joints. Entry k
+            bounds the distance from joint k's origin to the next, for any rotations.
+        folded: (n + 1,) number of URDF joint poses, fixed joints' too, that are multiplied in each constant.
     """
 
     robot: str
@@ -80,16 +82,16 @@ class FrameChain(Displayable):
 
     def _sheet(self) -> TextDocument:
         heads = ("joint", "kind", "lower", "upper", "x", "y", "z", "axis x", "axis y", "axis z")
-        stand = zip(self.joints, self.origins().tolist(), self.axes().tolist(), strict=False)
+        geometry = zip(self.joints, self.origins().tolist(), self.axes().tolist(), strict=False)
         rows = [
             (
                 joint.name,
-                " ".join([joint.kind.value, *["backwards"] * joint.backwards, *_follows(joint)]),
+                " ".join([joint.kind.value, *["backwards"] * joint.backwards, *_rule_text(joint)]),
                 *("" if joint.limit is None else f"{x:.6g}" for x in _bounds(joint.limit)),
                 *origin,
                 *axis,
             )
-            for joint, origin, axis in stand
+            for joint, origin, axis in geometry
         ]
         x, y, z = (self.origins()[-1].round(12) + 0.0).tolist()
         return TextDocument(
@@ -102,12 +104,12 @@ class FrameChain(Displayable):
 
     @cached_property
     def coupling(self) -> Coupling:
-        """How the path's coordinates move its joints."""
+        """The map from the path's coordinates to its joint values."""
         return coupling_of([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the path's own coordinates, in the order that `placement` expects."""
+        """Names of the path's coordinates, in the order that `placement` expects."""
         return self.coupling.names
 
     @property
@@ -117,14 +119,14 @@ class FrameChain(Displayable):
 
     @cached_property
     def reach(self) -> float:
-        """Metres: the sum of the constant offsets between joints, tip included, base offset not."""
+        """Sum (m) of the constant offsets between joints, with the tip offset, without the base offset."""
         return float(self.lengths[1:].sum())
 
     def frames(self, q: Given | None = None) -> FloatArray:
-        """(..., n + 1, 4, 4) poses in the base: each joint's frame before its own motion, then the tip.
+        """Return poses (..., n + 1, 4, 4) in the base: each joint's frame before its motion, then the tip.
 
         Args:
-            q: (..., coordinates) in the order of `joint_names`; None is every coordinate at zero.
+            q: (..., coordinates), ordered as `joint_names`; None for the zero configuration.
 
         Raises:
             InputError: `q` has the wrong length.
@@ -139,24 +141,24 @@ class FrameChain(Displayable):
         return poses
 
     def placement(self, q: Given) -> FloatArray:
-        """(..., 4, 4) T_base_tip for `q` (..., coordinates); raises InputError for a wrong length."""
+        """Return T_base_tip (..., 4, 4) for `q` (..., coordinates); raises InputError for a wrong length."""
         return np.ascontiguousarray(self.frames(q)[..., -1, :, :])
 
     def axes(self, q: Given | None = None) -> FloatArray:
-        """(..., n, 3) unit axes z_{i-1} in the base; at zero coordinates when `q` is None."""
+        """Return the unit axes z_{i-1} (..., n, 3) in the base; None for `q` is the zero configuration."""
         return np.ascontiguousarray(self.frames(q)[..., :-1, :3, 2])
 
     def origins(self, q: Given | None = None) -> FloatArray:
-        """(..., n + 1, 3) joint origins O_{i-1} in the base, metres; the last is the tip's."""
+        """Return the joint origins O_{i-1} (..., n + 1, 3) in the base, m; the last is the tip's origin."""
         return np.ascontiguousarray(self.frames(q)[..., :3, 3])
 
     def interorigin(self, q: Given | None = None) -> FloatArray:
-        """(..., n, 3) interorigin vectors d_{i-1,i} in the base, metres; the last leads to the tip."""
+        """Return the interorigin vectors d_{i-1,i} (..., n, 3) in the base, m; the last leads to the tip."""
         return np.ascontiguousarray(np.diff(self.origins(q), axis=-2))
 
 
-def _follows(joint: ChainJoint) -> list[str]:
-    """Whom a joint follows, in words."""
+def _rule_text(joint: ChainJoint) -> list[str]:
+    """Return the mimic rule of a joint as text, in a list; empty without a rule."""
     return [f"= {joint.mimic}"] if joint.mimic else []
 
 
@@ -165,23 +167,23 @@ def _bounds(limit: Limit | None) -> tuple[float, float]:
 
 
 def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
-    """The path from `base` (the root when None) to `tip`.
+    """Return the path from `base` (None: the root) to `tip`.
 
     Args:
         tree: The robot.
         tip: Name of a link or joint frame.
-        base: Likewise.
+        base: Name of a link or joint frame.
 
     Raises:
-        UnknownNameError: there is no such frame; the nearest names are offered.
-        InputError: a planar or floating joint lies on the way.
+        UnknownNameError: no frame has that name; the message lists the nearest names.
+        InputError: a planar or floating joint lies on the path.
     """
     base_name = tree.links[0] if base is None else base
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0
     lengths, folded, count = list[float](), list[int](), 0
     for joint, backwards in steps_between(tree, tip, base_name):
-        _refuse_many_coordinates(tree, joint, base_name, tip)
-        to_joint, from_joint = _around(joint, backwards)
+        _check_single_axis(tree, joint, base_name, tip)
+        to_joint, from_joint = _poses_around(joint, backwards)
         A = A @ to_joint
         length += 0.0 if backwards else _norm(joint)
         count += 1
@@ -189,7 +191,7 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
             joints.append(ChainJoint(joint.name, joint.kind, backwards, frozen(A), joint.limit, joint.mimic))
             lengths.append(length)
             folded.append(count)
-            # A joint passed backwards has its constant after its motion, one passed forwards before it.
+            # The constant of a backward joint comes after its motion, that of a forward joint before it.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += _norm(joint) if backwards else 0.0
@@ -198,10 +200,10 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
 
 
 def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:
-    """The joints from `base` to `tip`, fixed ones too, each with whether it is passed backwards.
+    """Return the joints from `base` to `tip`, fixed ones too, each with whether the path passes it backwards.
 
     Raises:
-        UnknownNameError: there is no such frame.
+        UnknownNameError: no frame has that name.
     """
     up, down = tree.path(tree.frame_link(base)), tree.path(tree.frame_link(tip))
     common = 0
@@ -212,7 +214,7 @@ def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint,
 
 
 def motion_about_z(values: FloatArray, turns: bool) -> FloatArray:
-    """(..., 4, 4) Rz(values) or Tz(values)."""
+    """Return Rz(values) or Tz(values), (..., 4, 4)."""
     T = np.zeros((*values.shape, 4, 4))
     T[..., 2, 2] = T[..., 3, 3] = 1.0
     if turns:
@@ -225,8 +227,8 @@ def motion_about_z(values: FloatArray, turns: bool) -> FloatArray:
     return T
 
 
-def _around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray]:
-    """The constants before and after a joint's motion about its own z, in the path's direction."""
+def _poses_around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray]:
+    """Return the constant poses before and after a joint's motion about its own z, in path direction."""
     if not joint.kind.has_axis:
         return (inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)
     align = pose(axis_aligning(-joint.axis if backwards else joint.axis))
@@ -239,13 +241,13 @@ def _norm(joint: Joint) -> float:
     return math.hypot(*joint.T_parent_joint[:3, 3])
 
 
-def _refuse_many_coordinates(tree: KinematicTree, joint: Joint, base: str, tip: str) -> None:
+def _check_single_axis(tree: KinematicTree, joint: Joint, base: str, tip: str) -> None:
     if joint.kind not in (JointKind.PLANAR, JointKind.FLOATING):
         return
     child = tree.links[tree.joint_index(joint.name) + 1]
     raise InputError(
-        f"a {joint.kind.value} joint has no single axis and cannot stand on a path of axes",
+        f"a {joint.kind.value} joint has no single axis and cannot be on a path of axes",
         where=f"joint {joint.name}",
         found=f"it lies between {base} and {tip}",
-        remedy=f"take both ends on one side of it: from {child!r} outwards, or within the links before it",
+        remedy=f"choose base and tip on the same side of it: both from {child!r} outwards, or both before it",
     )

@@ -1,8 +1,12 @@
-"""Configurations: what `q` holds for each joint, and how it reads in Pinocchio's layout.
+"""Configurations: the layout of `q`, named poses, limits, and the conversion to and from Pinocchio's layout.
 
-One number for each revolute, continuous and prismatic joint; planar (x, y, angle); floating (x, y, z, qx,
-qy, qz, qw). Pinocchio differs for continuous (cos, sin) and planar (x, y, cos, sin), and its default model
-gives followers a coordinate of their own.
+| joint | urdfkin | Pinocchio |
+|---|---|---|
+| revolute, prismatic | one number | the same |
+| continuous | one number | cos, sin |
+| planar | x, y, angle | x, y, cos, sin |
+| floating | x, y, z, qx, qy, qz, qw | the same |
+| mimic | none | a coordinate of its own, in the default model |
 """
 
 from __future__ import annotations
@@ -21,11 +25,11 @@ from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_n
 from urdfkin.model.ranges import coordinate_ranges
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, frozen
 
-#: How far (rad or m) a follower's coordinate, or a (cos, sin) pair's norm, may be off in `from_pinocchio`.
-_FOLLOWS_TO = 1e-9
+#: Tolerance of `from_pinocchio` (rad or m) for the coordinate of a mimic joint.
+_MIMIC_TOLERANCE = 1e-9
 
 
-#: What is put behind the name of a joint that has several numbers, and what they are measured in.
+#: Suffix and unit of each number of a joint that has several.
 _OF_Q = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
@@ -37,20 +41,22 @@ _OF_RATES = {
 
 
 def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """A name for each number of `q`: the joint's, with a suffix where a joint has several.
+    """Return a name for each number of `q`: the joint's name, with a suffix if the joint has several.
 
-    They are `base.x`, `base.y`, ...; where another joint is itself called so, `base:x`, `base:y`, ...
+    Example: `base.x`, `base.y`, ...; if another joint has such a name, `base:x`, `base:y`, ...
     """
-    return tuple(name for name, _ in _named(tree, _OF_Q))
+    return tuple(name for name, _ in _names_and_units(tree, _OF_Q))
 
 
 def rate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """A name for each number of `v` and `a`; several where a joint has several, in the moving frame."""
-    return tuple(name for name, _ in _named(tree, _OF_RATES))
+    """Return a name for each number of `v` and `a`; planar and floating joints have several."""
+    return tuple(name for name, _ in _names_and_units(tree, _OF_RATES))
 
 
-def _named(tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]) -> Iterator[tuple[str, str]]:
-    """A name and a unit for each number; no two have the same name, nor one that of another joint."""
+def _names_and_units(
+    tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]
+) -> Iterator[tuple[str, str]]:
+    """Yield a name and a unit for each number; the names are unique and differ from every joint name."""
     taken = set[str]()
     for joint in tree.joints:
         if not joint.nv:
@@ -67,12 +73,12 @@ def _named(tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]) -> It
 
 
 def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
-    """What each number of "q", "v" or "a" is measured in, rates aside: "rad", "m", or "" for none."""
-    return tuple(unit for _, unit in _named(tree, _OF_Q if what == "q" else _OF_RATES))
+    """Return the unit of each number of "q", "v" or "a" without the time unit: "rad", "m", or "" for none."""
+    return tuple(unit for _, unit in _names_and_units(tree, _OF_Q if what == "q" else _OF_RATES))
 
 
 def places(tree: KinematicTree, what: str) -> CoordinateLayout:
-    """How the numbers of "q", "v" or "a" are called and measured, for those who give them by name."""
+    """Return the names and units of "q", "v" or "a", to parse values that are given by name."""
     is_q = what == "q"
     spans = {
         joint.name: (at, joint.nq if is_q else joint.nv)
@@ -91,10 +97,10 @@ def places(tree: KinematicTree, what: str) -> CoordinateLayout:
 
 
 def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
-    """Joints that have no number of their own, and what to do instead of giving one."""
+    """Return the joints without a coordinate, each with a hint for the message."""
     return {
         joint.name: Hint(
-            f"it follows {joint.mimic.leader}: give that, or load with mimic=False (--no-mimic)",
+            f"it mimics {joint.mimic.leader}: give that value, or load with mimic=False (--no-mimic)",
             Question.MIMIC_JOINTS,
         )
         if joint.mimic
@@ -105,10 +111,10 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Pinocchio's lengths where they differ from ours, and what to do about them."""
+    """Return Pinocchio's lengths where they differ from urdfkin's, each with a hint for the message."""
     follow = any(joint.mimic for joint in tree.joints)
     free = Hint(
-        "mimic joints follow their leaders: leave them out, or load with mimic=False (--no-mimic)",
+        "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
         Question.MIMIC_JOINTS,
     )
     of_followers = sum(joint.kind.nv for joint in tree.joints if joint.mimic)
@@ -118,7 +124,7 @@ def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
             length = _pinocchio_length(tree, mimic=mimic)
             asks = f", mimic={mimic}" if follow else ""
             found[length] = Hint(
-                f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) gives urdfkin's",
+                f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) converts it to urdfkin's",
                 Question.CONTINUOUS_JOINTS,
             )
         if follow:
@@ -133,7 +139,7 @@ def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
 
 
 def neutral(tree: KinematicTree) -> FloatArray:
-    """(nq,) zeros, and the identity quaternion for floating joints."""
+    """Return the zero configuration (nq,), with the identity quaternion for floating joints."""
     q = np.zeros(tree.nq)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if joint.kind is JointKind.FLOATING:
@@ -142,10 +148,10 @@ def neutral(tree: KinematicTree) -> FloatArray:
 
 
 def poses(tree: KinematicTree) -> dict[str, FloatArray]:
-    """Named configurations (nq,): `neutral`; `ready`, within the limits; and what else the tree has.
+    """Return the named configurations (nq,): `neutral`, `ready` and the tree's own named poses.
 
-    `ready` is the tree's own where it has one (the catalogue gives some robots one), and otherwise the
-    neutral one with every joint that may not be at 0 in the middle of its range.
+    `ready` is within the limits. The catalogue defines it for some robots. For the others it is `neutral`,
+    but with every joint whose limits exclude 0 in the middle of its range.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -161,7 +167,7 @@ def poses(tree: KinematicTree) -> dict[str, FloatArray]:
 
 
 def limits(tree: KinematicTree) -> FloatArray:
-    """(2, nq) lower and upper bounds of each coordinate; infinite where there is none."""
+    """Return the lower and upper limits (2, nq) of each coordinate; infinite without a limit."""
     found = np.tile([[-np.inf], [np.inf]], tree.nq)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if joint.nq == 1 and joint.limit is not None and joint.kind is not JointKind.CONTINUOUS:
@@ -170,7 +176,7 @@ def limits(tree: KinematicTree) -> FloatArray:
 
 
 def velocity_limits(tree: KinematicTree) -> FloatArray:
-    """(nv,) the largest rates; infinite where there is none."""
+    """Return the velocity limits (nv,); infinite without a limit."""
     found = np.full(tree.nv, np.inf)
     for joint, at in zip(tree.joints, tree.v_index, strict=True):
         if joint.nv == 1 and joint.limit is not None:
@@ -179,10 +185,10 @@ def velocity_limits(tree: KinematicTree) -> FloatArray:
 
 
 def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """`q` with the quaternions of floating joints brought to norm 1 (a copy if there are any).
+    """Return `q` with the quaternions of floating joints normalised (a copy if there are any).
 
     Raises:
-        InputError: a quaternion whose norm is further than 1e-6 from 1.
+        InputError: the norm of a quaternion differs from 1 by more than 1e-6.
     """
     if not tree.floating_joints:
         return q
@@ -194,12 +200,12 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
 
 
 def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
-    """q, v or a as float64 with the right last axis (`urdfkin.model.configuration_like`)."""
+    """Return q, v or a as float64 with the right last axis (`urdfkin.model.configuration_like`)."""
     if (named := by_name(value, what)) is not None:
         return places(tree, what).read(named)
     array, width = floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv
     if array.shape[-1:] != (width,):
-        names = ", ".join(_names(tree, what)) or "none, nothing moves"
+        names = ", ".join(_names(tree, what)) or "none, no joint moves"
         instead = _other_lengths(tree, what).get(array.shape[-1]) if array.ndim else None
         raise InputError(
             f"{what} needs {width} numbers for {tree.name}: {names}",
@@ -211,13 +217,13 @@ def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
 
 
 def shaped(tree: KinematicTree, value: Given, what: str) -> FloatArray:
-    """The same, quaternions of norm 1; raises InputError."""
+    """Return the same as `numbers`, with unit quaternions; raises InputError."""
     array = numbers(tree, value, what)
     return with_unit_quaternions(tree, array) if what == "q" else array
 
 
 def checked(tree: KinematicTree, value: Given, what: str) -> FloatArray:
-    """The same, and every number finite; raises NotFiniteError too."""
+    """Return the same as `shaped`; raises NotFiniteError as well if a number is not finite."""
     array = shaped(tree, value, what)
     if not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0]
@@ -232,12 +238,12 @@ def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """One line for each joint that leaves its bounds somewhere in a batch (..., nq); followers too."""
+    """Return one line for each joint, mimic joints too, that is outside its limits in a batch (..., nq)."""
     lines = []
     for joint, values in zip(tree.joints, _own_values(tree, q), strict=True):
         if values is None or joint.limit is None or not values.size:
             continue
-        # A bound printed in decimal is rounded: one unit in the last place is no violation.
+        # A limit printed in decimal is rounded: one unit in the last place is not a violation.
         lower, upper = np.nextafter(joint.limit.lower, -np.inf), np.nextafter(joint.limit.upper, np.inf)
         outside = np.maximum(lower - values, values - upper)
         if outside.max() > 0.0:
@@ -248,7 +254,10 @@ def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
 
 
 def _degrees(joint: Joint, value: float) -> str:
-    """A question, where a value looks like degrees: beyond a turn, typed, and within the limits if it is."""
+    """Return the hint "degrees?" if the value looks like degrees, else "".
+
+    It looks like degrees if it exceeds one turn, has at most six digits, and is within the limits as degrees.
+    """
     typed = f"{value:.6g}"
     if not (joint.kind.turns and joint.limit and abs(value) > math.tau and float(typed) == value):
         return ""
@@ -257,7 +266,7 @@ def _degrees(joint: Joint, value: float) -> str:
 
 
 def _own_values(tree: KinematicTree, q: FloatArray) -> Iterator[FloatArray | None]:
-    """The coordinate of each joint with a single one, None for the others."""
+    """Yield the value of each joint that has an axis, None for the others."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.kind.has_axis:
             yield None
@@ -271,7 +280,7 @@ def _own_values(tree: KinematicTree, q: FloatArray) -> Iterator[FloatArray | Non
 
 
 def pinocchio_coordinates(joint: Joint, own: FloatArray) -> FloatArray:
-    """(..., k) Pinocchio's coordinates of one joint, from urdfkin's (..., joint.kind.nq)."""
+    """Return Pinocchio's coordinates (..., k) of one joint, from urdfkin's (..., joint.kind.nq)."""
     if joint.kind is JointKind.CONTINUOUS:
         return np.concatenate((np.cos(own), np.sin(own)), axis=-1)
     if joint.kind is JointKind.PLANAR:
@@ -280,13 +289,13 @@ def pinocchio_coordinates(joint: Joint, own: FloatArray) -> FloatArray:
 
 
 def pinocchio_blocks(tree: KinematicTree, q: FloatArray, *, mimic: bool) -> Iterator[tuple[int, FloatArray]]:
-    """For each joint that takes coordinates in Pinocchio's model: its index and they, in order.
+    """Yield the index and the coordinates of each joint that has coordinates in Pinocchio's model, in order.
 
     Args:
         tree: The robot.
         q: (..., nq).
-        mimic: False for Pinocchio's default model, in which followers have coordinates too; True for one
-            built with `mimic=True`.
+        mimic: False for Pinocchio's default model, in which mimic joints have coordinates too; True for a
+            model built with `mimic=True`.
     """
     for i, (joint, at) in enumerate(zip(tree.joints, tree.q_index, strict=True)):
         if not _in_pinocchio(joint, mimic=mimic):
@@ -301,28 +310,30 @@ _SIZES = {JointKind.CONTINUOUS: 2, JointKind.PLANAR: 4}
 
 
 def _in_pinocchio(joint: Joint, *, mimic: bool) -> bool:
-    """Whether a joint takes coordinates in Pinocchio's model, which is built with or without followers."""
+    """Return whether a joint has coordinates in Pinocchio's model (`mimic` as in `pinocchio_blocks`)."""
     return joint.kind.nq > 0 and not (mimic and joint.mimic)
 
 
 def _pinocchio_length(tree: KinematicTree, *, mimic: bool) -> int:
-    """How many coordinates Pinocchio's model has."""
+    """Return the number of coordinates of Pinocchio's model."""
     present = (joint.kind for joint in tree.joints if _in_pinocchio(joint, mimic=mimic))
     return sum(_SIZES.get(kind, kind.nq) for kind in present)
 
 
 def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
-    """(..., nq_pinocchio) for (..., nq)."""
+    """Convert `q` (..., nq) to Pinocchio's layout (..., nq_pinocchio)."""
     blocks = [block for _, block in pinocchio_blocks(tree, q, mimic=mimic)]
     return np.concatenate(blocks, axis=-1) if blocks else np.zeros((*q.shape[:-1], 0))
 
 
 def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
-    """(..., nq) for (..., nq_pinocchio); angles of continuous and planar joints come back in [-pi, pi].
+    """Convert Pinocchio's configuration (..., nq_pinocchio) to urdfkin's (..., nq).
+
+    Angles of continuous and planar joints are returned in [-pi, pi].
 
     Raises:
-        InputError: wrong length, a (cos, sin) pair that is no unit vector, or a follower that does not
-            follow its leader.
+        InputError: `q` has a wrong length, a (cos, sin) pair does not have norm 1, or a mimic joint does not
+            obey its rule.
     """
     length = _pinocchio_length(tree, mimic=mimic)
     if q.shape[-1:] != (length,):
@@ -331,7 +342,7 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
             "a Pinocchio configuration has the wrong length",
             where=tree.name,
             found=f"{q.shape}, expected (..., {length})",
-            remedy=f"mimic={not mimic} is for one of buildModelFromUrdf(..., mimic={not mimic})"
+            remedy=f"use mimic={not mimic} for a model of buildModelFromUrdf(..., mimic={not mimic})"
             if other
             else None,
             question=Question.MIMIC_JOINTS if other else Question.CONTINUOUS_JOINTS,
@@ -348,7 +359,7 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
         else:
             own[..., tree.q_index[i] : tree.q_index[i] + joint.kind.nq] = values
     for joint, leader_at, values in followers:
-        _check_follows(joint, own[..., leader_at], values[..., 0])
+        _check_mimic_rule(joint, own[..., leader_at], values[..., 0])
     return own
 
 
@@ -367,18 +378,18 @@ def _angle_back(joint: Joint, values: FloatArray) -> FloatArray:
     return np.concatenate((values[..., :-2], np.arctan2(sine, cosine)[..., None]), axis=-1)
 
 
-def _check_follows(joint: Joint, leader: FloatArray, values: FloatArray) -> None:
+def _check_mimic_rule(joint: Joint, leader: FloatArray, values: FloatArray) -> None:
     rule = joint.mimic
     if rule is None or not values.size:
         return
     off = rule.multiplier * leader + rule.offset - values
     if joint.kind is JointKind.CONTINUOUS:
         off = np.arctan2(np.sin(off), np.cos(off))
-    if np.abs(off).max() > _FOLLOWS_TO * max(1.0, float(np.abs(values).max())):
+    if np.abs(off).max() > _MIMIC_TOLERANCE * max(1.0, float(np.abs(values).max())):
         raise InputError(
-            f"a follower must be {rule.multiplier:g} * {rule.leader} + {rule.offset:g}",
+            f"the mimic joint must be {rule.multiplier:g} * {rule.leader} + {rule.offset:g}",
             where=f"joint {joint.name}",
             found=f"it is off by {np.abs(off).max():.3g}",
-            remedy="load with mimic=False to move it freely",
+            remedy="load with mimic=False to give it its own coordinate",
             question=Question.MIMIC_JOINTS,
         )

@@ -1,9 +1,15 @@
-"""q, v and a as people give them: in order, by name, with units, or as a named pose.
+"""Parse q, v and a: arrays, text, mappings by name, named poses, and tables with labels.
 
-Text is numbers between commas or blanks (`0.3, 30deg, pi/2`, brackets allowed), or `NAME=NUMBER` between
-commas (`shoulder=30deg, elbow=pi/2`), or a pose (`ready`), which `NAME=NUMBER` behind it changes. A mapping
-has a number, an array of a batch, or such a text for each name. A pandas Series or DataFrame, and any other
-table whose labels or columns have names, is read as a mapping. A missing name is an error, never 0.
+| input | example |
+|---|---|
+| numbers in order, between commas or blanks; brackets allowed | `0.3, 30deg, pi/2` |
+| numbers by name, between commas | `shoulder=30deg, elbow=pi/2` |
+| a named pose | `ready` |
+| a named pose with changes | `ready, elbow=pi/2` |
+| a mapping from names to numbers, text or batches | `{"shoulder": "30deg", "elbow": [0.1, 0.2]}` |
+| a pandas Series or DataFrame, or another table with named columns | read as a mapping |
+
+A missing name is an error; it never means 0.
 """
 
 from __future__ import annotations
@@ -22,18 +28,18 @@ from urdfkin.errors.numbers import parse_float, parse_quantity, remedy
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, floats
 
-#: What q, v and a may be given as; text counts as an ArrayLike.
+#: Accepted types of q, v and a; text is an ArrayLike too.
 Given = ArrayLike | Mapping[str, ArrayLike]
 
-#: How many names a message lists.
+#: Largest number of names in a message.
 _LISTED = 8
-#: A unit belongs to the number before it, blanks or not.
+#: The blank between a number and its unit.
 _UNIT_APART = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
 _AROUND_SIGNS = re.compile(r" ?([=*/]) ?")
 
 
 class Hint(NamedTuple):
-    """What to do instead of what was given, and the question whose answer says why."""
+    """The remedy for a wrong input, and the page with the explanation."""
 
     remedy: str
     question: Question
@@ -41,16 +47,16 @@ class Hint(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class CoordinateLayout:
-    """What the numbers of a q, v or a are called, and how they are measured.
+    """Names and units of the numbers of q, v or a.
 
     Attributes:
         what: "q", "v" or "a".
-        names: One a number.
-        units: "rad", "m", "" for a number without a unit, such as a quaternion's, or None for whatever it is.
-        spans: Joints with several numbers: where the first stands, and how many they are.
-        poses: Makes the named values; it and the next two are only called where they are needed.
-        otherwise: Makes what else might be named, and what to do instead.
-        lengths: Makes other lengths than `names` has that people give, and what to do about it.
+        names: The name of each number.
+        units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
+        spans: For each joint with several numbers: the first index and the count.
+        poses: Returns the named values. It and the next two functions are called only when needed.
+        otherwise: Returns a hint for each name that is not a coordinate, such as a fixed joint.
+        lengths: Returns a hint for each wrong length that users often pass, such as Pinocchio's.
     """
 
     what: str
@@ -62,15 +68,15 @@ class CoordinateLayout:
     lengths: Callable[[], Mapping[int, Hint]] = dict
 
     def read(self, value: str | Mapping[str, ArrayLike], where: str | None = None) -> FloatArray:
-        """(..., numbers) that a text or a mapping says.
+        """Return the numbers (..., numbers) of a text or a mapping.
 
         Args:
-            value: See the module.
-            where: How messages call the place that it was given in.
+            value: Text or mapping as described in the module.
+            where: Name of the input in messages.
 
         Raises:
-            InputError: too few or too many numbers, one that is none, a unit that does not fit.
-            UnknownNameError: no such coordinate, rate or pose.
+            InputError: too few or too many numbers, an invalid number, or a wrong unit.
+            UnknownNameError: an unknown coordinate, joint velocity or pose.
 
         >>> rest = {"neutral": np.zeros(2)}
         >>> arm = CoordinateLayout("q", ("shoulder", "elbow"), ("rad", "rad"), poses=lambda: rest)
@@ -97,7 +103,7 @@ keeps: 'neutral, elbow=...'
         for name, number in named:
             if name is None or name in values:
                 wrong = f"{name!r} twice" if name else repr(number[:60])
-                raise InputError("numbers come in order, or each with its name", where=where, found=wrong)
+                raise InputError("give all numbers in order, or each with its name", where=where, found=wrong)
             values[name] = number
         return self._by_name(values, where, pose)
 
@@ -132,7 +138,9 @@ keeps: 'neutral, elbow=...'
         try:
             shape = np.broadcast_shapes(*shapes)
         except ValueError:
-            raise InputError("batches of different shapes", where=where, found=safe_repr(shapes)) from None
+            raise InputError(
+                "the batches have different shapes", where=where, found=safe_repr(shapes)
+            ) from None
         out = np.empty((*shape, len(self.names)))
         out[...] = 0.0 if rest is None else rest
         for i, x in found.items():
@@ -140,12 +148,12 @@ keeps: 'neutral, elbow=...'
         return out
 
     def _of_a_joint(self, name: object, value: ArrayLike, where: str) -> dict[int, FloatArray]:
-        """The numbers of a joint that has several; an error for anything else that is no name here."""
-        kind = "coordinate" if self.what == "q" else "rate"
+        """Return the numbers, by index, of a joint that has several; raises an error for any other name."""
+        kind = {"q": "coordinate", "v": "joint velocity"}.get(self.what, "joint acceleration")
         if not isinstance(name, str):
-            raise InputError(f"a {kind} is called by its name", where=where, found=safe_repr(name))
+            raise InputError(f"the name of a {kind} must be text", where=where, found=safe_repr(name))
         if (instead := self.otherwise().get(name)) is not None:
-            raise InputError(f"{name!r} is no {kind}", where=where, **instead._asdict())
+            raise InputError(f"{name!r} is not a {kind}", where=where, **instead._asdict())
         if name not in self.spans:
             raise UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
         at, size = self.spans[name]
@@ -165,10 +173,10 @@ keeps: 'neutral, elbow=...'
         )
 
     def _number(self, text: str, where: str, unit: str | None) -> float:
-        """One number in SI units.
+        """Return one number in SI units.
 
         Raises:
-            InputError: it is none, or in a unit that does not fit.
+            InputError: the text is not a number, or its unit is wrong.
         """
         found = parse_quantity(text)
         value = parse_float(text) if found is None else found.value
@@ -181,21 +189,21 @@ keeps: 'neutral, elbow=...'
         other = unit is not None and found.unit not in (None, unit)
         if other or found.per not in (0, order):
             kinds = {"rad": "rad or deg", "m": "m or mm", "": "no unit", None: "rad, deg, m or mm"}[unit]
-            per = ("", ", or that per s", ", or that per s^2")[order]
+            per = ("", ", or these per s", ", or these per s^2")[order]
             raise InputError(
-                "a unit that does not fit",
+                "wrong unit",
                 where=where,
                 found=repr(text.strip()),
-                remedy=f"it is in {kinds}{per}",
+                remedy=f"use {kinds}{per}",
             )
         return value
 
 
 def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """`value` where it gives its numbers by name, a table with labels as a mapping; None where by order.
+    """Return `value` if it names its numbers, a table with labels as a mapping; None for numbers in order.
 
     Raises:
-        InputError: a label that stands twice; a list of tables with labels.
+        InputError: a label occurs twice, or `value` is a list of tables with labels.
 
     >>> by_name([0.5, 0.1], "q"), by_name("ready", "q"), by_name({"elbow": 0.5}, "q")
     (None, 'ready', {'elbow': 0.5})
@@ -207,21 +215,21 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
     if isinstance(value, list | tuple):
         if any(_labels(item) for item in value):
             raise InputError(
-                "a list of tables with labels",
+                "a list of tables with labels is not accepted",
                 where=where,
                 found=f"{len(value)} of them",
-                remedy="give one table of them all, or numbers in order",
+                remedy="give one table, or numbers in order",
             )
         return None
     labels = _labels(value)
     if twice := [safe_repr(label) for label, count in Counter(labels).items() if count > 1]:
-        raise InputError("a label stands twice", where=where, found=listed(twice))
+        raise InputError("a label occurs twice", where=where, found=listed(twice))
     table: Any = value
     return {label: table[label] for label in labels} or None
 
 
 def _labels(value: object) -> list[Any]:
-    """A table's labels (pandas' `keys()`, `columns`, `column_names`); none where they only count."""
+    """Return a table's labels (`keys()`, `columns` or `column_names`); empty if they are 0, 1, 2, ..."""
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []
@@ -239,10 +247,10 @@ def wrong_count(
     remedy: str | None = None,
     question: Question = Question.JOINT_ORDER,
 ) -> InputError:
-    """The error for another count of numbers than there are names."""
+    """Return the error for a wrong count of numbers."""
     without = f", none for {listed(names[count:])}" if count < len(names) else ""
     return InputError(
-        f"{len(names)} numbers are expected ({listed(names) or 'none: nothing moves'})",
+        f"{len(names)} numbers are expected ({listed(names) or 'none: no joint moves'})",
         where=where,
         found=f"{count}{without}",
         remedy=remedy,
@@ -251,13 +259,13 @@ def wrong_count(
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names for a message, no more than a line holds."""
+    """Return names for a message, at most eight and the total count."""
     more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
     return ", ".join(map(str, names[:_LISTED])) + more
 
 
 def _cells(text: str) -> list[str]:
-    """What stands between commas; where there are none, between blanks."""
+    """Split a text at commas; without commas, at blanks."""
     text = " ".join(text.split())
     if text[:1] + text[-1:] in ("[]", "()", "{}"):
         text = text[1:-1].strip()
@@ -267,11 +275,11 @@ def _cells(text: str) -> list[str]:
 
 
 def _pair(cell: str) -> tuple[str | None, str]:
-    """A name and what stands behind its last `=`; None where there is no name."""
+    """Split a cell at its last `=` into a name and a number; the name is None without `=`."""
     name, equals, number = cell.rpartition("=")
     return (name.strip(), number.strip()) if equals else (None, cell)
 
 
 def _is_word(text: str) -> bool:
-    """Whether a text may be a pose's name: it is no number, nor something that was meant as one."""
+    """Return whether a text may be the name of a pose: it is not a number and does not look like one."""
     return text[:1].isalpha() and "=" not in text and parse_quantity(text) is None and remedy(text) is None

@@ -1,4 +1,4 @@
-"""Names of frames that say whether a link or a joint is meant, whatever else in the robot is called so."""
+"""Frame names with a prefix, `link:` or `joint:`, which makes an ambiguous name unique."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import ClassVar, Self
 
 
 class FrameName(str):
-    """`link:NAME` or `joint:NAME`, meant as that even where something is itself called `link:NAME`.
+    """`link:NAME` or `joint:NAME`. It means that link or joint even if something else is named `link:NAME`.
 
-    As text it is an ordinary name, for reports and messages; a plain `str` of the same text is looked for as
-    it stands first (`KinematicTree.frame_link`).
+    Reports and messages print it as an ordinary name. A plain `str` with the same text is first looked up
+    as a name without a prefix (`KinematicTree.frame_link`).
 
     >>> LinkFrame.of("hand"), LinkFrame.of("hand").own
     ('link:hand', 'hand')
@@ -20,12 +20,12 @@ class FrameName(str):
 
     @classmethod
     def of(cls, own: str) -> Self:
-        """The frame of the link, or joint, of that name."""
+        """Return the frame name of a link or joint, given its own name."""
         return cls(f"{cls.prefix}{own}")
 
     @property
     def own(self) -> str:
-        """The link's or joint's own name."""
+        """The link's or joint's own name, without the prefix."""
         return self[len(self.prefix) :]
 
 
@@ -37,7 +37,7 @@ class LinkFrame(FrameName):
 
 
 class JointFrame(FrameName):
-    """`joint:NAME`: the frame of a joint, which is its child link's."""
+    """`joint:NAME`: the frame of a joint, which is the frame of its child link."""
 
     __slots__ = ()
     prefix = "joint:"

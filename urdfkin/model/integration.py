@@ -1,7 +1,9 @@
-"""From one configuration along rates, and the rates between two: what + and - are where q holds orientations.
+"""Integrate joint velocities, and find the joint velocities between two configurations.
 
-As Pinocchio's `integrate` and `difference`. One number of a joint adds up; planar and floating joints move
-along the screw that their rates, which stand in the moving frame, make: R = R_0 exp(w), p = p_0 + R_0 V(w) s
+The two functions replace + and - where q holds orientations. They agree with Pinocchio's `integrate` and
+`difference`. For a joint with one coordinate they add and subtract numbers. Planar and floating joints move
+along the screw of their joint velocity (w, s), which is in the moving frame:
+R = R_0 exp(w), p = p_0 + R_0 V(w) s,
 with V(w) = I + (1 - cos|w|)/|w|^2 [w] + (|w| - sin|w|)/|w|^3 [w]^2.
 """
 
@@ -16,15 +18,15 @@ from urdfkin.kinematics.rotation import exp_rotation, log_rotation, skew
 from urdfkin.kinematics.rotation.quaternion import quaternion_of, rotation_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: Squared angles (rad^2) below which (|w| - sin|w|)/|w|^3 is summed, which would lose its digits else.
-_SUMMED = 0.25
+#: Below this squared angle (rad^2), (|w| - sin|w|)/|w|^3 is computed as a series, to avoid cancellation.
+_SERIES_BELOW = 0.25
 
 
 def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
-    """(..., nq) where `q` (..., nq) gets to in a second at the rates `v` (..., nv)."""
-    shape = _together(q, v)
+    """Return the configuration (..., nq) after one second at the joint velocities `v` (..., nv) from `q`."""
+    shape = _common_shape(q, v)
     out = np.array(np.broadcast_to(q, (*shape, tree.nq)))
-    for joint, at, to in _own(tree):
+    for joint, at, to in _coordinate_joints(tree):
         step = v[..., to : to + joint.nv]
         if joint.nq == 1:
             out[..., at] += step[..., 0]
@@ -32,7 +34,7 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
         here = out[..., at : at + joint.nq]
         p, R = _pose(joint, here)
         s, w = _screw(joint, step)
-        p = p + (R @ (_along(w) @ s[..., np.newaxis]))[..., 0]
+        p = p + (R @ (_V(w) @ s[..., np.newaxis]))[..., 0]
         if joint.kind is JointKind.PLANAR:
             here[...] = np.concatenate((p[..., :2], here[..., 2:] + w[..., 2:]), axis=-1)
         else:
@@ -41,11 +43,14 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 
 
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
-    """(..., nv) rates that lead from `start` to `end` (..., nq) in a second, the shortest way round."""
-    shape = _together(start, end)
+    """Return the joint velocities (..., nv) that lead from `start` to `end` (..., nq) in one second.
+
+    Angles take the shorter of the two ways round.
+    """
+    shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
     v = np.empty((*shape, tree.nv))
-    for joint, at, to in _own(tree):
+    for joint, at, to in _coordinate_joints(tree):
         one, other = (q[..., at : at + joint.nq] for q in (start, end))
         if joint.nq == 1:
             way = other[..., 0] - one[..., 0]
@@ -57,29 +62,29 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
         if joint.kind is JointKind.PLANAR:
             w = np.zeros((*shape, 3))
             w[..., 2] = _shortest(other[..., 2] - one[..., 2])
-        s = np.linalg.solve(_along(w), back @ (p_1 - p_0)[..., np.newaxis])[..., 0]
+        s = np.linalg.solve(_V(w), back @ (p_1 - p_0)[..., np.newaxis])[..., 0]
         six = (s[..., :2], w[..., 2:]) if joint.kind is JointKind.PLANAR else (s, w)
         v[..., to : to + joint.nv] = np.concatenate(six, axis=-1)
     return v
 
 
-def _together(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
-    """The common batch shape."""
+def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
+    """Return the common batch shape; raises InputError if there is none."""
     try:
         return np.broadcast_shapes(one.shape[:-1], other.shape[:-1])
     except ValueError:
         found = f"{one.shape[:-1]} and {other.shape[:-1]}"
-        raise InputError("the batch shapes do not fit", found=found) from None
+        raise InputError("the batch shapes do not fit together", found=found) from None
 
 
-def _own(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
-    """Joints with coordinates of their own, and where these and their rates begin."""
+def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
+    """Return the joints with their own coordinates, and the first index of each in q and in v."""
     rows = zip(tree.joints, tree.q_index, tree.v_index, strict=True)
     return [(joint, at, to) for joint, at, to in rows if joint.nv]
 
 
 def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(..., 3) and (..., 3, 3) of a planar or floating joint."""
+    """Return position (..., 3) and rotation (..., 3, 3) of a planar or floating joint."""
     if joint.kind is JointKind.FLOATING:
         return own[..., :3], rotation_of(own[..., 3:])
     zero = np.zeros((*own.shape[:-1], 1))
@@ -87,7 +92,7 @@ def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _screw(joint: Joint, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sliding and turning, (..., 3) each."""
+    """Return the linear and the angular part of a joint velocity, (..., 3) each."""
     if joint.kind is JointKind.FLOATING:
         return step[..., :3], step[..., 3:]
     zero = np.zeros((*step.shape[:-1], 1))
@@ -100,14 +105,14 @@ def _about_z(angle: FloatArray) -> FloatArray:
     return turn
 
 
-def _along(w: FloatArray) -> FloatArray:
-    """(..., 3, 3) V(w)."""
+def _V(w: FloatArray) -> FloatArray:
+    """Return V(w), (..., 3, 3)."""
     square = (w * w).sum(axis=-1)[..., np.newaxis, np.newaxis]
     angle, W = np.sqrt(square), skew(w)
     half = np.sinc(angle / (2.0 * math.pi))
     summed = sum((-square) ** k / math.factorial(2 * k + 3) for k in range(7))
     cubed = np.where(
-        square < _SUMMED, summed, (1.0 - np.sinc(angle / math.pi)) / np.where(square > 0.0, square, 1.0)
+        square < _SERIES_BELOW, summed, (1.0 - np.sinc(angle / math.pi)) / np.where(square > 0.0, square, 1.0)
     )
     V: FloatArray = np.eye(3) + 0.5 * half**2 * W + cubed * (W @ W)
     return V

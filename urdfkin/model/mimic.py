@@ -1,8 +1,8 @@
-"""Which coordinates move which joints of a path: leaders count, followers copy.
+"""The map from the coordinates of a path to the values of its joints, mimic joints included.
 
-A path's own coordinates are its independent joints in path order. A joint that mimics another is no
-coordinate: its value is `multiplier * q_leader + offset`, and its leader is a coordinate of the path even
-when the leader itself lies elsewhere on the robot.
+The coordinates of a path are its independent joints, in path order. A mimic joint has no coordinate: its
+value is `multiplier * q_mimicked + offset`. The mimicked joint is a coordinate of the path even if it lies
+elsewhere on the robot.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class Coupling:
     """The linear map from a path's coordinates to the values of its joints: values = G q + g.
 
     Attributes:
-        joints: Every joint of the path that moves, base to tip.
-        mimics: Whom each of them follows, None for a joint with a coordinate of its own.
-        kinds: How each of them moves.
+        joints: Names of all moving joints of the path, base to tip.
+        mimics: The mimic rule of each joint; None for a joint with its own coordinate.
+        kinds: The kind of each joint.
 
     Example:
         >>> turn = JointKind.REVOLUTE
@@ -41,7 +41,7 @@ class Coupling:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The coordinates: names of independent joints, in the order in which the path meets them."""
+        """Names of the coordinates: the independent joints, in path order."""
         leaders = (
             mimic.leader if mimic else joint for joint, mimic in zip(self.joints, self.mimics, strict=True)
         )
@@ -49,24 +49,24 @@ class Coupling:
 
     @cached_property
     def matrix(self) -> FloatArray:
-        """(joints, coordinates) G: how fast each joint moves with each coordinate."""
+        """G, (joints, coordinates): the velocity of each joint for unit velocity of each coordinate."""
         G = np.zeros((len(self.joints), len(self.names)))
         G[np.arange(len(self.joints)), self._leader_index] = self._multiplier
         return frozen(G)
 
     @cached_property
     def offset(self) -> FloatArray:
-        """(joints,) g: where each joint stands when every coordinate is zero."""
+        """g, (joints,): the value of each joint when every coordinate is zero."""
         return frozen([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
     def places(self, what: str = "q") -> CoordinateLayout:
-        """How the numbers of a path's q, v or a are called and measured, for those who give them by name."""
+        """Return the names and units of the path's q, v or a, to parse values that are given by name."""
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
-        # A leader that is not on the path may be of any kind.
+        # A mimicked joint that is not on the path may be of any kind: its unit is unknown here.
         own = tuple(map(units.get, self.names))
         follow = {
-            joint: Hint(f"it follows {mimic.leader}: give that", Question.MIMIC_JOINTS)
+            joint: Hint(f"it mimics {mimic.leader}: give that value", Question.MIMIC_JOINTS)
             for joint, mimic, _ in rules
             if mimic
         }
@@ -74,22 +74,22 @@ class Coupling:
         return CoordinateLayout(what, self.names, own, poses=lambda: neutral, otherwise=lambda: follow)
 
     def values(self, q: Given) -> FloatArray:
-        """(..., joints) values of all joints, rad or m.
+        """Return the values (..., joints) of all joints, rad or m.
 
         Args:
             q: (..., coordinates) in the order of `names`, or a mapping by name, or text
                 (`urdfkin.model.configuration_like`).
 
         Raises:
-            InputError: the last axis has another length than `names`, or a name is missing.
-            UnknownNameError: a name that is no coordinate of the path.
+            InputError: the last axis of `q` has the wrong length, or a name is missing.
+            UnknownNameError: a name is not a coordinate of the path.
         """
         coordinates = self.checked(q, "q")
-        # One multiplication and one addition for each joint, so that G's zeros cost no rounding.
+        # One multiplication and one addition for each joint: the zeros of G cause no rounding.
         return np.asarray(coordinates[..., self._leader_index] * self._multiplier + self.offset)
 
     def checked(self, array: Given, what: str) -> FloatArray:
-        """`array`, "q", "v" or "a", as float64 with the path's number of coordinates on its last axis."""
+        """Return `array` ("q", "v" or "a") as float64; raises InputError for a wrong last axis."""
         if (named := by_name(array, what)) is not None:
             return self.places(what).read(named)
         values = np.asarray(array, dtype=np.float64)
@@ -97,7 +97,7 @@ class Coupling:
             raise InputError(
                 f"{what} needs {len(self.names)} values on its last axis: {', '.join(self.names) or 'none'}",
                 found=f"shape {values.shape}",
-                remedy="pick these out of the robot's own coordinates, for instance with select()",
+                remedy="select these from the robot's coordinates, for example with select()",
             )
         return values
 
@@ -112,23 +112,23 @@ class Coupling:
         return frozen([mimic.multiplier if mimic else 1.0 for mimic in self.mimics])
 
     def q_index(self, tree: KinematicTree) -> tuple[int, ...]:
-        """Where the path's coordinates stand in the configuration `q` of the whole robot."""
+        """Return the index of each coordinate of the path in the configuration `q` of the whole robot."""
         return tuple(tree.q_index[tree.joint_index(name)] for name in self.names)
 
     def v_index(self, tree: KinematicTree) -> tuple[int, ...]:
-        """Where the path's rates stand in the rates `v` of the whole robot."""
+        """Return the index of each joint velocity of the path in `v` of the whole robot."""
         return tuple(tree.v_index[tree.joint_index(name)] for name in self.names)
 
     def select(self, tree: KinematicTree, q: Given) -> FloatArray:
-        """(..., coordinates) of the path out of the whole robot's `q` (..., nq).
+        """Return the coordinates (..., coordinates) of the path from the whole robot's `q` (..., nq).
 
         Raises:
-            InputError: `q` has another length than the robot's.
+            InputError: `q` does not have the robot's length.
         """
         return numbers(tree, q, "q")[..., list(self.q_index(tree))]
 
 
 def coupling_of(joints: Sequence[tuple[str, Mimic | None, JointKind]]) -> Coupling:
-    """The coupling of joints given as (name, whom it follows, how it moves)."""
+    """Return the coupling of joints given as (name, mimic rule or None, kind)."""
     names, mimics, kinds = zip(*joints, strict=True) if joints else ((), (), ())
     return Coupling(names, mimics, kinds)

@@ -1,4 +1,4 @@
-"""Rigid transforms as (4, 4) arrays: made of their parts, and turned round."""
+"""Rigid transforms as (4, 4) arrays: construction and inverse."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from urdfkin.model.tree import FloatArray
 
 
 def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
-    """(4, 4) a rotation (3, 3) and an origin (3,), metres; what is not given stays as it is.
+    """Return the pose (4, 4) with a rotation (3, 3) and an origin (3,), m; each defaults to the identity's.
 
     >>> pose(p=[1.0, 2.0, 3.0])[:3, 3].tolist()
     [1.0, 2.0, 3.0]
@@ -23,6 +23,6 @@ def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
 
 
 def inverse(T: FloatArray) -> FloatArray:
-    """(4, 4) the pose of the outer frame in the inner one."""
+    """Return the inverse (4, 4) of a pose."""
     back = T[:3, :3].T
     return pose(back, -back @ T[:3, 3])

@@ -1,4 +1,4 @@
-"""Ranges of the coordinates: each joint's own limits, and where its mimic joints keep theirs."""
+"""Ranges of the coordinates, from each joint's limits and those of its mimic joints."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import numpy as np
 from urdfkin.kinematics.roundings import EPS, FOLLOWER
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit, Mimic
 
-#: A coordinate whose bounds are wider than this, or missing, has this range: rad or m.
+#: Largest bound of a range (rad or m); also used when a limit is missing.
 WIDEST = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class NarrowedRange:
-    """A joint whose mimic joints leave their limits before it reaches its own.
+    """The range of a mimicked joint that the limits of its mimic joints make smaller.
 
     Attributes:
-        joint: Name of the joint that is mimicked.
+        joint: Name of the mimicked joint.
         own: Its own range.
-        kept: The part of it in which its mimic joints keep their limits; None where there is none.
+        kept: The part of it in which all mimic joints are within their limits; None if there is no such part.
         by: Names of these mimic joints.
-        unit: Of the ranges, "rad" or "m".
+        unit: Unit of the ranges, "rad" or "m".
     """
 
     joint: str
@@ -36,12 +36,12 @@ class NarrowedRange:
         names = ", ".join(self.by)
         own = f"joint {self.joint} ranges over {range_words(self.own)} {self.unit}"
         if self.kept is None:
-            return f"{own}; nowhere do its mimic joints keep all their limits ({names})"
+            return f"{own}; no value keeps all its mimic joints within their limits ({names})"
         return f"{own}; its mimic joints keep their limits from {range_words(self.kept)} only ({names})"
 
 
 def range_words(ends: tuple[float, float]) -> str:
-    """Both ends of a range.
+    """Return the two ends of a range as text.
 
     >>> range_words((-0.005, 0.055))
     '-0.005 to 0.055'
@@ -50,19 +50,19 @@ def range_words(ends: tuple[float, float]) -> str:
 
 
 def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """The range of each joint with one coordinate of its own: the file's limits of that joint alone."""
+    """Return the range of each joint with one coordinate of its own, from that joint's limits alone."""
     return {joint.name: _own_range(joint) for joint in tree.joints if joint.nq == 1}
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """The same where mimic joints keep their limits too, if there is such a part of the range."""
+    """Return the same ranges, narrowed to where mimic joints are within their limits, if possible."""
     ranges = own_ranges(tree)
     narrowed = {one.joint: one.kept for one in narrowed_ranges(tree)}
     return {name: narrowed.get(name) or own for name, own in ranges.items()}
 
 
 def narrowed_ranges(tree: KinematicTree) -> tuple[NarrowedRange, ...]:
-    """The ranges that limits of mimic joints narrow."""
+    """Return the ranges that the limits of mimic joints narrow."""
     followers: dict[str, list[Joint]] = {}
     for joint in tree.joints:
         if joint.mimic is not None and joint.limit is not None:
@@ -91,23 +91,23 @@ def _narrowed(leader: Joint, own: tuple[float, float], joints: list[Joint]) -> N
 
 
 def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
-    """The part of a joint's range in which its mimic joint keeps its limits; empty if there is none."""
+    """Return the part of a range in which a mimic joint is within its limits; empty if there is none."""
 
     def keeps(leader: float) -> bool:
-        # As `configuration.limit_violations` counts: a bound printed in decimal is rounded.
+        # As in `configuration.limit_violations`: a limit printed in decimal is rounded.
         own = rule.multiplier * leader + rule.offset
         return bool(np.nextafter(limit.lower, -np.inf) <= own <= np.nextafter(limit.upper, np.inf))
 
-    if keeps(lower) and keeps(upper):  # and so all between: what is not cut keeps its bits
+    if keeps(lower) and keeps(upper):  # then so does every value between: the range stays bit for bit
         return lower, upper
     if rule.multiplier == 0.0:
         return math.inf, -math.inf
     ends = sorted((end - rule.offset) / rule.multiplier for end in (limit.lower, limit.upper))
-    # Inwards by what the follower's own value may be rounded by.
+    # Move the ends inwards by the rounding error of the mimic joint's value.
     room = (
         FOLLOWER * EPS * (max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)) / abs(rule.multiplier)
     )
-    if not math.isfinite(room):  # a follower with a single bound
+    if not math.isfinite(room):  # a mimic joint with one limit only
         room = FOLLOWER * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
     return (
         lower if keeps(lower) else max(lower, ends[0] + room),

@@ -1,7 +1,7 @@
-"""The recursion of section 7.7 and what is read off a frame, on any kind of number.
+"""The forward recursion of section 7.7, and the quantities of a frame, for any kind of number.
 
-`eq` are the chapter's equations, computing with that kind (`urdfkin.kinematics.number_kinds.bound`). The walk
-in compiled code is `urdfkin.compiled.recursion`.
+`eq` holds the textbook's equations for one kind of number (`urdfkin.kinematics.number_kinds.bound`). The
+compiled recursion is `urdfkin.compiled.recursion`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """A link's frame: R and p in the world's axes, w, vel, alpha and acc in the axes of the recursion."""
+    """State of a link's frame.
+
+    R and p are in the world's axes; w, vel, alpha and acc are in the axes of the recursion.
+    """
 
     R: Matrix = IDENTITY
     p: Vector = ZERO
@@ -35,7 +38,16 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A joint velocity: its axis, its kind, its joint's frame, its index on the path and in v, its factor."""
+    """One Jacobian column of a joint.
+
+    Attributes:
+        z: The joint's axis.
+        turns: Whether the joint is revolute.
+        carrier: State of the joint's frame.
+        order: Index of the column on the path.
+        place: Index of the joint velocity in v.
+        factor: Factor on that joint velocity (the multiplier of a mimic joint).
+    """
 
     z: Vector
     turns: bool
@@ -47,28 +59,28 @@ class Column:
 
 @dataclass(eq=False)
 class Recursion:
-    """From a link's state to the next.
+    """The steps of the recursion, from a link's state to the next.
 
     Attributes:
         eq: The equations.
-        own: Whether motion is seen in each link's own axes, not in the world's.
+        own: Whether motion is expressed in each link's own axes (True) or in the world's (False).
     """
 
     eq: Any
     own: bool = False
 
     def seen(self, s: State, x: Vector) -> Vector:
-        """A vector of the link, in the axes of the recursion."""
+        """Express a vector of the link in the axes of the recursion."""
         return x if self.own else self.eq.rotate(s.R, x)
 
     def carried(self, s: State, d: Vector) -> State:
-        """Along the rigid link: 7.58, 7.128, 7.130."""
+        """Move the state along the rigid link: 7.58, 7.128, 7.130."""
         eq, lever = self.eq, self.seen(s, d)
         vel, acc = eq.point_velocity(s.vel, s.w, lever), eq.point_acceleration(s.acc, s.alpha, s.w, lever)
         return replace(s, p=eq.point_position(s.p, s.R, d), vel=vel, acc=acc)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """The same motion, seen from a frame that is turned by S."""
+        """Express the same motion in a frame rotated by S."""
         R = self.eq.product(s.R, S)
         if not self.own:
             return replace(s, R=R)
@@ -76,20 +88,20 @@ class Recursion:
         return State(R, s.p, *(self.eq.rotate(back, x) for x in (s.w, s.vel, s.alpha, s.acc)))
 
     def revolute(self, s: State, axis: Vector, S: Matrix, v: Number, a: Number) -> State:
-        """7.129, then 7.127, then the turn itself."""
+        """Pass a revolute joint: 7.129, then 7.127, then the rotation itself."""
         z = self.seen(s, axis)
         alpha = self.eq.angular_acceleration(s.alpha, s.w, z, v, a)
         return self.turned(replace(s, alpha=alpha, w=self.eq.angular_velocity(s.w, z, v)), S)
 
     def prismatic(self, s: State, axis: Vector, x: Number, v: Number, a: Number) -> State:
-        """The slide is a part of the interorigin vector (7.64); then 7.130 and 7.128."""
+        """Pass a prismatic joint: its displacement is in the interorigin vector (7.64); then 7.130, 7.128."""
         s = self.carried(s, self.eq.times(x, axis))
         z = self.seen(s, axis)
         acc = self.eq.sliding_acceleration(s.acc, s.w, z, v, a)
         return replace(s, vel=self.eq.sliding_velocity(s.vel, z, v), acc=acc)
 
     def free(self, s: State, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> State:
-        """A planar or floating joint; u, o and their rates are in the moved axes."""
+        """Pass a planar or floating joint; its velocities and accelerations are in the moved axes."""
         eq, s = self.eq, self.turned(self.carried(s, slide), S)
         u, o, u_rate, o_rate = (self.seen(s, x) for x in rates)
         return replace(
@@ -100,21 +112,21 @@ class Recursion:
             acc=eq.free_acceleration(s.acc, s.w, o, u, u_rate),
         )
 
-    # -- what is asked of a frame; columns are in the world's axes -----------------------------------
+    # -- quantities of a frame; columns are in the world's axes --------------------------------------
 
     def velocity(self, s: State, reference: Reference) -> tuple[Vector, Vector]:
-        """Linear, angular: 7.127, 7.128."""
+        """Return the linear and the angular velocity: 7.127, 7.128."""
         at_world = reference is Reference.WORLD
         return self.eq.point_velocity(s.vel, s.w, self.eq.minus(ZERO, s.p)) if at_world else s.vel, s.w
 
     def acceleration(self, s: State, reference: Reference) -> tuple[Vector, Vector]:
-        """Linear, angular, classical: 7.129, 7.130."""
+        """Return the linear and the angular classical acceleration: 7.129, 7.130."""
         at_world = reference is Reference.WORLD
         acc = self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)) if at_world else s.acc
         return acc, s.alpha
 
     def in_reference(self, s: State, reference: Reference, linear: Vector, angular: Vector) -> Six:
-        """A pair seen in the world's axes, in those of its reference."""
+        """Express a pair of world-axes vectors in the axes of the reference frame."""
         if reference is Reference.LOCAL:
             back = self.eq.transposed(s.R)
             linear, angular = self.eq.rotate(back, linear), self.eq.rotate(back, angular)
@@ -127,15 +139,15 @@ class Recursion:
         return six
 
     def jacobian(self, s: State, columns: Sequence[Column], nv: int, reference: Reference) -> list[Six]:
-        """The columns of 7.85, one for each rate."""
+        """Return the columns of the Jacobian (7.85), one for each joint velocity."""
         to = ZERO if reference is Reference.WORLD else s.p
-        return self._summed(s, reference, nv, ((one, *self._column(one, to)) for one in columns))
+        return self._add_mimic_columns(s, reference, nv, ((one, *self._column(one, to)) for one in columns))
 
     def jacobian_rate(self, s: State, columns: Sequence[Column], nv: int, reference: Reference) -> list[Six]:
-        """The columns of 7.126."""
+        """Return the columns of the Jacobian's time derivative (7.126)."""
         to, to_rate = (ZERO, ZERO) if reference is Reference.WORLD else (s.p, s.vel)
         rates = ((one, *self._rate(s, one, to, to_rate, reference)) for one in columns)
-        return self._summed(s, reference, nv, rates)
+        return self._add_mimic_columns(s, reference, nv, rates)
 
     def _rate(
         self, s: State, column: Column, to: Vector, to_rate: Vector, reference: Reference
@@ -150,10 +162,10 @@ class Recursion:
             turning = eq.rate_in_turning_axes(turning, s.w, angular)
         return rate, turning
 
-    def _summed(
+    def _add_mimic_columns(
         self, s: State, reference: Reference, nv: int, found: Iterator[tuple[Column, Vector, Vector]]
     ) -> list[Six]:
-        """By rate: a leader's own column and those of its followers."""
+        """Add the columns of mimic joints to the column of their mimicked joint."""
         out: list[Six] = [(0,) * 6] * nv
         for column, linear, angular in found:
             six = self.in_reference(s, reference, linear, angular)
@@ -165,7 +177,7 @@ class Recursion:
     def hessian(
         self, s: State, columns: Sequence[Column], reference: Reference
     ) -> Iterator[tuple[int, int, Number, Six]]:
-        """By which column and which rate, their factor, and how the rate changes the column."""
+        """Yield column index, joint velocity index, factor, and derivative of the column."""
         to = ZERO if reference is Reference.WORLD else s.p
         ends = [(one, self._column(one, to)) for one in columns]
         for of, six in ends:
@@ -174,7 +186,14 @@ class Recursion:
                 yield of.place, by.place, of.factor * by.factor, self.in_reference(s, reference, *change)
 
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
-        """How a column changes with a rate that comes before it, or with it, or behind it."""
+        """Return the derivative of a column by a joint velocity.
+
+        Args:
+            six: The column.
+            by: The column of the joint velocity.
+            reference: The reference frame.
+            before: Whether the moving joint is before the column's joint on the path, or is that joint.
+        """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO
         if reference is Reference.WORLD:

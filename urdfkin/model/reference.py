@@ -1,4 +1,4 @@
-"""In which axes, and for which point, a velocity, Jacobian or acceleration is given."""
+"""Reference frames: the axes and the point of a velocity, Jacobian or acceleration."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from urdfkin.errors.validators import safe_repr
 
 
 class Reference(IntEnum):
-    """Pinocchio's three reference frames, by its names.
+    """The three reference frames, with Pinocchio's names.
 
     * `LOCAL`: the frame's own origin, in the frame's axes.
-    * `WORLD`: the point of the moving body that is at the world's origin now, in the world's axes.
-    * `LOCAL_WORLD_ALIGNED`: the frame's own origin, in the world's axes: the text's choice (7.85).
+    * `WORLD`: the point of the moving body that is now at the world's origin, in the world's axes.
+    * `LOCAL_WORLD_ALIGNED`: the frame's own origin, in the world's axes. The textbook uses this one (7.85).
 
-    Wherever a reference is taken, a member or its name in either case will do:
+    Every `reference` argument accepts a member or its name, in upper or lower case:
 
     >>> Reference.of("local_world_aligned") is Reference.LOCAL_WORLD_ALIGNED
     True
@@ -27,7 +27,7 @@ class Reference(IntEnum):
 
     @classmethod
     def of(cls, value: Reference | str) -> Reference:
-        """The member that a user means; raises UnknownNameError for another name."""
+        """Return the member for a member or a name; raises UnknownNameError for an unknown name."""
         if isinstance(value, Reference):
             return value
         name = value if isinstance(value, str) else safe_repr(value)

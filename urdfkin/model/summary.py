@@ -1,4 +1,4 @@
-"""A robot in words: its joints with their axes, places and limits, in the order of its coordinates."""
+"""The summary of a robot: a table of its joints with axes, indices and limits, printed as a tree."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from urdfkin.errors.display import Table, TextDocument
 from urdfkin.model.ranges import narrowed_ranges
 from urdfkin.model.tree import KinematicTree
 
-#: What is said of a joint, in rad and rad/s, of prismatic joints in m and m/s.
+#: Columns of a joint: limits in rad and rad/s, for prismatic joints in m and m/s.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "follows")
-#: Those that hold words, behind the link and the joint.
+#: Indices of the text columns; link and joint are columns 0 and 1.
 WORDS = (0, 1, 2, 3, 4, 5, 9)
 
 
 def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
-    """What there is to say of a robot, in a terminal or a notebook's cell: one table that is also its tree.
+    """Return the summary of a robot for a terminal or a notebook: one table that also shows the tree.
 
     Args:
         tree: The robot.
-        base: Where chains begin unless told.
-        tip: Where they end.
-        order: What there is to say of the order of its joints.
+        base: Default base of a chain.
+        tip: Default tip of a chain.
+        order: Text about the order of the joints.
     """
     columns = COLUMNS if any(joint.mimic for joint in tree.joints) else COLUMNS[:-1]
     names = ["", *(joint.name for joint in tree.joints)]
@@ -45,7 +45,7 @@ def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocum
 
 
 def guides(tree: KinematicTree) -> Iterator[str]:
-    """What stands before each link, root first, so that the list is a tree: nothing before an only child."""
+    """Yield the tree lines before each link name, root first; empty before an only child."""
     children = [0] * len(tree.links)
     for joint in tree.joints:
         children[joint.parent] += 1
@@ -61,7 +61,7 @@ def guides(tree: KinematicTree) -> Iterator[str]:
 
 
 def cells_of(tree: KinematicTree, i: int) -> tuple[str, ...]:
-    """The cells of `COLUMNS` for joint `i`; of a fixed joint its kind alone."""
+    """Return the cells of `COLUMNS` for joint `i`; for a fixed joint only its kind."""
     joint = tree.joints[i]
     if not joint.kind.nv:
         return (joint.kind.value, *[""] * (len(COLUMNS) - 1))
@@ -79,7 +79,7 @@ def _place(letter: str, at: int, count: int) -> str:
 
 
 def axis_words(axis: Sequence[float]) -> str:
-    """A joint's axis: `z`, `-x`, or the three numbers where it is none of the frame's own.
+    """Return a joint's axis as text: `z`, `-x`, or three numbers if it is not an axis of the frame.
 
     >>> axis_words((0.0, -1.0, 0.0)), axis_words((0.0, 0.6, 0.8))
     ('-y', '0 0.6 0.8')
@@ -91,7 +91,7 @@ def axis_words(axis: Sequence[float]) -> str:
 
 
 def rule_words(leader: str, factor: float, offset: float) -> str:
-    """What a follower's value is.
+    """Return the mimic rule of a joint as text.
 
     >>> rule_words("thumb", 2.0, -0.1), rule_words("thumb", 1.0, 0.0)
     ('2 * thumb -0.1', 'thumb')

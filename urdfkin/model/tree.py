@@ -1,7 +1,7 @@
-"""A robot as a tree of links and joints: what a URDF says about motion, and nothing else.
+"""The robot model: a tree of links and joints, with the joint limits and mimic rules of the URDF.
 
-`KinematicTree` knows neither XML nor Pinocchio. Links and joints stand in Pinocchio's order (depth first,
-sibling joints by name), so that coordinates and rates can be exchanged with it without a permutation.
+`KinematicTree` depends neither on XML nor on Pinocchio. Its links and joints are in Pinocchio's order (depth
+first, sibling joints by name), so `q` and `v` have the same order in both.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ __all__ = [
 
 
 def frozen(array: ArrayLike) -> FloatArray:
-    """A read-only, C-contiguous float64 copy of `array`; raises InputError where it is no numbers."""
+    """Return a read-only, C-contiguous float64 copy of `array`; raises InputError if it is not numeric."""
     copy = np.array(floats(array, "an array"), dtype=np.float64, order="C")
     copy.setflags(write=False)
     return copy
 
 
 class JointKind(Enum):
-    """The joint types of the URDF specification; the value is the word the file uses."""
+    """The joint types of the URDF specification; each value is the word used in the file."""
 
     REVOLUTE = "revolute"
     CONTINUOUS = "continuous"
@@ -54,22 +54,22 @@ class JointKind(Enum):
 
     @property
     def nq(self) -> int:
-        """How many coordinates a joint of this kind takes in `q`."""
+        """Number of coordinates of such a joint in `q`."""
         return _SIZES[self][0]
 
     @property
     def nv(self) -> int:
-        """How many rates it takes in `v` and `a`."""
+        """Number of entries of such a joint in `v` and `a`."""
         return _SIZES[self][1]
 
     @property
     def has_axis(self) -> bool:
-        """Whether the axis of the joint means anything to its motion."""
+        """Whether the joint moves about or along its axis."""
         return self in (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
 
     @property
     def turns(self) -> bool:
-        """Whether the joint is a rotation about its axis."""
+        """Whether the joint rotates about its axis."""
         return self in (JointKind.REVOLUTE, JointKind.CONTINUOUS)
 
 
@@ -85,7 +85,7 @@ _SIZES = {
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """Bounds of a joint: `lower`, `upper` in rad or m, `velocity` in rad/s or m/s, `effort` in N m or N."""
+    """Limits of a joint: `lower`, `upper` in rad or m, `velocity` in rad/s or m/s, `effort` in N m or N."""
 
     lower: float
     upper: float
@@ -94,15 +94,16 @@ class Limit:
 
 
 def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
-    """Whether there are bounds, both finite."""
+    """Return whether there is a limit with finite `lower` and `upper`."""
     return limit is not None and math.isfinite(limit.lower) and math.isfinite(limit.upper)
 
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """A joint that follows another: its coordinate is `multiplier * q_leader + offset`.
+    """The rule of a mimic joint: its value is `multiplier * q_leader + offset`.
 
-    `leader` is the name of a joint that follows nobody: chains are resolved before a tree is built.
+    `leader` is the name of the mimicked joint. It is not a mimic joint itself: chains of mimic joints are
+    resolved before a tree is built.
     """
 
     leader: str
@@ -116,19 +117,19 @@ class Mimic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
-    """One joint and the place where it sits.
+    """One joint and its pose in the parent link.
 
     Attributes:
-        name: As in the URDF.
-        kind: How it moves.
+        name: Name in the URDF.
+        kind: Kind of the joint.
         parent: Index of the parent link in `KinematicTree.links`.
         T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, in metres. The
             child link's frame is the joint frame after the motion.
-        axis: (3,) unit axis in the joint frame; (1, 0, 0) where the kind has none.
-        limit: Its bounds, None where there are none.
-        mimic: Whom it follows, None if it has a coordinate of its own.
-        tilt: By how much (rad) the axis that Pinocchio turns about is off this one (URDF514); mostly 0.
-            Nothing is computed from it: results may differ from Pinocchio's by so much more.
+        axis: (3,) unit axis in the joint frame; (1, 0, 0) if the kind has no axis.
+        limit: Its limits; None without limits.
+        mimic: Its mimic rule; None if it has its own coordinate.
+        tilt: Angle (rad) between Pinocchio's axis and this one (URDF514), usually 0. No result uses it;
+            differences from Pinocchio may be larger by this amount.
     """
 
     name: str
@@ -156,12 +157,12 @@ class Joint:
 
     @property
     def nq(self) -> int:
-        """Coordinates of its own: none for a fixed joint or a follower."""
+        """Number of its own coordinates; 0 for a fixed joint or a mimic joint."""
         return 0 if self.mimic else self.kind.nq
 
     @property
     def nv(self) -> int:
-        """Rates of its own: none for a fixed joint or a follower."""
+        """Number of its own joint velocities; 0 for a fixed joint or a mimic joint."""
         return 0 if self.mimic else self.kind.nv
 
 
@@ -172,11 +173,11 @@ class KinematicTree:
     Attributes:
         name: The robot's name.
         links: Link names; `links[0]` is the root and `links[i + 1]` the child of `joints[i]`.
-        joints: Every joint, fixed ones too; a joint's parent link always stands before its child link.
-        poses: Named poses: a value for each of some joints. Nothing of the motion.
+        joints: Every joint, fixed ones too; the parent link of a joint always comes before its child link.
+        poses: Named poses: a value for some of the joints. They do not affect the motion.
 
     Raises:
-        InputError: when the order, a name or a mimic leader breaks these rules.
+        InputError: the order, a name or a mimic rule breaks these rules.
     """
 
     name: str
@@ -196,7 +197,7 @@ class KinematicTree:
         for i, joint in enumerate(self.joints):
             if not 0 <= joint.parent <= i:
                 raise InputError(
-                    "a joint's parent link must stand before it",
+                    "a joint's parent link must come before it",
                     where=f"joint {joint.name}",
                     found=str(joint.parent),
                 )
@@ -207,16 +208,16 @@ class KinematicTree:
         leader = self.joints[self.joint_index(mimic.leader)]
         if leader.mimic is not None or leader.kind.nq != 1 or joint.kind.nq != 1:
             raise InputError(
-                "mimic needs a follower and a leader of one coordinate each, and the leader must not follow",
+                "a joint with one coordinate can mimic only an independent joint with one coordinate",
                 where=f"joint {joint.name}",
-                found=f"{joint.kind.value} following {leader.kind.value} {leader.name}",
+                found=f"{joint.kind.value} mimicking {leader.kind.value} {leader.name}",
             )
 
     # -- coordinates ---------------------------------------------------------------------------------
 
     @cached_property
     def floating_joints(self) -> tuple[int, ...]:
-        """Indices of the joints whose coordinates hold a quaternion."""
+        """Indices of the joints that have a quaternion in `q`."""
         return tuple(i for i, joint in enumerate(self.joints) if joint.kind is JointKind.FLOATING)
 
     @cached_property
@@ -226,17 +227,17 @@ class KinematicTree:
 
     @cached_property
     def nv(self) -> int:
-        """Length of the rates `v` and of their rates `a`."""
+        """Length of the joint velocities `v` and of the joint accelerations `a`."""
         return sum(joint.nv for joint in self.joints)
 
     @cached_property
     def q_index(self) -> tuple[int, ...]:
-        """Where each joint's coordinates begin in `q`; a follower has its leader's."""
+        """Index of each joint's first coordinate in `q`; for a mimic joint, that of its mimicked joint."""
         return self._offsets([joint.nq for joint in self.joints])
 
     @cached_property
     def v_index(self) -> tuple[int, ...]:
-        """Where each joint's rates begin in `v`; a follower has its leader's."""
+        """Index of each joint's first velocity in `v`; for a mimic joint, that of its mimicked joint."""
         return self._offsets([joint.nv for joint in self.joints])
 
     def _offsets(self, sizes: Sequence[int]) -> tuple[int, ...]:
@@ -257,20 +258,20 @@ class KinematicTree:
         return {name: i for i, name in enumerate(self.links)}
 
     def joint_index(self, name: str) -> int:
-        """Index of a joint by name; raises UnknownNameError with the nearest names."""
+        """Return the index of a joint by name; raises UnknownNameError with the nearest names."""
         if (index := self._joint_index.get(name)) is None:
             raise UnknownNameError("joint", name, self._joint_index, where=self.name)
         return index
 
     def link_index(self, name: str) -> int:
-        """Index of a link by name; raises UnknownNameError with the nearest names."""
+        """Return the index of a link by name; raises UnknownNameError with the nearest names."""
         if (index := self._link_index.get(name)) is None:
             raise UnknownNameError("link", name, self._link_index, where=self.name)
         return index
 
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
-        """Every link and every joint, root first, each once, as Pinocchio names its frames.
+        """Names of all links and joints, root first, without duplicates, as Pinocchio names its frames.
 
         A joint's frame is its child link's frame: in a URDF the two are the same by definition.
         """
@@ -281,28 +282,28 @@ class KinematicTree:
 
     @cached_property
     def link_frames(self) -> tuple[LinkFrame, ...]:
-        """Every link, root first, under a name that stands for nothing else."""
+        """Unambiguous names (`link:NAME`) of all links, root first."""
         return tuple(LinkFrame.of(name) for name in self.links)
 
     @cached_property
     def joint_frames(self) -> tuple[JointFrame, ...]:
-        """Every joint, likewise."""
+        """Unambiguous names (`joint:NAME`) of all joints, in order."""
         return tuple(JointFrame.of(joint.name) for joint in self.joints)
 
     def frame_link(self, name: str) -> int:
-        """Index of the link that carries the frame called `name`.
+        """Return the index of the link that carries the frame `name`.
 
-        A link or joint that is called exactly so comes first; else `link:NAME` and `joint:NAME` say which of
-        the two is meant.
+        A link or joint with exactly this name is found first. Otherwise `link:NAME` and `joint:NAME` select
+        one of the two.
 
         Raises:
-            UnknownNameError: nothing is called so; the nearest names are offered.
-            InputError: a link and a joint elsewhere share the name.
+            UnknownNameError: nothing has this name; the message lists the nearest names.
+            InputError: a link and a joint at different places share the name.
         """
         if not isinstance(name, str):
             raise InputError("a frame is the name of a link or joint", where=self.name, found=safe_repr(name))
         if isinstance(name, FrameName):
-            return self._meant(name)
+            return self._frame_index(name)
         link, joint = self._link_index.get(name), self._joint_index.get(name)
         if link is None and joint is None:
             meant = self._with_prefix(name)
@@ -310,25 +311,25 @@ class KinematicTree:
                 raise UnknownNameError(
                     "frame", name, self.frame_names, where=self.name, question=Question.UNKNOWN_FRAMES
                 )
-            return self._meant(meant)
+            return self._frame_index(meant)
         if link is not None and joint is not None and link != joint + 1:
             frames = self.link_frames, self.joint_frames
             ways = [
-                *self._spelled(frames[0][link], *frames[1][link - 1 : link]),
-                *self._spelled(frames[1][joint], frames[0][joint + 1]),
+                *self._unambiguous(frames[0][link], *frames[1][link - 1 : link]),
+                *self._unambiguous(frames[1][joint], frames[0][joint + 1]),
             ]
             raise InputError(
-                f"frame {name!r} is the name of a link and of a joint in another place",
+                f"frame {name!r} is the name of a link and of a joint at different places",
                 where=self.name,
-                remedy=f"say {' or '.join(map(repr, ways))}" if ways else "rename one of the two",
+                remedy=f"write {' or '.join(map(repr, ways))}" if ways else "rename one of the two",
             )
         return link if link is not None else self._joint_index[name] + 1
 
-    def _meant(self, frame: FrameName) -> int:
+    def _frame_index(self, frame: FrameName) -> int:
         return self.link_index(frame.own) if isinstance(frame, LinkFrame) else self.joint_index(frame.own) + 1
 
     def _with_prefix(self, name: str) -> FrameName | None:
-        """`link:NAME` or `joint:NAME` as it is meant, if there is such a link or joint."""
+        """Return the frame name for `link:NAME` or `joint:NAME` if such a link or joint exists, else None."""
         kinds: tuple[tuple[type[FrameName], dict[str, int]], ...] = (
             (LinkFrame, self._link_index),
             (JointFrame, self._joint_index),
@@ -338,21 +339,21 @@ class KinematicTree:
                 return kind(name)
         return None
 
-    def _spelled(self, *names: FrameName) -> list[str]:
-        """The first of the names of a frame that, written out, is no other's own name."""
+    def _unambiguous(self, *names: FrameName) -> list[str]:
+        """Return, in a list, the first of some frame names that is not the own name of a link or joint."""
         known = self._link_index.keys() | self._joint_index.keys()
         return [str(name) for name in names if name not in known][:1]
 
     def frame_name(self, link: int) -> str:
-        """A name by which `frame_link` finds a link: its own, or a `LinkFrame` where a joint has it too."""
+        """Return a name that `frame_link` resolves to this link: its own, or a `LinkFrame` if ambiguous."""
         name = self.links[link]
         joint = self._joint_index.get(name)
         return name if joint is None or joint + 1 == link else self.link_frames[link]
 
-    # -- walks ---------------------------------------------------------------------------------------
+    # -- paths ---------------------------------------------------------------------------------------
 
     def path(self, link: int) -> tuple[int, ...]:
-        """Joints between the root and a link, from the root outwards."""
+        """Return the indices of the joints between the root and a link, root first."""
         joints = []
         while link > 0:
             joints.append(link - 1)
@@ -360,13 +361,15 @@ class KinematicTree:
         return tuple(reversed(joints))
 
     def leaves(self) -> Iterator[int]:
-        """Links without children."""
+        """Return the indices of the links without children."""
         parents = {joint.parent for joint in self.joints}
         return (link for link in range(len(self.links)) if link not in parents)
 
 
 def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
-    """The tree hung from a link `universe` by a joint `root_joint`, as Pinocchio names the two.
+    """Return the tree with a root joint: a new link `universe` carries it by a joint `root_joint`.
+
+    Both names are Pinocchio's.
 
     Args:
         tree: The robot.
@@ -385,25 +388,25 @@ def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
 
 
 def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree:
-    """The tree with the tilts of some joints, by name: see `Joint.tilt`."""
+    """Return the tree with given tilts of some joints, by name (`Joint.tilt`)."""
     joints = (replace(joint, tilt=tilts.get(joint.name, 0.0)) for joint in tree.joints)
     return KinematicTree(tree.name, tree.links, tuple(joints))
 
 
 def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
-    """The tree with named poses; what they say of joints that have no single coordinate in it is left out."""
+    """Return the tree with named poses, without the values for joints that do not have one coordinate."""
     own = {joint.name for joint in tree.joints if joint.nq == 1}
     kept = {pose: {name: x for name, x in of.items() if name in own} for pose, of in poses.items()}
     return replace(tree, poses=kept)
 
 
 def freed(tree: KinematicTree) -> KinematicTree:
-    """The tree with every mimic joint free to move on its own."""
+    """Return the tree without mimic rules: every mimic joint gets its own coordinate."""
     return KinematicTree(tree.name, tree.links, tuple(replace(joint, mimic=None) for joint in tree.joints))
 
 
 def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -> KinematicTree:
-    """Order joints as Pinocchio does (depth first, siblings by name) and make the tree.
+    """Return the tree of some joints, ordered as in Pinocchio (depth first, siblings by name).
 
     Args:
         name: The robot's name.
@@ -411,13 +414,13 @@ def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -
         joints: (joint, parent link, child link) in any order; the `parent` index inside is ignored.
 
     Raises:
-        InputError: when a joint cannot be reached from the root.
+        InputError: a joint cannot be reached from the root.
     """
     below: dict[str, list[tuple[Joint, str]]] = {}
     for joint, parent, child in joints:
         below.setdefault(parent, []).append((joint, child))
     links, ordered = [root], list[Joint]()
-    # An explicit stack: a chain of 50,000 links must not meet the interpreter's recursion limit.
+    # An explicit stack: a chain of 50,000 links would exceed the interpreter's recursion limit.
     stack = [(0, joint, child) for joint, child in _last_name_first(below.get(root, []))]
     while stack:
         parent_index, joint, child = stack.pop()
@@ -425,7 +428,7 @@ def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -
         links.append(child)
         stack += [(len(links) - 1, *pair) for pair in _last_name_first(below.get(child, []))]
         if len(ordered) > len(joints):
-            raise InputError("the joints close a loop", where=name, found=f"joint {joint.name} met again")
+            raise InputError("the joints close a loop", where=name, found=f"joint {joint.name} reached twice")
     if len(ordered) != len(joints):
         missing = sorted({joint.name for joint, _, _ in joints} - {joint.name for joint in ordered})
         raise InputError(f"joints cannot be reached from {root!r}", where=name, found=", ".join(missing))

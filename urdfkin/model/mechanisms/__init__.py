@@ -1,1 +1,1 @@
-"""Two mechanisms laid on each other, and how far they can be apart: what `same` and `dh --compare` share."""
+"""The alignment of two mechanisms, and bounds on their difference, for `same` and `dh --compare`."""

@@ -1,14 +1,14 @@
-"""Two mechanisms laid on each other: what is free is used up, what is left is a difference, joint by joint.
+"""The alignment of two mechanisms: base, senses and zeros are matched, and differences are kept by joint.
 
-One walk from a body that both have. With G what moves A's home to where B's lies, a joint of A leads to
-exp(S t), the joint of B to exp(S' t'); B's coordinate may count the other way and from another zero (t' and
-its screw are then written in A's), and G changes where B's axis, or what hangs on it, lies elsewhere. So B
-becomes A with a rigid motion L put in before some joints, and some axes exchanged:
+The matcher starts from a common body. Let G be the motion from A's zero configuration to B's. A joint of A
+moves by exp(S t), the joint of B by exp(S' t'). B's coordinate may have the opposite sense and another zero;
+t' and its screw are written in A's. G changes where B's axis, or the body behind it, is elsewhere. So B is A
+with a rigid motion L inserted before some joints, and some axes replaced:
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H,
 
-with all S'_i = S_i, t'_i = t_i and L_i = 1 where nothing differs. Two models move alike if and only if
-nothing does, but for turns that screws on one line share.
+with S'_i = S_i, t'_i = t_i and L_i = 1 where nothing differs. Two models move alike if and only if nothing
+differs, except for rotations that screws on one line share.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ IDENTITY.setflags(write=False)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """A joint of both models on the way from the base.
+    """A joint pair on the path from the base.
 
     Attributes:
         a: Joint of A (index in its tree).
-        b: Joint of B.
-        kind: "turns", "prismatic", "planar", "floating".
-        previous: The step before it, -1 for none.
-        sense: +1 or -1, and
-        offset: rad or m: B's value is sense * A's + offset.
-        before: (4, 4) L, put in before the joint, at A's home.
-        axis: A's screw at home, pointing away from the base.
-        other: B's, likewise; `axis` itself where they agree.
-        tilt: Radians by which B's axis is tilted, or a planar joint's normal.
-        shift: Metres by which it is off, or, of a planar or floating joint, its frame.
-        conversion: B's coordinates of a planar or floating joint; None where they are A's.
-        unlike: "a" or "b" where the joint is fixed in that model and moves in the other, "kind" where it
-            moves in another way; else "".
+        b: Joint of B (index in its tree).
+        kind: "turns" (revolute), "prismatic", "planar", "floating".
+        previous: Index of the step before it, -1 for none.
+        sense: +1 or -1; see `offset`.
+        offset: B's value is sense * A's value + offset, rad or m.
+        before: (4, 4) L, inserted before the joint, in A's zero configuration.
+        axis: A's screw in the zero configuration, directed away from the base.
+        other: B's screw, likewise; `axis` itself if they agree.
+        tilt: Angle (rad) between the axes, or between the normals of planar joints.
+        shift: Distance (m) between the axes; for a planar or floating joint, between the frames.
+        conversion: From A's coordinates of a planar or floating joint to B's; None if they are equal.
+        unlike: "a" or "b" if the joint is fixed in that model and moves in the other, "kind" if the kinds of
+            motion differ; else "".
     """
 
     a: int
@@ -63,7 +63,7 @@ class Step:
 
     @property
     def differs(self) -> bool:
-        """Whether its axis does."""
+        """Whether the axes differ."""
         return self.tilt > 0.0 or self.shift > 0.0
 
 
@@ -72,14 +72,14 @@ class FramePair:
     """A link of both models.
 
     Attributes:
-        a: Link of A.
-        b: Link of B.
-        previous: The step that carries it, -1 for none.
-        home: (4, 4) A's at home.
-        end: (4, 4) L, put in behind the last joint, at A's home.
-        tilt: Radians by which B's is turned on its body.
-        shift: Metres by which it is moved on it.
-        tool: (4, 4) B's in A's frame, where it is taken for another tool on the same body.
+        a: Link of A (index in its tree).
+        b: Link of B (index in its tree).
+        previous: Index of the step that carries it, -1 for none.
+        home: (4, 4) pose of A's link in the zero configuration.
+        end: (4, 4) L, inserted behind the last joint, in A's zero configuration.
+        tilt: Angle (rad) between the two on their body.
+        shift: Distance (m) between the two on their body.
+        tool: (4, 4) pose of B's link in A's, if it counts as a different tool on the same body.
     """
 
     a: int
@@ -92,31 +92,31 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def put_right(self) -> FramePair:
-        """The same, B's frame seen as another tool."""
+        """Return the same pair, with B's frame as a different tool."""
         tool = inverse(self.home) @ self.end @ self.home
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
     @property
     def differs(self) -> bool:
-        """Whether it lies elsewhere on its body."""
+        """Whether the link is elsewhere on its body."""
         return self.tilt > 0.0 or self.shift > 0.0
 
 
 @dataclass(slots=True)
 class Alignment:
-    """What laying them on each other found.
+    """The result of aligning two mechanisms.
 
     Attributes:
         a: One mechanism.
-        b: The other.
-        base: Links that the walk began at, of A and of B.
-        X: (4, 4) what brings B's root to where it must stand in A's.
-        steps: Joints, each behind the one before it.
-        frames: Links that both have.
+        b: The other mechanism.
+        base: Links of A and of B at which the matcher began.
+        X: (4, 4) pose of B's root in A's root frame.
+        steps: The joint pairs; each comes after the pair before it on its path.
+        frames: The links of both.
         only_a: Joints that only A has (indices).
-        only_b: Likewise.
-        matched: How many places agree.
-        worst: Metres: the largest disagreement, an angle counted with the robot's size.
+        only_b: Joints that only B has (indices).
+        matched: Number of joints and links that agree.
+        worst: The largest disagreement (m); angles are multiplied by the robot's size.
     """
 
     a: Mechanism
@@ -138,21 +138,21 @@ class Alignment:
 
     @property
     def differing(self) -> int:
-        """How many joints and links differ."""
+        """Number of joints and links that differ."""
         return sum(step.differs or bool(step.unlike) for step in self.steps) + sum(
             frame.differs for frame in self.frames
         )
 
     @property
     def size(self) -> float:
-        """Metres: what angles are counted with."""
+        """Length (m) that converts angles to distances."""
         return size_of(self.a, self.b)
 
     @property
     def inner_off(self) -> tuple[float, float]:
-        """Metres: the least and the largest that two axes are off, or two links that are no tools.
+        """Smallest and largest disagreement (m) of axes, and of links that carry joints.
 
-        Of those that are off; 0 where none is.
+        Only actual disagreements count; both are 0 if there is none.
         """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         links = [one for one in self.frames if one.a in carry[0] or one.b in carry[1]]
@@ -162,13 +162,13 @@ class Alignment:
 
     @property
     def names(self) -> dict[str, str]:
-        """Joints of A and what they are in B."""
+        """Joints of A and their names in B."""
         joints = self.a.tree.joints, self.b.tree.joints
         return {joints[0][step.a].name: joints[1][step.b].name for step in self.steps}
 
     @property
     def gauge(self) -> Gauge:
-        """What was free, as it was found; the order of joints is that of `b` already."""
+        """The free choices as the alignment found them; the joint order is already that of `b`."""
         joints = self.a.tree.joints
         return Gauge(
             (self.a.tree.links[self.base[0]], self.b.tree.links[self.base[1]]),
@@ -178,28 +178,28 @@ class Alignment:
         )
 
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Two joints of A on one body, with B's, that lead to what differs and whose names say nothing."""
-        told = {joint.name for joint in self.b.tree.joints} | set(given)
+        """Yield two joint pairs of one body that lead to a difference and are not paired by name."""
+        known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
         ends += [frame.previous for frame in self.frames if frame.differs]
         lead = sorted({i for end in ends for i in self.indices(end)})
-        some = [self.steps[i] for i in lead if self.a.tree.joints[self.steps[i].a].name not in told]
+        some = [self.steps[i] for i in lead if self.a.tree.joints[self.steps[i].a].name not in known_names]
         for k, one in enumerate(some):
             for other in some[k + 1 :]:
                 if other.previous == one.previous and other.kind == one.kind:
                     yield frozenset(((one.a, one.b), (other.a, other.b)))
 
     def frames_of(self, pairs: Sequence[tuple[int, int]]) -> list[FramePair]:
-        """Links (of A, of B) on bodies that are laid on each other, as frames."""
+        """Return links (of A, of B) on aligned bodies as frame pairs."""
         on = {(self.a.body_of[frame.a], self.b.body_of[frame.b]): frame for frame in self.frames}
         rounding = tolerance_of(self.a, self.b)
         found = []
         for a, b in pairs:
             if (known := on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # What moves B's home to where it lies on A's body, from any two links there.
-            laid = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
-            home, at = self.a.homes[a], laid @ self.b.homes[b]
+            # The motion from B's zero configuration to A's body, from any two links on it.
+            T_a_b = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
+            home, at = self.a.homes[a], T_a_b @ self.b.homes[b]
             tilt, shift = apart(home, at)
             if rounding.holds(tilt, shift):
                 found.append(FramePair(a, b, known.previous, home, IDENTITY, 0.0, 0.0))
@@ -209,7 +209,7 @@ class Alignment:
         return found
 
     def indices(self, previous: int) -> list[int]:
-        """The steps from the base to one of them, itself too."""
+        """Return the indices of the steps from the base to one of them, including it."""
         found = []
         while previous >= 0:
             found.append(previous)
@@ -217,7 +217,7 @@ class Alignment:
         return found[::-1]
 
     def path(self, previous: int) -> list[Step]:
-        """The same as steps."""
+        """Return the steps from the base to one of them, including it."""
         return [self.steps[i] for i in self.indices(previous)]
 
     @property
@@ -228,14 +228,14 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gauge:
-    """What is free, taken as given: where B's root stands, each joint's sense and zero.
+    """Prescribed free choices: the pose of B's root, and each joint's sense and zero.
 
     Attributes:
-        base: Links of A and of B on the bodies where the walk begins; None: by names.
-        X: (4, 4) B's root in A's.
-        zeros: Of joints of A that are not (1, 0.0).
-        conversions: Of planar and floating joints of A that count otherwise in B.
-        orders: Joints of B that are taken in another order, run by run.
+        base: Links of A and of B on the bodies at which the matcher begins; None: by names.
+        X: (4, 4) pose of B's root in A's root frame.
+        zeros: Sense and offset of joints of A, if not (1, 0.0).
+        conversions: Of planar and floating joints of A with other coordinates in B.
+        orders: Joints of B in another order, one for each reordered run.
     """
 
     base: tuple[str, str] | None = None
@@ -245,5 +245,5 @@ class Gauge:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: B as it is written: root on root, each coordinate the same number.
+#: No free choice: equal roots, and equal coordinates.
 AS_WRITTEN = Gauge()

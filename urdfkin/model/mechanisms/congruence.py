@@ -1,9 +1,9 @@
-"""An exact match of two subtrees: every axis of one lies on an axis of the other, whatever their zeros are.
+"""Exact matching of two subtrees: every axis of one coincides with an axis of the other, for some zeros.
 
-The axes on one body are fixed to each other. A joint leaves free only a rotation about its axis, or a
-displacement along it. So whether all that a joint moves matches depends on the two joints and on the senses
-and places of their axes, not on the angle: each such case is computed once. The search visits a pair of
-joints a few times, however long the chains are and however many joints have two possible zeros.
+The axes on one body are fixed relative to each other. A joint leaves free only a rotation about its axis, or
+a translation along it. So whether the subtrees behind two joints match depends on the joints and on the
+directions and positions of their axes, not on the angle; each case is computed once. The search visits each
+pair of joints a few times, even for long chains and for many joints with two possible zeros.
 """
 
 from __future__ import annotations
@@ -13,32 +13,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urdfkin.model.mechanisms.joint_matching import Came, Pair, Pairing, family
+from urdfkin.model.mechanisms.joint_matching import Pair, Pairing, Via, family
 from urdfkin.model.mechanisms.mechanism import Edge, Mechanism, Tolerance, apart
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 
-#: Poses of B's body behind two joints, given the bodies behind them, the joints and B's pose before them.
+#: Poses of B's body behind two joints, from the bodies behind them, the joints, and B's pose before them.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
-#: A deeper tree is matched joint by joint, without this search, which recurses.
+#: Largest depth of a tree for this recursive search; deeper trees are matched joint by joint.
 DEEPEST = 200
-#: So many ways to assign the joints of two bodies are tried.
+#: Largest number of attempts to assign the joints of two bodies.
 MOST_ASSIGNMENTS = 5000
 
 IDENTITY = np.eye(4)
 
-#: Coordinates of A, each with B's that belongs to it, and by how much faster B's moves (the sign: sense).
+#: A's coordinates, each with B's coordinate and the ratio of their velocities (its sign is the sense).
 Rates = Mapping[str, tuple[str, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Match:
-    """What matches behind some joints.
+    """The match of the subtrees behind two joints.
 
     Attributes:
-        X: (4, 4) the pose of B's body behind the joint.
-        rates: How coordinates belong together there.
+        X: (4, 4) pose of B's body behind the joint.
+        rates: Corresponding coordinates in these subtrees.
     """
 
     X: FloatArray
@@ -49,11 +49,11 @@ class Congruence:
     """Exact matches of the subtrees of two mechanisms.
 
     Args:
-        a: One.
-        b: The other.
-        pairing: Joints and links that names pair.
-        tolerance: Within which axes agree.
-        poses: Candidates for the pose of B's body behind a joint.
+        a: One mechanism.
+        b: The other mechanism.
+        pairing: Joints and links paired by name.
+        tolerance: Tolerance for axes.
+        poses: Returns candidate poses of B's body behind a joint.
     """
 
     def __init__(
@@ -65,40 +65,40 @@ class Congruence:
         self._rules = True
 
     def ignore_rules(self) -> None:
-        """Match axes alone from now on, whatever mimic rules say: these differ."""
+        """Match axes only, from now on; the mimic rules differ."""
         self._rules = False
         self._known.clear()
 
-    def at(self, bodies: tuple[int, int], came: Came, X: FloatArray) -> Sequence[Pair] | None:
-        """The pairs of joints at two bodies if all that they carry matches, else None.
+    def at(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
+        """Return the joint pairs of two bodies if their subtrees match exactly, else None.
 
         Args:
             bodies: Of A and of B.
-            came: The joints by which they were reached.
-            X: (4, 4) what moves B's body from its own home to where it stands at A's.
+            via: The joints by which they were reached.
+            X: (4, 4) motion of B's body from its zero configuration to its pose at A's.
         """
-        found = None if self._off else self._at(bodies, came, X)
+        found = None if self._off else self._at(bodies, via, X)
         return None if found is None else found[0]
 
     def behind(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """(4, 4) the pose of B's body behind two joints with which everything there matches; None: no pose.
+        """Return the pose (4, 4) of B's body behind two joints for an exact match; None if there is none.
 
         Args:
             e: Joint of A.
             f: Joint of B.
-            bodies: Those that carry them on the way.
-            X: (4, 4) the pose of B's body there, as for `at`.
+            bodies: The bodies before the joints.
+            X: (4, 4) pose of B's body before the joint, as for `at`.
         """
         found = None if self._off else self._behind(e, f, bodies, X)
         return None if found is None else found.X
 
-    def _at(self, bodies: tuple[int, int], came: Came, X: FloatArray) -> tuple[Sequence[Pair], Rates] | None:
-        if not self.pairing.same_shape(bodies, came):
+    def _at(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> tuple[Sequence[Pair], Rates] | None:
+        if not self.pairing.same_shape(bodies, via):
             return None
         for i, j in self.pairing.links(*bodies):
             if not self.tolerance.holds(*apart(self.a.homes[i], X @ self.b.homes[j])):
                 return None
-        named, left_a, left_b = self.pairing.by_names(bodies, came)
+        named, left_a, left_b = self.pairing.by_names(bodies, via)
         if len(left_a) != len(left_b) or not all(self._lie_alike(e, f, X) for e, f in named):
             return None
         candidates = [[f] for _, f in named]
@@ -118,7 +118,7 @@ class Congruence:
         tries: list[int],
         rates: Rates,
     ) -> tuple[Sequence[Pair], Rates] | None:
-        """Each joint of A with one of B of its own, such that all behind them matches; None where none is."""
+        """Assign a different joint of B to each joint of A, so that subtrees match; None if impossible."""
         if not left:
             return [], rates
         at = min(range(len(left)), key=lambda i: len(candidates[i]))
@@ -154,7 +154,7 @@ class Congruence:
         return found
 
     def _rate(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> Rates:
-        """How the coordinates of two joints belong together; nothing where there is not one of each."""
+        """Return the corresponding coordinates of two joints; empty if one of them has none."""
         joints = self.a.joint(e), self.b.joint(f)
         if not self._rules or not joints[0].kind.has_axis:
             return {}
@@ -169,7 +169,7 @@ class Congruence:
         return {x: (y, (1.0 if alike != back else -1.0) * m / n)}
 
     def _together(self, some: Rates, others: Rates) -> Rates | None:
-        """Both, or None where they say two things of one coordinate."""
+        """Return the union of two correspondences, or None if they contradict each other."""
         for x, (y, rate) in others.items():
             there = some.get(x)
             if there is None:
@@ -187,7 +187,7 @@ class Congruence:
         return self.tolerance.holds(*self.pairing.mismatch(e, f, IDENTITY, X))
 
     def _same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Whether two poses of B's body before a joint differ by what the joint itself can undo."""
+        """Return whether two poses of B's body before a joint differ by a motion that the joint can undo."""
         kind = self.a.joint(e).kind
         if kind.nq > 1:
             return family(kind) == "floating" or self.tolerance.holds(*apart(X, other))
@@ -203,7 +203,7 @@ class Congruence:
 
 
 def _distinct(poses: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """Each pose once, to the last bit; two that rounding parts are both tried."""
+    """Yield each pose once; poses are equal if all bits are equal."""
     seen = set[bytes]()
     for X in poses:
         if (key := X.tobytes()) not in seen:

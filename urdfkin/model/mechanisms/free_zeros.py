@@ -1,8 +1,8 @@
-"""Zeros of joints that no axis and no frame fixes: mimic rules do.
+"""Joint zeros that only mimic rules determine, because no axis and no link frame does.
 
-A rule v = m w + c of A and one of B, v' = m' w' + c', say the same if v' = s v + o and w' = s' w + o' make
-one of the other. Where nothing hangs on a joint's link, its o is free, and the rule gives it. A turning
-joint's o is free by full turns in any case.
+Let v = m w + c be a rule of A and v' = m' w' + c' one of B. They are equivalent if v' = s v + o and
+w' = s' w + o' turn one into the other. If nothing is attached to a joint's link, its offset o is free, and
+the rule determines it. For a revolute joint o is free by full turns in any case.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, Step
 from urdfkin.model.mechanisms.mechanism import Tolerance, between_lines
 from urdfkin.model.tree import Joint
 
-#: By so many turns the zero of a mimicked joint may be another one.
+#: Full turns by which the zero of a mimicked joint may be changed.
 TURNS = (0, 1, -1)
-#: A zero that axes fix may be off by so many times an angle's rounding: they may have a short lever.
+#: Tolerance of a zero that axes determine, in units of the angle tolerance; the axes may be close together.
 LEVER = 1e4
 
 
@@ -26,15 +26,15 @@ class _Rule:
     """A step whose joint moves with a coordinate of B: its value is m x + c in A, n y + d in B.
 
     Attributes:
-        step: Its index.
-        slope: s m, of sense * A's value in A's coordinate.
+        step: Index of the step.
+        slope: s m, the slope of sense * A's value.
         constant: s c.
         n: Multiplier of B's rule.
         d: Offset of B's rule.
-        offset: o, as it was found.
-        turns: Whether the joint turns.
-        free: Whether nothing fixes o.
-        meets: Whether a link of A and one of B stand in one place on what it carries.
+        offset: o, as the alignment found it.
+        turns: Whether the joint is revolute.
+        free: Whether no axis and no common link determines o.
+        meets: Whether links of A and of B coincide on the body behind the joint.
     """
 
     step: int
@@ -48,15 +48,15 @@ class _Rule:
     meets: bool
 
     def beta(self, turn: int) -> float:
-        """Of y = alpha x + beta, from this joint's zero moved by some turns."""
+        """Return beta of y = alpha x + beta, from this joint's zero moved by some full turns."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def wanted(self, beta: float) -> float:
-        """The offset that beta asks for."""
+        """Return the offset that corresponds to beta."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
-        """Whether the zero may be so, but for rounding."""
+        """Return whether the joint can have this offset, within rounding."""
         off = offset - self.offset
         if self.turns:
             off = math.remainder(off, 2.0 * math.pi)
@@ -64,11 +64,11 @@ class _Rule:
 
 
 def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
-    """Joints of A whose zero mimic rules set otherwise than it was found: sense and offset."""
+    """Return sense and offset of the joints of A whose zero mimic rules change."""
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(found):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # One member with another slope keeps its difference; the others are set all the same.
+        # A joint with a different slope keeps its difference; the others are set nevertheless.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )
@@ -92,7 +92,7 @@ def _near(x: float, y: float, tolerance: Tolerance) -> bool:
 
 
 def _groups(found: Alignment) -> Iterator[list[_Rule]]:
-    """Steps whose joints move with one coordinate of A and one of B."""
+    """Yield groups of steps whose joints move with one coordinate of A and one of B."""
     groups = dict[tuple[str, str], list[_Rule]]()
     for i, step in enumerate(found.steps):
         if step.unlike or step.kind not in ("turns", "prismatic"):
@@ -100,34 +100,34 @@ def _groups(found: Alignment) -> Iterator[list[_Rule]]:
         x, m, c = _as_rule(found.a.tree.joints[step.a])
         y, n, d = _as_rule(found.b.tree.joints[step.b])
         slope, constant = step.sense * m, step.sense * c
-        held, meets = _held(found, i)
-        rule = _Rule(i, slope, constant, n, d, step.offset, step.kind == "turns", not held, meets)
+        determined, meets = _is_determined(found, i)
+        rule = _Rule(i, slope, constant, n, d, step.offset, step.kind == "turns", not determined, meets)
         groups.setdefault((x, y), []).append(rule)
     yield from (rules for rules in groups.values() if len(rules) > 1)
 
 
 def _as_rule(joint: Joint) -> tuple[str, float, float]:
-    """The coordinate that a joint moves with, its multiplier and its offset."""
+    """Return the coordinate of a joint, its multiplier and its offset."""
     rule = joint.mimic
     return (joint.name, 1.0, 0.0) if rule is None else (rule.leader, rule.multiplier, rule.offset)
 
 
-def _held(found: Alignment, i: int) -> tuple[bool, bool]:
-    """Whether axes or links of one name fix a joint's zero; whether other links meet on what it carries."""
+def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
+    """Return whether axes or common links determine a joint's zero, and whether other links coincide."""
     names = set(found.a.tree.links) & set(found.b.tree.links)
     behind = {i}
     for k, step in enumerate(found.steps):
         if step.previous in behind:
-            if step.differs or step.unlike or step.conversion or not _stays(found.steps[i], step):
+            if step.differs or step.unlike or step.conversion or not _keeps_axis(found.steps[i], step):
                 return True, True
             behind.add(k)
     carried = [frame for frame in found.frames if frame.previous in behind]
-    held = any(found.a.tree.links[frame.a] in names for frame in carried)
-    return held, any(frame.tool is IDENTITY for frame in carried)
+    determined = any(found.a.tree.links[frame.a] in names for frame in carried)
+    return determined, any(frame.tool is IDENTITY for frame in carried)
 
 
-def _stays(one: Step, other: Step) -> bool:
-    """Whether a joint leaves another one's axis where it is, whatever its value."""
+def _keeps_axis(one: Step, other: Step) -> bool:
+    """Return whether the motion of one joint keeps the axis of another unchanged."""
     if "turns" not in (one.kind, other.kind):
         return other.kind == "prismatic"
     if {one.kind, other.kind} - {"turns", "prismatic"}:

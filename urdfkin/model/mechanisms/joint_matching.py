@@ -1,6 +1,7 @@
-"""Which joints of two bodies are each other's: by given and agreeing names, else by how they lie.
+"""Candidates for matching two mechanisms: pairs of joints, and poses and zeros that align their axes.
 
-Where one model may have to be set for its axes to lie on another's: guesses to be tried, not results.
+Joints of two bodies are paired by given names, then by equal names, then by geometry. The functions for poses
+and zeros yield candidates that a search tries; they are not results.
 """
 
 from __future__ import annotations
@@ -30,36 +31,36 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.tree import FloatArray, JointKind
 
 Pair = tuple[Edge, Edge]
-Came = tuple[Edge | None, Edge | None]
+Via = tuple[Edge | None, Edge | None]
 
 
 def family(kind: JointKind) -> str:
-    """What two joints must have in common to be each other's: how they move, not how far."""
+    """Return the kind of motion that two joints must share to be paired; limits do not matter."""
     return "turns" if kind.turns else kind.value
 
 
 class Pairing:
-    """The pairs of two mechanisms, body by body.
+    """The joint pairs of two mechanisms, body by body.
 
     Args:
-        a: One.
-        b: The other.
-        given: Joint names of `a` and the names that they have in `b`.
-        tolerance: Within which axes agree.
+        a: One mechanism.
+        b: The other mechanism.
+        given: Joint names of `a` and their names in `b`.
+        tolerance: Tolerance for axes.
     """
 
     def __init__(self, a: Mechanism, b: Mechanism, given: Mapping[str, str], tolerance: Tolerance) -> None:
         self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
         self._named = {name for pair in given.items() for name in pair}
         self._signatures: dict[tuple[bool, int, int], str] = {}
-        #: What names alone tell is asked again for thousands of places where a root may stand.
+        #: Pairs by name are needed again for thousands of candidate poses, so they are cached.
         self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
         self._by_names = dict[
-            tuple[tuple[int, int], Came], tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]
+            tuple[tuple[int, int], Via], tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]
         ]()
 
     def links(self, body_a: int, body_b: int) -> tuple[tuple[int, int], ...]:
-        """Links of one name on two bodies."""
+        """Return the links of equal names on two bodies."""
         if (known := self._links.get((body_a, body_b))) is None:
             there = {self.b.tree.links[link]: link for link in self.b.bodies[body_b]}
             known = self._links[body_a, body_b] = tuple(
@@ -70,22 +71,22 @@ class Pairing:
         return known
 
     def edges(
-        self, bodies: tuple[int, int], came: Came, G: FloatArray, XC: FloatArray
+        self, bodies: tuple[int, int], via: Via, G: FloatArray, XC: FloatArray
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Joints that lead on from two bodies: pairs, and what is left over of each.
+        """Return the pairs of next joints at two bodies, and the unpaired joints of A and of B.
 
         Args:
-            bodies: Of a and of b.
-            came: The joints by which they were reached.
-            G: (4, 4) what moves a's home to where b's is.
-            XC: (4, 4) what moves b's own home there.
+            bodies: Of A and of B.
+            via: The joints by which they were reached.
+            G: (4, 4) motion of A's zero configuration to B's pose.
+            XC: (4, 4) motion of B's zero configuration to that pose.
         """
-        named, left_a, left_b = self.by_names(bodies, came)
+        named, left_a, left_b = self.by_names(bodies, via)
         pairs = list(named)
         rest = sorted(
             (self._unlikeness(one, other), i, j)
-            for i, one in self._standing(self.a, bodies[0], left_a, G)
-            for j, other in self._standing(self.b, bodies[1], left_b, XC)
+            for i, one in self._geometries(self.a, bodies[0], left_a, G)
+            for j, other in self._geometries(self.b, bodies[1], left_b, XC)
             if one.kind == other.kind
         )
         taken_a, taken_b = set[int](), set[int]()
@@ -101,27 +102,27 @@ class Pairing:
         )
 
     def by_names(
-        self, bodies: tuple[int, int], came: Came
+        self, bodies: tuple[int, int], via: Via
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """What `edges` says as far as names tell: the pairs, and what is left for how joints lie."""
-        if (known := self._by_names.get((bodies, came))) is None:
-            known = self._by_names[bodies, came] = self._named_alike(bodies, came)
+        """Return the pairs by name, and the joints of A and of B that remain to be paired by geometry."""
+        if (known := self._by_names.get((bodies, via))) is None:
+            known = self._by_names[bodies, via] = self._named_alike(bodies, via)
         return known
 
-    def same_shape(self, bodies: tuple[int, int], came: Came) -> bool:
-        """Whether as many joints of the same kinds are behind two bodies, branch by branch."""
+    def same_shape(self, bodies: tuple[int, int], via: Via) -> bool:
+        """Return whether the subtrees behind two bodies have the same joint kinds, branch by branch."""
         shapes = (
             sorted(self._signature(m, body, edge) for edge in m.edges_of[body] if edge is not by)
-            for m, body, by in zip((self.a, self.b), bodies, came, strict=True)
+            for m, body, by in zip((self.a, self.b), bodies, via, strict=True)
         )
         return next(shapes) == next(shapes)
 
     def alike(self, bodies: tuple[int, int], e: Edge, f: Edge) -> bool:
-        """Whether as many joints of the same kinds hang on two joints at two bodies."""
+        """Return whether the subtrees behind two joints have the same joint kinds."""
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Whether each axis at a body of A has one of B's at it, B's home moved by X."""
+        """Return whether each axis at a body of A coincides with one of B, with B's zero moved by X."""
         at = np.eye(4)
         return all(
             any(
@@ -134,22 +135,22 @@ class Pairing:
         )
 
     def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
-        """Joints at a body of B that no given name tells about, the most like one of A first.
+        """Return the joints of B without a given name, the most similar to a joint of A first.
 
         Args:
             bodies: Of A and of B.
             e: Joint of A.
             edges: Joints of B.
-            X: (4, 4) what moves B's home to where A's is.
+            X: (4, 4) motion of B's zero configuration to A's pose.
         """
-        one = self._standing(self.a, bodies[0], [e], np.eye(4))
-        others = self._standing(self.b, bodies[1], edges, X)
+        one = self._geometries(self.a, bodies[0], [e], np.eye(4))
+        others = self._geometries(self.b, bodies[1], edges, X)
         ranked = sorted((self._unlikeness(one[0][1], other), j) for j, other in others) if one else []
         return [edges[j] for _, j in ranked]
 
-    def _named_alike(self, bodies: tuple[int, int], came: Came) -> tuple[list[Pair], list[Edge], list[Edge]]:
-        left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not came[0]]
-        left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not came[1]]
+    def _named_alike(self, bodies: tuple[int, int], via: Via) -> tuple[list[Pair], list[Edge], list[Edge]]:
+        left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not via[0]]
+        left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not via[1]]
         pairs: list[Pair] = []
         for e, f in self._by_name(bodies, list(left_a), list(left_b)):
             if e in left_a and f in left_b:
@@ -170,18 +171,18 @@ class Pairing:
                 if links & {self.b.tree.links[k] for k in self.b.bodies[f.beyond(bodies[1])]}:
                     yield e, f
 
-    def _standing(
+    def _geometries(
         self, mechanism: Mechanism, body: int, edges: Sequence[Edge], T: FloatArray
-    ) -> list[tuple[int, _Standing]]:
-        """The joints that no given name tells about, moved by T."""
+    ) -> list[tuple[int, _JointGeometry]]:
+        """Return the joints without a given name, with their index, moved by T."""
         return [
-            (i, _Standing.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
+            (i, _JointGeometry.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
             for i, edge in enumerate(edges)
             if mechanism.joint(edge).name not in self._named
         ]
 
-    def _unlikeness(self, one: _Standing, other: _Standing) -> tuple[bool, float, float]:
-        """Of shape, then of axes, then, where axes lie on one line, of where they point and stand on it."""
+    def _unlikeness(self, one: _JointGeometry, other: _JointGeometry) -> tuple[bool, float, float]:
+        """Return a sort key: different shape, then distance of axes, then direction and origin."""
         angle, way = one.mismatch(other)
         off = 0.0 if self._tolerance.holds(angle, way) else angle * max(self.a.size, LEAST_SIZE) + way
         place = math.dist(one.place, other.place)
@@ -189,7 +190,7 @@ class Pairing:
         return one.shape != other.shape, off, place + self.a.size * points_back
 
     def _signature(self, mechanism: Mechanism, body: int, edge: Edge) -> str:
-        """What hangs on a joint, joints' kinds alone."""
+        """Return the joint kinds of the subtree behind a joint, as text."""
         key = mechanism is self.a, body, edge.joint
         if (known := self._signatures.get(key)) is None:
             beyond = edge.beyond(body)
@@ -203,18 +204,18 @@ class Pairing:
         return known
 
     def mismatch(self, e: Edge, f: Edge, G: FloatArray, XC: FloatArray) -> tuple[float, float]:
-        """How far (rad, m) the axes of two joints lie apart as lines, whichever way they point."""
+        """Return the angle and distance (rad, m) between two joint axes as lines, for either direction."""
         kind = family(self.a.joint(e).kind)
         if kind != family(self.b.joint(f).kind):
             return 0.0, 0.0
         if kind == "planar":
-            return _Standing.of(self.a, e, G).mismatch(_Standing.of(self.b, f, XC))
+            return _JointGeometry.of(self.a, e, G).mismatch(_JointGeometry.of(self.b, f, XC))
         return _lines_apart(kind, self.a.screw(e).moved(G), self.b.screw(f).moved(XC))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Standing:
-    """A joint where it stands: how it moves, what hangs on it, its axis, its frame's place, and Z axis."""
+class _JointGeometry:
+    """The geometry of a joint: kind, subtree shape, axis, origin and z axis of its frame."""
 
     kind: str
     shape: str
@@ -223,14 +224,14 @@ class _Standing:
     normal: FloatArray
 
     @classmethod
-    def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, shape: str = "") -> _Standing:
-        """The joint of an edge, moved by T."""
+    def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, shape: str = "") -> _JointGeometry:
+        """Return the geometry of an edge's joint, moved by T."""
         pose = T @ mechanism.homes[edge.joint + 1]
         screw = mechanism.screw(edge).moved(T)
         return cls(family(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
 
-    def mismatch(self, other: _Standing) -> tuple[float, float]:
-        """How far (rad, m) its axis lies from that of a joint of its kind."""
+    def mismatch(self, other: _JointGeometry) -> tuple[float, float]:
+        """Return the angle and distance (rad, m) between this axis and that of a joint of the same kind."""
         if self.kind == "planar":
             normals = (Screw(one.normal, one.normal) for one in (self, other))
             return between_lines(*normals, placed=False)
@@ -238,25 +239,25 @@ class _Standing:
 
 
 def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
-    """How far (rad, m) the axes of two joints of a kind lie apart."""
-    if kind == "floating":  # goes anywhere, wherever it counts from
+    """Return the angle and distance (rad, m) between the axes of two joints of the same kind."""
+    if kind == "floating":  # reaches every pose from any origin
         return 0.0, 0.0
     return between_lines(s, t, placed=kind == "turns")
 
 
 _Some = TypeVar("_Some")
-#: One of A and one of B.
+#: A pair: one of A and one of B.
 Both = tuple[_Some, _Some]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Axis:
-    """A joint's screw at home.
+    """A joint's screw in the zero configuration.
 
     Attributes:
-        screw: Its line; that of a slide has no place.
-        turns: Whether it turns.
-        seen: The line that it is seen from.
+        screw: Its line; the line of a prismatic joint has no position.
+        turns: Whether the joint is revolute.
+        seen: The reference line, along which heights are measured.
     """
 
     screw: Screw
@@ -264,11 +265,11 @@ class Axis:
     seen: Screw
 
     def moved(self, T: FloatArray) -> Axis:
-        """The axis after a rigid motion."""
+        """Return the axis after a rigid motion."""
         return Axis(self.screw.moved(T), self.turns, self.seen.moved(T))
 
     def height(self, u: FloatArray) -> float | None:
-        """How far along u (m) the nearest point of the line that it is seen from is; None where any is."""
+        """Return the height (m) along u of the nearest point of the reference line; None if not unique."""
         s, start = self.screw, self.seen
         along_s = float(start.direction @ s.direction)
         if not self.turns or 1.0 - along_s**2 < ALONG**2:
@@ -279,7 +280,7 @@ class Axis:
 
 
 def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
-    """By how much theirs must be turned about u, or slid along it, to lie as ours does."""
+    """Yield rotations about u, or translations along it, that align the second axis with the first."""
     if not turns:
         heights = ours.height(u.direction), theirs.height(u.direction)
         if heights[0] is not None and heights[1] is not None:
@@ -298,10 +299,13 @@ def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
 
 
 def behind(
-    mechanisms: Both[Mechanism], came: Both[Edge | None], bodies: Both[int], seen: Both[Screw]
+    mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], seen: Both[Screw]
 ) -> Iterator[Both[Axis]]:
-    """Pairs of axes at two bodies, and behind the ones along a line, which move nothing seen from it."""
-    for e, f in _led_on(mechanisms, came, bodies):
+    """Yield pairs of axes at two bodies.
+
+    An axis parallel to the line `seen` does not move that line, so the axes behind it are included.
+    """
+    for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])
         yield axes
         screws = axes[0].screw, axes[1].screw
@@ -310,11 +314,11 @@ def behind(
             yield from behind(mechanisms, (e, f), beyond, screws if axes[0].turns else seen)
 
 
-def laid(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Where B's root may stand for its axes to lie on A's: first axis on first, then by those behind it.
+def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
+    """Yield poses of B's root that align its axes with A's: the first axis, then those behind it.
 
-    What is left free is a turn about the first axis and a slide along it. Where nothing is behind, as of a
-    rotor, those beside it tell.
+    The first axis leaves a rotation about it and a translation along it free. If no axis is behind it, as for
+    a rotor, the other axes of the body decide.
     """
     firsts = _firsts((a, b), (None, None), bodies, ())
     for (ours, theirs), near, far in firsts:
@@ -329,16 +333,16 @@ def laid(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
                     yield along(ours.screw, way, turns=False) @ X
 
 
-def laid_by_siblings(
+def root_poses_by_siblings(
     a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
-    """Where B's root may stand for three axes of one body to lie on three of A's, whatever is behind them.
+    """Yield poses of B's root that align three axes of one body with three of A's.
 
     Args:
-        a: One.
-        b: The other.
+        a: One mechanism.
+        b: The other mechanism.
         bodies: Of both, with several joints each.
-        alike: Whether a joint of A may be one of B.
+        alike: Whether a joint of A may be paired with a joint of B.
     """
     edges = _with_axes(a, bodies[0])
     ours = [_axis(a, edge) for edge in edges]
@@ -362,9 +366,9 @@ def laid_by_siblings(
             more = [
                 pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
             ]
-            if not ours[second].turns:  # a slide across the first axis leaves heights along it as they are
+            if not ours[second].turns:  # a translation across the first axis keeps heights along it
                 carried = edges[second].beyond(bodies[0]), g.beyond(bodies[1])
-                led = _led_on((a, b), (edges[second], g), carried)
+                led = _next_joints((a, b), (edges[second], g), carried)
                 more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
             K = between(start, u, turns=True)[0]
             for turn in zeros(u, pair[0], pair[1].moved(K), turns=True):
@@ -383,7 +387,7 @@ def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
 
 
 def _across(u: Screw, s: Screw) -> float:
-    """The sine of the angle between two axes."""
+    """Return the sine of the angle between two axes."""
     return float(np.linalg.norm(np.cross(u.direction, s.direction)))
 
 
@@ -392,11 +396,14 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 
 
 def _firsts(
-    mechanisms: Both[Mechanism], came: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
+    mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Pairs of first turning axes, with slides before them and what is behind; of slides where none turns."""
+    """Return pairs of first revolute axes, each with the prismatic axes before it and the axes behind it.
+
+    Prismatic axes are used if there is no revolute one.
+    """
     found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
-    for e, f in _led_on(mechanisms, came, bodies):
+    for e, f in _next_joints(mechanisms, via, bodies):
         pair, beyond = (
             (_axis(mechanisms[0], e), _axis(mechanisms[1], f)),
             (e.beyond(bodies[0]), f.beyond(bodies[1])),
@@ -407,11 +414,13 @@ def _firsts(
     return found
 
 
-def _led_on(mechanisms: Both[Mechanism], came: Both[Edge | None], bodies: Both[int]) -> Iterator[Both[Edge]]:
-    """All pairs of joints with axes that lead on from two bodies and move alike."""
+def _next_joints(
+    mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int]
+) -> Iterator[Both[Edge]]:
+    """Yield all pairs of next joints at two bodies that both have an axis and the same kind of motion."""
     ours, theirs = (
         [edge for edge in mechanism.edges_of[body] if edge is not by and mechanism.joint(edge).kind.has_axis]
-        for mechanism, by, body in zip(mechanisms, came, bodies, strict=True)
+        for mechanism, by, body in zip(mechanisms, via, bodies, strict=True)
     )
     for e, f in product(ours, theirs):
         if _axis(mechanisms[0], e).turns is _axis(mechanisms[1], f).turns:

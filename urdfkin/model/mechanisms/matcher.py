@@ -1,6 +1,8 @@
-"""The walk that lays B on A: at each joint its sense and zero are chosen so that most behind it agrees.
+"""Align mechanism B with mechanism A: match their joints, and choose base, senses, zeros and order.
 
-The search for how B is laid on A: where to begin, in which order, whose joint is whose, and how nearly.
+The matcher goes through both mechanisms from a common body outwards. At each joint it chooses the sense and
+the zero with which most links and axes behind the joint agree. `align` calls it for several starting bodies
+and joint orders, and returns the best result.
 """
 
 from __future__ import annotations
@@ -14,13 +16,13 @@ from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, G
 from urdfkin.model.mechanisms.congruence import Congruence
 from urdfkin.model.mechanisms.free_zeros import zeros_by_rules
 from urdfkin.model.mechanisms.joint_matching import (
-    Came,
     Pair,
     Pairing,
+    Via,
     behind,
     family,
-    laid,
-    laid_by_siblings,
+    root_poses_by_axes,
+    root_poses_by_siblings,
     zeros,
 )
 from urdfkin.model.mechanisms.mechanism import (
@@ -41,47 +43,55 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 
-#: What the next axis leaves open, so many joints ahead decide.
+#: Number of joints that a choice looks ahead when the next axis does not decide it.
 AHEAD = 6
-#: So many places for B's root are tried in which all axes of one body lie on axes of A's.
-MOST_LAID = 48
-#: What is off by less than this of what something else is fits twice as well: only that is better.
+#: Number of poses of B's root that are tried with all axes of one body on axes of A's body.
+MOST_ROOT_POSES = 48
+#: A choice with as many agreements is better only if its largest disagreement is below this share.
 TWICE_AS_WELL = 0.5
 
-#: What a joint is free in: an offset, or a pose.
+#: The free part of a joint: an offset, or a pose.
 _Free = TypeVar("_Free", float, FloatArray)
-#: How many of some places agree, and the largest disagreement (m).
+#: Number of links and axes that agree, and the largest disagreement (m).
 Score = tuple[int, float]
 
 
 @dataclass(slots=True)
 class Ahead:
-    """How many steps ahead a search may still take; several walks share one."""
+    """The number of look-ahead steps that are left to a search; several matchers may share one."""
 
     left: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """Where the walk stands: two bodies, how they were reached, what moves either home there."""
+    """A position of the matcher in both mechanisms.
+
+    Attributes:
+        bodies: The current body of A and of B.
+        via: The joints by which they were reached; None at the base.
+        previous: Index of the last step, -1 for none.
+        G: (4, 4) motion of A's zero configuration to B's pose.
+        XC: (4, 4) motion of B's zero configuration to that pose.
+    """
 
     bodies: tuple[int, int]
-    came: tuple[Edge | None, Edge | None]
+    via: tuple[Edge | None, Edge | None]
     previous: int
     G: FloatArray
     XC: FloatArray
 
 
 class MechanismMatcher:
-    """Walks over two mechanisms, each from a body that both have to their ends.
+    """Match the joints of two mechanisms, from a common body to their ends.
 
     Args:
-        a: One.
-        b: The other, which is laid on it.
-        pairing: Whose joint is whose.
-        gauge: What is free; None: whatever makes most agree.
-        ahead: How many steps ahead it may take for that.
-        tolerance: Within which places and axes agree.
+        a: One mechanism.
+        b: The other mechanism, which is aligned with `a`.
+        pairing: The joints of `a` and `b` that may be matched.
+        gauge: Prescribed free choices; None: those with which most agrees.
+        ahead: The number of look-ahead steps.
+        tolerance: Tolerance for poses and axes.
         base: Links of both on the bodies to begin at; None: the likeliest.
     """
 
@@ -98,13 +108,13 @@ class MechanismMatcher:
         self.a, self.b, self.pairing, self.gauge, self.ahead = a, b, pairing, gauge, ahead
         self.tolerance, self.base = tolerance, base
         self.size = size_of(a, b)
-        #: Subtrees that match exactly; None where nothing is free.
+        #: Subtrees that match exactly; None for a prescribed gauge.
         self.exact = Congruence(a, b, pairing, tolerance, self._poses_behind) if gauge is None else None
 
     # -- where to begin ------------------------------------------------------------------------------
 
     def beginnings(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Bodies that both have and where B's root may stand, the likeliest first."""
+        """Yield common bodies with possible poses of B's root in A's root frame, the likeliest first."""
         if self.gauge is not None:
             names = self.gauge.base
             base = next(self._bases()) if names is None else self._bodies_of(*names)
@@ -130,7 +140,7 @@ class MechanismMatcher:
         return any(joint.mimic is not None for m in (self.a, self.b) for joint in m.tree.joints)
 
     def _exact_beginning(self, bases: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], FloatArray] | None:
-        """The first pair of bodies and place of B's root with which everything matches."""
+        """Return the first pair of bodies, and pose of B's root, with which everything matches."""
         for base in bases:
             if self.pairing.same_shape(base, (None, None)):
                 for X in self._exact_places(base):
@@ -139,19 +149,23 @@ class MechanismMatcher:
         return None
 
     def _exact_places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Where B's root may stand if everything matches: all axes of the body lie on axes of the other."""
+        """Yield poses of B's root for an exact match: all axes of a body lie on axes of the other."""
         yield from self._by_names(base)
-        siblings = laid_by_siblings(self.a, self.b, base, lambda e, f: self.pairing.alike(base, e, f))
-        some = (X for X in chain(siblings, laid(self.a, self.b, base)) if self.pairing.all_lie_alike(base, X))
-        yield from islice(some, MOST_LAID)
+        siblings = root_poses_by_siblings(self.a, self.b, base, lambda e, f: self.pairing.alike(base, e, f))
+        some = (
+            X
+            for X in chain(siblings, root_poses_by_axes(self.a, self.b, base))
+            if self.pairing.all_lie_alike(base, X)
+        )
+        yield from islice(some, MOST_ROOT_POSES)
 
     def _places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Where B's root may stand: where A's does, where links of one name meet, where axes do."""
+        """Yield poses of B's root: A's root, poses that align links of equal names, poses that align axes."""
         yield from self._by_names(base)
         yield from self._by_axes(base)
 
     def _by_names(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Where A's root stands, where links of one name meet."""
+        """Yield A's root, then the poses that align links of equal names."""
         yield IDENTITY
         for link_a, link_b in self.pairing.links(*base):
             yield self.a.homes[link_a] @ inverse(self.b.homes[link_b])
@@ -161,10 +175,10 @@ class MechanismMatcher:
         return a.body_of[a.tree.link_index(link_a)], b.body_of[b.tree.link_index(link_b)]
 
     def _bases(self) -> Iterator[tuple[int, int]]:
-        """A's root body with the body of B that has most of its links, or with any of B's.
+        """Yield A's root body with the body of B that shares most links with it, or with each body of B.
 
-        Where those share no name, B's root body too, with the one of A: what carries A's root, a floating
-        joint say, may be A's alone.
+        If no names are shared, yield B's root body too, with the body of A that shares most links with it.
+        A's root may have no counterpart in B, for example before a floating joint.
         """
         if self.base is not None:
             yield self.a.body_of[self.base[0]], self.b.body_of[self.base[1]]
@@ -179,18 +193,18 @@ class MechanismMatcher:
             yield ours, 0
 
     def _by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Where B's first axes come to lie on A's, as well as they do."""
+        """Yield poses of B's root that align B's first axes with A's best."""
         scored = list[tuple[float, Place, Score]]()
-        for X in laid(self.a, self.b, base):
+        for X in root_poses_by_axes(self.a, self.b, base):
             place = Place(base, (None, None), -1, IDENTITY, X)
             scored.append((0.0, place, self._score(place)))
         best = _best_of(scored)[2] if scored else (0, 0.0)
         yield from (place.XC for _, place, score in scored if not better(best, score))
 
-    # -- the walk ------------------------------------------------------------------------------------
+    # -- matching ------------------------------------------------------------------------------------
 
     def run(self, base: tuple[int, int], X: FloatArray) -> Alignment:
-        """What is found from a pair of bodies on, B's root standing at X."""
+        """Return the alignment from a pair of bodies, with B's root at X."""
         found = Alignment(self.a, self.b, (self.a.bodies[base[0]][0], self.b.bodies[base[1]][0]), X)
         stack = [Place(base, (None, None), -1, IDENTITY, X)]
         while stack:
@@ -210,33 +224,33 @@ class MechanismMatcher:
         return found
 
     def _edges(self, place: Place) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Joints that lead on from a place: pairs, and what is left over of each."""
-        pairs = self._exact_pairs(place.bodies, place.came, inverse(place.G) @ place.XC)
+        """Return the matched pairs of next joints, and the unmatched joints of A and of B."""
+        pairs = self._exact_pairs(place.bodies, place.via, inverse(place.G) @ place.XC)
         if pairs is not None:
             return pairs, (), ()
-        return self.pairing.edges(place.bodies, place.came, place.G, place.XC)
+        return self.pairing.edges(place.bodies, place.via, place.G, place.XC)
 
-    def _exact_pairs(self, bodies: tuple[int, int], came: Came, X: FloatArray) -> Sequence[Pair] | None:
-        """The pairs of joints at two bodies if all that they carry matches; None where nothing is free."""
-        return None if self.exact is None else self.exact.at(bodies, came, X)
+    def _exact_pairs(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
+        """Return the joint pairs of two bodies if their subtrees match exactly; None otherwise."""
+        return None if self.exact is None else self.exact.at(bodies, via, X)
 
-    def _poses_behind(self, beyond: tuple[int, int], came: Pair, X: FloatArray) -> Iterator[FloatArray]:
-        """Candidates for the pose of B's body behind two joints of a kind, from its pose before them."""
-        there = Place(beyond, came, -1, IDENTITY, X)
-        kind, f = family(self.a.joint(came[0]).kind), came[1]
+    def _poses_behind(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
+        """Yield candidate poses of B's body behind two joints of the same kind, from its pose before them."""
+        there = Place(beyond, via, -1, IDENTITY, X)
+        kind, f = family(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
             t, turns = self.b.screw(f), kind == "turns"
             for offset in self._offsets(there, IDENTITY, t, turns):
                 yield X @ along(t, offset, turns=turns) if offset else X
             return
-        homes = self.a.homes[came[0].joint + 1], self.b.homes[f.joint + 1]
+        homes = self.a.homes[via[0].joint + 1], self.b.homes[f.joint + 1]
         plane = undoing(inverse(X @ homes[1]) @ homes[0]) if kind == "planar" else None
         for N in self._behind(there, homes[0], homes[1], plane, self._exact_places(beyond)):
             yield homes[0] @ N @ inverse(homes[1])
 
     def _frames(self, place: Place, found: Alignment) -> None:
         pairs = self._all_links(place)
-        if (other := self._tool_on(place, pairs)) is not None:
+        if (other := self._as_tools(place, pairs)) is not None:
             found.frames.append(other)
         for link_a, link_b in pairs:
             home = self.a.homes[link_a]
@@ -251,8 +265,8 @@ class MechanismMatcher:
                 found.worst = max(found.worst, angle * self.size + way)
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, way))
 
-    def _tool_on(self, place: Place, taken: list[tuple[int, int]]) -> FramePair | None:
-        """Where no link of two bodies is the other's: any of either, as another tool on the same body."""
+    def _as_tools(self, place: Place, taken: list[tuple[int, int]]) -> FramePair | None:
+        """Return any two links as different tools on the same body, if no links of the bodies match."""
         ours, theirs = self._own_links(place)
         if taken or not ours or not theirs:
             return None
@@ -261,7 +275,7 @@ class MechanismMatcher:
         return FramePair(ours[0], theirs[0], place.previous, home, IDENTITY, 0.0, 0.0, tool)
 
     def _all_links(self, place: Place) -> list[tuple[int, int]]:
-        """Links of one name, then those that stand in one place under names that the other has not."""
+        """Return links of equal names, then links at the same pose whose names the other model lacks."""
         pairs = list(self.pairing.links(*place.bodies))
         taken = {j for _, j in pairs}
         ours, theirs = self._own_links(place)
@@ -275,43 +289,43 @@ class MechanismMatcher:
         return pairs
 
     def _own_links(self, place: Place) -> tuple[list[int], list[int]]:
-        """Links of two bodies under names that the other model has not."""
+        """Return the links of two bodies whose names do not exist in the other model."""
         names_a, names_b = self.a.tree.links, self.b.tree.links
         ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
 
     def _step(self, place: Place, e: Edge, f: Edge, index: int, depth: int) -> tuple[Step, Place, Score]:
-        """The step that a pair of joints makes, where it leads, and how well it fits what is behind it."""
+        """Return the step over a pair of joints, the position behind it, and its score."""
         kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
-        came = e, f
+        via = e, f
         backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
         bodies = e.beyond(place.bodies[0]), f.beyond(place.bodies[1])
-        there = Place(bodies, came, index, place.G, place.XC)
+        there = Place(bodies, via, index, place.G, place.XC)
         if kinds[0] != kinds[1]:
-            return self._unlike(place, came, kinds, backwards), there, (0, 0.0)
+            return self._unlike(place, via, kinds, backwards), there, (0, 0.0)
         if kinds[0] in ("turns", "prismatic"):
             return self._like(place, there, backwards, depth, turns=kinds[0] == "turns")
         return self._free(place, there, backwards, depth, kinds[0])
 
     def _unlike(
-        self, place: Place, came: tuple[Edge, Edge], kinds: tuple[str, str], backwards: tuple[bool, bool]
+        self, place: Place, via: tuple[Edge, Edge], kinds: tuple[str, str], backwards: tuple[bool, bool]
     ) -> Step:
-        """A joint fixed in one model, or of another kind: what hangs on it shows by how much."""
+        """Return the step over two joints of different kinds; one may be fixed."""
         unlike = {kinds[0]: "a", kinds[1]: "b"}.get("fixed", "kind")
         if unlike == "a":
-            axis = _outwards(self.b.screw(came[1]), backwards[1]).moved(inverse(place.G) @ place.XC)
+            axis = _outwards(self.b.screw(via[1]), backwards[1]).moved(inverse(place.G) @ place.XC)
         else:
-            axis = _outwards(self.a.screw(came[0]), backwards[0])
+            axis = _outwards(self.a.screw(via[0]), backwards[0])
         kind = kinds[1] if unlike == "a" else kinds[0]
         return Step(
-            came[0].joint, came[1].joint, kind, place.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0, unlike
+            via[0].joint, via[1].joint, kind, place.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0, unlike
         )
 
     def _free(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, kind: str
     ) -> tuple[Step, Place, Score]:
-        """A planar or floating joint: where its frame stands, and what it counts from, is free."""
-        e, f = _both(there.came)
+        """Pass a planar or floating joint: its frame and the origin of its coordinates are free."""
+        e, f = _both(there.via)
         homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
         at, seen = place.G @ homes[0], place.XC @ homes[1]
         axis, back = Screw(homes[0][:3, 2], homes[0][:3, 3]), backwards[0] != backwards[1]
@@ -328,7 +342,7 @@ class MechanismMatcher:
         if as_written:
             return replace(step, unlike="kind" if back else ""), there, (0, 0.0)
         M = inverse(seen) @ at
-        exact = self._exactly(place, there)
+        exact = self._exact_pose(place, there)
         if given is not None:
             tried: Iterable[FloatArray] = [inverse(given.before) if backwards[1] else given.behind]
         elif exact is not None:
@@ -338,7 +352,7 @@ class MechanismMatcher:
             tried = self._behind(there, at, homes[1], plane, self._by_axes(there.bodies))
         places = ((N, replace(there, XC=at @ N @ inverse(homes[1]))) for N in tried)
         N, moved, score = self._best(places, depth)
-        # Outwards, P_b^(1 or -1) = M P_a^(1 or -1) N.
+        # In outward direction, P_b^(1 or -1) = M P_a^(1 or -1) N.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
         before, behind = (IDENTITY if self.tolerance.holds(*apart(IDENTITY, T)) else T for T in pair)
         if before is IDENTITY and behind is IDENTITY and not back:
@@ -351,35 +365,35 @@ class MechanismMatcher:
         at: FloatArray,
         home_b: FloatArray,
         plane: FloatArray | None,
-        laid_behind: Iterable[FloatArray],
+        poses_behind: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
-        """N to try: none, all as it stands at home, those with which a link or an axis behind agrees.
+        """Yield candidates for N: the identity, the zero configuration, and those that align a link or axis.
 
         Args:
-            there: Behind the joint, B as it stands at home.
+            there: The position behind the joint, with B in its zero configuration.
             at: (4, 4) the joint's frame.
-            home_b: (4, 4) B's own.
-            plane: (4, 4) what a planar joint's N is, but for motions in its plane.
-            laid_behind: (4, 4) where B's axes behind the joint lie on A's.
+            home_b: (4, 4) the frame of B's joint in the zero configuration.
+            plane: (4, 4) N of a planar joint up to motions in its plane; None for a floating joint.
+            poses_behind: (4, 4) poses that align B's axes behind the joint with A's.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]
         wanted += [
             there.G @ self.a.homes[i] @ inverse(self.b.homes[j]) for i, j in self.pairing.links(*there.bodies)
         ]
-        for XC in chain(wanted, (there.G @ X for X in laid_behind)):
+        for XC in chain(wanted, (there.G @ X for X in poses_behind)):
             N = inverse(at) @ XC @ home_b
             yield N if plane is None else plane @ onto_plane(inverse(plane) @ N)
 
     def _like(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, *, turns: bool
     ) -> tuple[Step, Place, Score]:
-        """A joint that turns, or slides, in both: sense, zero, and what makes its axis the other's."""
-        e, f = _both(there.came)
+        """Pass a joint that is revolute, or prismatic, in both: choose sense, zero and change of axis."""
+        e, f = _both(there.via)
         s = _outwards(self.a.screw(e), backwards[0])
         t = _outwards(self.b.screw(f), backwards[1])
         start, end = s.moved(place.G), t.moved(place.XC)
-        sense, zero = self._given(self.a.joint(e).name)
+        sense, zero = self._prescribed(self.a.joint(e).name)
         sense = sense or (-1 if start.direction @ end.direction < 0.0 else 1)
         if sense < 0:
             end = end.reversed()
@@ -387,13 +401,13 @@ class MechanismMatcher:
         back = inverse(place.G)
         kind, (a, b) = "turns" if turns else "prismatic", (e.joint, f.joint)
         if self.tolerance.holds(tilt, shift):
-            exact = self._exactly(place, there)
+            exact = self._exact_pose(place, there)
             if exact is not None:
                 zero = _value_of(t, inverse(place.XC) @ exact, turns=turns)
                 zero = 0.0 if self.tolerance.holds(*apart(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
             return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there, score
-        # What hangs on the joint has moved with its axis, or its axis alone is another.
+        # Either the joint and all behind it have moved, or only its axis differs.
         with_it = self._best_zero(there, K @ place.G, t, turns, zero, depth)
         if depth == AHEAD:
             alone = self._best_zero(there, place.G, t, turns, zero, depth)
@@ -404,23 +418,23 @@ class MechanismMatcher:
         before = back @ K @ place.G
         return Step(a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift), *with_it[1:]
 
-    def _exactly(self, place: Place, there: Place) -> FloatArray | None:
-        """(4, 4) the XC behind two joints with which all that they carry matches; None where none does."""
+    def _exact_pose(self, place: Place, there: Place) -> FloatArray | None:
+        """Return the exactly matching XC (4, 4) behind two joints; None if there is none."""
         if self.exact is None:
             return None
-        X = self.exact.behind(*_both(there.came), place.bodies, inverse(place.G) @ place.XC)
+        X = self.exact.behind(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)
         return None if X is None else place.G @ X
 
     # -- a joint's zero ------------------------------------------------------------------------------
 
-    def _given(self, joint: str) -> tuple[int, float | None]:
-        """Its sense and zero; 0 and None where they are free."""
+    def _prescribed(self, joint: str) -> tuple[int, float | None]:
+        """Return the prescribed sense and zero of a joint; 0 and None if they are free."""
         return (0, None) if self.gauge is None else self.gauge.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
         self, there: Place, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
     ) -> tuple[float, Place, Score]:
-        """The offset of B's joint with which most of what follows agrees; 0 has the first word."""
+        """Return the offset of B's joint with which most of the rest agrees; 0 is tried first."""
         offsets = self._offsets(there, G, t, turns) if zero is None else (zero,)
         moved = (
             (offset, there.XC @ along(t, offset, turns=turns) if offset else there.XC) for offset in offsets
@@ -428,9 +442,9 @@ class MechanismMatcher:
         return self._best(((offset, replace(there, G=G, XC=XC)) for offset, XC in moved), depth)
 
     def _best(self, choices: Iterable[tuple[_Free, Place]], depth: int) -> tuple[_Free, Place, Score]:
-        """The first choice with which most agrees; between equals, what follows decides, `depth` joints on.
+        """Return the first choice with most agreements; ties are resolved by looking `depth` joints ahead.
 
-        Two axes that meet at right angles, say, lie on two others in two ways; the third one tells which.
+        Example: two axes that meet at right angles lie on two others in two ways; a third axis decides.
         """
         scored = list[tuple[_Free, Place, Score]]()
         for what, place in choices:
@@ -438,7 +452,7 @@ class MechanismMatcher:
                 continue
             score = self._score(place)
             scored.append((what, place, score))
-            if not score[1] and self.pairing.links(*place.bodies):  # no other choice can agree as well
+            if not score[1] and self.pairing.links(*place.bodies):  # no other choice agrees better
                 return scored[-1]
         best = _best_of(scored)
         equal = [one for one in scored if not better(best[2], one[2])]
@@ -452,25 +466,25 @@ class MechanismMatcher:
         return _best_of(seen)
 
     def _with_behind(self, place: Place, here: Score, depth: int) -> Score:
-        """The score of a place together with what follows."""
-        pairs = self.pairing.edges(place.bodies, place.came, place.G, place.XC)[0]
+        """Return the score of a position together with the joints behind it."""
+        pairs = self.pairing.edges(place.bodies, place.via, place.G, place.XC)[0]
         self.ahead.left -= len(pairs)
         scores = [here, *(self._step(place, e, f, -1, depth - 1)[2] for e, f in pairs)]
         return sum(count for count, _ in scores), max(off for _, off in scores)
 
     def _score(self, place: Place) -> Score:
-        """How many of the links and axes at a place agree, and the largest disagreement (m)."""
+        """Return the number of links and axes that agree at a position, and the largest disagreement (m)."""
         off = [
             apart(place.G @ self.a.homes[i], place.XC @ self.b.homes[j])
             for i, j in self.pairing.links(*place.bodies)
         ]
-        pairs, _, _ = self.pairing.edges(place.bodies, place.came, place.G, place.XC)
+        pairs, _, _ = self.pairing.edges(place.bodies, place.via, place.G, place.XC)
         off += [self.pairing.mismatch(e, f, place.G, place.XC) for e, f in pairs]
         wrong = [angle * self.size + way for angle, way in off if not self.tolerance.holds(angle, way)]
         return len(off) - len(wrong), max(wrong, default=0.0)
 
     def _offsets(self, there: Place, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
-        """Zeros of B's joint to try: none, and those with which one thing behind it agrees."""
+        """Yield candidate zeros of B's joint: 0, and those that align a link or an axis behind it."""
         yield 0.0
         u = t.moved(there.XC)
         for i, j in self.pairing.links(*there.bodies):
@@ -479,19 +493,19 @@ class MechanismMatcher:
                 yield turn_about(u.direction, at[:3, :3] @ seen[:3, :3].T)
             else:
                 yield float(u.direction @ (at[:3, 3] - seen[:3, 3]))
-        for ours, theirs in behind((self.a, self.b), there.came, there.bodies, (u.moved(inverse(G)), t)):
+        for ours, theirs in behind((self.a, self.b), there.via, there.bodies, (u.moved(inverse(G)), t)):
             yield from zeros(u, ours.moved(G), theirs.moved(there.XC), turns)
 
 
 def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
-    """The body of another mechanism that has most links of one's root body by name; None where none has."""
+    """Return the body of `other` that shares most link names with the root of `one`; None if none does."""
     names = {one.tree.links[link] for link in one.bodies[0]}
     shared = [len(names & {other.tree.links[k] for k in body}) for body in other.bodies]
     return max(range(len(shared)), key=shared.__getitem__) if any(shared) else None
 
 
 def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place, Score]:
-    """The first that no other is better than by much."""
+    """Return the first element that no other element clearly beats (`better`)."""
     best = scored[0]
     for one in scored[1:]:
         best = one if better(one[2], best[2]) else best
@@ -499,31 +513,31 @@ def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place
 
 
 def better(score: Score, than: Score) -> bool:
-    """Whether more agrees, or as much and the rest twice as well."""
+    """Return whether more agrees, or as much agrees and the rest disagrees by less than half."""
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
 
 def _value_of(screw: Screw, T: FloatArray, *, turns: bool) -> float:
-    """The value of a joint that moves as a rigid motion does."""
+    """Return the value at which a joint makes the rigid motion T."""
     if turns:
         return turn_about(screw.direction, T[:3, :3])
     return float(screw.direction @ T[:3, 3])
 
 
 def _outwards(screw: Screw, backwards: bool) -> Screw:
-    """A joint's screw as it moves what is behind it on the walk, by the joint's own value."""
+    """Return a joint's screw for the motion of the body behind it; reversed if the path goes backwards."""
     return screw.reversed() if backwards else screw
 
 
-def _both(came: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
-    e, f = came
+def _both(via: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
+    e, f = via
     assert e is not None
     assert f is not None
     return e, f
 
 
 def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
-    """Some joints at a body and all behind them."""
+    """Return the indices of some joints at a body and of all joints behind them."""
     found, stack = [], [(body, edge) for edge in edges]
     while stack:
         here, edge = stack.pop()
@@ -534,35 +548,35 @@ def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[
 
 
 def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, float]:
-    """`between` of two planes, whichever way their normals point."""
+    """Return `between` of two planes, for either direction of their normals."""
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (at, seen))
     return between(start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False)
 
 
-#: Of joints whose order does not matter, so many orders are tried: all of five slides.
+#: Number of orders that are tried for commuting joints: all orders of five prismatic joints.
 MOST_ORDERS = 120
-#: So many steps ahead each search takes in all, seconds: TALOS without a name takes 500, Baxter 1,000.
+#: Look-ahead steps of each search in all, which take seconds: TALOS without names needs 500, Baxter 1,000.
 MOST_AHEAD = 2000
-#: What is off by so little (rad, and as a share of the size) is taken for nothing where nothing else helps.
+#: Tolerances (rad, and as a share of the size) that are tried when the exact match fails.
 NEARLY = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
-#: So many times joints that are called otherwise are taken for each other.
+#: Number of exchanges of joints with different names that are tried.
 MOST_EXCHANGED = 12
 
 
 def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | None = None) -> Alignment:
-    """Lay B on A.
+    """Align B with A.
 
     Args:
-        a: One.
-        b: The other.
+        a: One mechanism.
+        b: The other mechanism.
         given: Joints of A and their names in B.
-        gauge: What is free; None: whatever makes most agree.
+        gauge: Prescribed free choices; None: those with which most agrees.
     """
     if gauge is not None:
         for taken in gauge.orders:
             b = b.in_order(taken)
-        return _laid(a, b, given, gauge)
-    best = _laid(a, b, given, None, Ahead(MOST_AHEAD))
+        return _best_alignment(a, b, given, gauge)
+    best = _best_alignment(a, b, given, None, Ahead(MOST_AHEAD))
     for orders in b.orders_of_runs(tolerance_of(a, b)):
         if best.complete:
             break
@@ -570,7 +584,7 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
         for names in _orders_to_try(a, as_it_is, given, run, orders):
             moved = [k for k, name in enumerate(names) if name != run[k]]
             other = as_it_is.in_order(names[moved[0] : moved[-1] + 1])
-            found = _laid(a, other, given, None)
+            found = _best_alignment(a, other, given, None)
             if better((found.matched, found.worst), (best.matched, best.worst)):
                 best = found
     return _by_rules(_nearly(_exchanged(best, given), given))
@@ -579,11 +593,11 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
 def _orders_to_try(
     a: Mechanism, b: Mechanism, given: Mapping[str, str], run: Sequence[str], orders: Iterator[list[str]]
 ) -> Iterator[Sequence[str]]:
-    """Other orders of a run of B's joints: the one of A where A has all their names, else any.
+    """Yield other orders of commuting joints of B: A's order if A has all their names, else all orders.
 
     Args:
-        a: One.
-        b: The other.
+        a: One mechanism.
+        b: The other mechanism.
         given: Joints of A and their names in B.
         run: Names of B's joints, from the inner body outwards.
         orders: All other orders that their axes allow.
@@ -599,18 +613,18 @@ def _orders_to_try(
 
 
 def _by_rules(best: Alignment) -> Alignment:
-    """The same with zeros that mimic rules give, where all that agreed agrees still."""
+    """Return the alignment with zeros from mimic rules, if it agrees at least as well; else the same."""
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
     gauge = best.gauge
-    found = _laid(best.a, best.b, best.names, replace(gauge, zeros={**gauge.zeros, **zeros}))
+    found = _best_alignment(best.a, best.b, best.names, replace(gauge, zeros={**gauge.zeros, **zeros}))
     return found if found.differing <= best.differing and found.worst <= best.worst else best
 
 
 def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Joints on one body that share no name taken for each other: arms that mirror each other, say."""
-    if best.only_a or best.only_b:  # two robots, which no exchange makes one
+    """Try to exchange joints of one body that share no name, for example two mirrored arms."""
+    if best.only_a or best.only_b:  # two different robots; an exchange cannot make them equal
         return best
     tried, ahead = set[frozenset[tuple[int, int]]](), Ahead(MOST_AHEAD)
     while (two := next((two for two in best.exchangeable(given) if two not in tried), None)) is not None:
@@ -620,37 +634,37 @@ def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
         joints = best.a.tree.joints, best.b.tree.joints
         (a, b), (c, d) = two
         other = {joints[0][a].name: joints[1][d].name, joints[0][c].name: joints[1][b].name}
-        found = _laid(best.a, best.b, {**given, **other}, None, ahead, base=best.base)
+        found = _best_alignment(best.a, best.b, {**given, **other}, None, ahead, base=best.base)
         if better((found.matched, found.worst), (best.matched, best.worst)):
             best, given = found, {**given, **other}
     return best
 
 
 def _nearly(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Another way to lay them on each other, which agrees by far more; the same where none is.
+    """Return a much better alignment found with a larger tolerance; the same one if there is none.
 
-    Where each axis is off by a little, none says which of two ways is meant, as one that agrees would. So
-    what is little is taken for nothing, more and more of it, until all agree; with what was free set as that
-    search found it, they are laid on each other once more and all that is little is told. What is off by more
-    is no way chosen wrongly unless something before it is off by less.
+    If every axis is slightly off, no exact agreement decides between two candidates. So the search runs again
+    with increasing tolerances, until everything agrees. Then the mechanisms are aligned again with the exact
+    tolerance and the free choices of that search, so that small differences are reported. A large difference
+    counts as a wrong choice only if a joint before it has a smaller one.
     """
     a, b, (least, most), ahead = best.a, best.b, best.inner_off, Ahead(MOST_AHEAD)
     for angle in NEARLY:
         if not least < angle * best.size < TWICE_AS_WELL * most:
             continue
         tolerance = Tolerance(angle, angle * best.size)
-        rough = _laid(a, b, given, None, ahead, tolerance, best.base)
+        rough = _best_alignment(a, b, given, None, ahead, tolerance, best.base)
         if rough.inner_off[1] or (len(rough.only_a), len(rough.only_b)) != (
             len(best.only_a),
             len(best.only_b),
         ):
             continue
-        exact = _laid(a, b, rough.names, rough.gauge)
+        exact = _best_alignment(a, b, rough.names, rough.gauge)
         return exact if exact.inner_off[1] < TWICE_AS_WELL * most else best
     return best
 
 
-def _laid(
+def _best_alignment(
     a: Mechanism,
     b: Mechanism,
     given: Mapping[str, str],
@@ -659,7 +673,7 @@ def _laid(
     tolerance: Tolerance | None = None,
     base: tuple[int, int] | None = None,
 ) -> Alignment:
-    """The best of all bodies to begin at, or of the one of two links, with some steps ahead."""
+    """Return the best alignment over all starting bodies, or from the bodies of the two `base` links."""
     tolerance = tolerance or tolerance_of(a, b)
     walk = MechanismMatcher(a, b, Pairing(a, b, given, tolerance), gauge, ahead or Ahead(0), tolerance, base)
     best: Alignment | None = None

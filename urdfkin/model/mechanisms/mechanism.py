@@ -1,22 +1,17 @@
-"""Rigid motions along and between screws: what a joint does, and what makes one axis another.
+"""A robot as a mechanism: rigid bodies and joint screws in the zero configuration.
 
-A planar or floating joint counted from another place: the same motion in other coordinates.
+By the product of exponentials a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
+pose H are those of the zero configuration, in one common frame. Links between the joints do not appear, so
+fixed links may be merged or split. No body is special as the root: seen from another body, a path passes
+some joints backwards, with reversed screws.
 
-Such a joint's coordinates are a pose P. Where B's joint stands in another frame, or what hangs on it is seen
-from another one, it moves alike at
+The coordinates of a planar or floating joint are a pose P. If B's joint is in another frame, or the body
+behind it has another frame, the motions are equal for
 
-    P_b = M P_a N,      or at      M P_a^-1 N where one model's joint runs back.
+    P_b = M P_a N,      or      M P_a^-1 N if one model's joint is reversed.
 
-For a floating joint any rigid M and N will do. A planar joint's poses are those of a plane, and M P N must be
-one for every P: M and N lift the plane by as much as they lower it, and turn it over both or neither.
-
-
-A robot as what its motion is fixed by: rigid bodies, and between them joints with their screws at home.
-
-By the product of exponentials a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H, with the unit screws S_i and
-the pose H as they are where every joint's value is zero, all seen from one place. No link between the joints
-enters it, so that fixed links may be merged or split; and nothing in it says which body is the root: seen
-from another body, what lies on the way is passed backwards, with its screw reversed.
+For a floating joint any rigid M and N are valid. For a planar joint, M P N must be in the plane for every P
+in the plane: M raises the plane by as much as N lowers it, and both or neither turn it over.
 """
 
 from __future__ import annotations
@@ -38,12 +33,12 @@ from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: What lies across an axis by less, a unit vector or metres, lies along it, and has no direction there.
+#: Below this length across an axis (of a unit vector, or in metres), a vector counts as parallel to it.
 ALONG = 1e-12
 
 
 def along(screw: Screw, value: float, *, turns: bool) -> FloatArray:
-    """(4, 4) exp(S t): a turn about a screw by radians, or a slide along it by metres."""
+    """Return exp(S t) (4, 4): a rotation about a screw in radians, or a translation along it in metres."""
     if not turns:
         return pose(p=screw.direction * value)
     R = rotation_about(screw.direction, value)
@@ -51,10 +46,11 @@ def along(screw: Screw, value: float, *, turns: bool) -> FloatArray:
 
 
 def between(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
-    """The least motion that makes one joint's axis another's, its tilt (rad) and its way (m).
+    """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
 
-    The axis is tilted about the first joint's origin and moved across itself: what is left, a turn about the
-    axis and a way along it, is a joint's zero or nobody's business. A slide's axis has no place.
+    The axis is tilted about the first joint's origin and shifted perpendicular to itself. A rotation
+    about the axis and a shift along it remain; they belong to the joint's zero, or have no effect. The axis
+    of a prismatic joint has no position, so its shift is 0.
     """
     R, tilt = shortest_turn(start.direction, end.direction)
     across = np.zeros(3)
@@ -65,53 +61,53 @@ def between(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float
 
 
 def shortest_turn(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
-    """The rotation by the least angle that turns one unit vector to another, and the angle."""
+    """Return the rotation by the smallest angle from one unit vector to another, and the angle."""
     cross = np.cross(u, v)
     sine, cosine = float(np.linalg.norm(cross)), float(u @ v)
     angle = math.atan2(sine, cosine)
-    if sine == 0.0:  # opposite: about any axis across
+    if sine == 0.0:  # opposite vectors: any perpendicular axis is correct
         axis = np.zeros(3) if cosine > 0.0 else axis_aligning(u)[:, 0] * math.pi
         return exp_rotation(axis), angle
     return exp_rotation(cross * (angle / sine)), angle
 
 
 def apart(T: FloatArray, other: FloatArray) -> tuple[float, float]:
-    """By what angle (rad) and way (m) two poses differ."""
-    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # a walk asks this thousands of times: plain numbers
+    """Return the angle (rad) and the distance (m) between two poses."""
+    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # called thousands of times; plain floats are faster
     sine = math.hypot(R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
     angle = math.atan2(sine, R[0][0] + R[1][1] + R[2][2] - 1.0)
     return angle, math.dist(other[:3, 3].tolist(), T[:3, 3].tolist())
 
 
 def turn_about(u: FloatArray, R: FloatArray) -> float:
-    """The angle about an axis that comes nearest to a rotation."""
+    """Return the angle of the rotation about u that is nearest to R."""
     vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return math.atan2(float(u @ vector), float(np.trace(R) - u @ R @ u))
 
 
 def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
-    """The angle about u from x to y, seen along u; None where one of them is along u."""
+    """Return the angle about u from x to y, projected along u; None if x or y is parallel to u."""
     x, y = x - u * (u @ x), y - u * (u @ y)
     if min(np.linalg.norm(x), np.linalg.norm(y)) < ALONG:
         return None
     return math.atan2(float(u @ np.cross(x, y)), float(x @ y))
 
 
-#: What the entries of a pose that was computed may be off by, as a share of their size.
+#: Relative tolerance for the entries of a computed pose.
 NEARLY = 1e-9
-#: A place in the plane that is none of the special ones: moved along both axes, and turned.
+#: A generic planar configuration: translated along both axes, and rotated.
 _AWAY = np.array([1.0, 2.0, 3.0])
 _Z = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointTransform:
-    """P_b = before P_a behind; with P_a^-1 where `back`.
+    """The conversion of a planar or floating joint: P_b = before P_a behind; P_a^-1 if `back`.
 
     Attributes:
         before: (4, 4) M.
         behind: (4, 4) N.
-        back: Whether one model's joint runs back.
+        back: Whether one model's joint is reversed.
     """
 
     before: FloatArray
@@ -119,12 +115,12 @@ class JointTransform:
     back: bool = False
 
     def __call__(self, kind: JointKind, own: FloatArray) -> FloatArray:
-        """(..., 3 or 7) B's coordinates for A's, of a planar or a floating joint."""
+        """Convert A's coordinates (..., 3 or 7) of a planar or floating joint to B's."""
         P = pose_of(kind, own)
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Whether M and N are rigid, and M P N one of the joint's poses at home and turned and moved away."""
+        """Return whether M and N are rigid, and M P N is a pose of the joint, at zero and at a generic P."""
         if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
         away = pose_of(JointKind.PLANAR, _AWAY)
@@ -132,7 +128,7 @@ class JointTransform:
 
 
 def pose_of(kind: JointKind, own: FloatArray) -> FloatArray:
-    """(..., 4, 4) P at a joint's coordinates: (x, y, angle), or (x, y, z, qx, qy, qz, qw)."""
+    """Return P (..., 4, 4) for a joint's coordinates: (x, y, angle), or (x, y, z, qx, qy, qz, qw)."""
     P = np.zeros((*own.shape[:-1], 4, 4))
     P[..., 3, 3] = 1.0
     if kind is JointKind.PLANAR:
@@ -143,14 +139,14 @@ def pose_of(kind: JointKind, own: FloatArray) -> FloatArray:
 
 
 def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
-    """The coordinates of a pose."""
+    """Return the coordinates of a pose (..., 4, 4) of a planar or floating joint."""
     if kind is JointKind.PLANAR:
         return np.concatenate((P[..., :2, 3], turn_in_plane(P)[..., np.newaxis]), axis=-1)
     return np.concatenate((P[..., :3, 3], quaternion_of(P[..., :3, :3])), axis=-1)
 
 
 def is_pose(kind: JointKind, T: FloatArray) -> bool:
-    """Whether a matrix is one that a planar or floating joint reaches; a floating one reaches every pose."""
+    """Return whether a planar or floating joint can reach a matrix; a floating joint reaches every pose."""
     R = T[:3, :3]
     near = NEARLY * (1.0 + np.abs(T).max())
     if np.abs(R @ R.T - np.eye(3)).max() > near or np.linalg.det(R) < 0.0 or T[3].tolist() != [0, 0, 0, 1]:
@@ -159,19 +155,20 @@ def is_pose(kind: JointKind, T: FloatArray) -> bool:
 
 
 def turn_in_plane(P: FloatArray) -> FloatArray:
-    """The angle about z that comes nearest to a pose's rotation."""
+    """Return the angle about z that is nearest to a pose's rotation."""
     return np.arctan2(P[..., 1, 0] - P[..., 0, 1], P[..., 0, 0] + P[..., 1, 1])
 
 
 def onto_plane(P: FloatArray) -> FloatArray:
-    """(4, 4) the pose in the plane that is nearest to another."""
+    """Return the pose (4, 4) in the plane that is nearest to another pose."""
     return pose_of(JointKind.PLANAR, coordinates_of(JointKind.PLANAR, P))
 
 
 def undoing(M: FloatArray) -> FloatArray:
-    """(4, 4) N with which M P N is in the plane for every P that is, where M leaves its normal the plane's.
+    """Return N (4, 4) for which M P N is in the plane for every P in the plane.
 
-    M is a lift by h, a motion in the plane, and perhaps half a turn about x: N undoes the lift and the turn.
+    M must keep the direction of the plane's normal, or reverse it. Then M is a lift by h, a motion in the
+    plane, and possibly half a turn about x: N undoes the lift and the half turn.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -179,17 +176,17 @@ def undoing(M: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Screw:
-    """A joint's axis as a line that points: a unit direction through a point."""
+    """A joint's axis as a directed line: a unit direction through a point."""
 
     direction: FloatArray
     point: FloatArray
 
     def moved(self, T: FloatArray) -> Screw:
-        """The screw after a rigid motion."""
+        """Return the screw after a rigid motion."""
         return Screw(T[:3, :3] @ self.direction, T[:3, :3] @ self.point + T[:3, 3])
 
     def reversed(self) -> Screw:
-        """The same line, pointing the other way."""
+        """Return the same line with the opposite direction."""
         return Screw(-self.direction, self.point)
 
 
@@ -198,9 +195,9 @@ class Edge:
     """A joint between two bodies.
 
     Attributes:
-        joint: Its index in the tree.
-        inner: The body that carries it.
-        outer: The body that it moves.
+        joint: Index of the joint in the tree.
+        inner: The parent body.
+        outer: The child body.
     """
 
     joint: int
@@ -208,16 +205,16 @@ class Edge:
     outer: int
 
     def beyond(self, body: int) -> int:
-        """The body at the other end."""
+        """Return the body at the other end."""
         return self.outer if body == self.inner else self.inner
 
 
 class Mechanism:
-    """Bodies and joints of a tree at home, where every joint's value is zero.
+    """Bodies and joints of a tree in the zero configuration.
 
     Args:
         tree: The robot.
-        parting: Fixed joints (indices) that count as joints all the same, since another model's move there.
+        parting: Fixed joints (indices) that count as joints, because they move in the other model.
     """
 
     def __init__(self, tree: KinematicTree, parting: Collection[int] = ()) -> None:
@@ -237,30 +234,30 @@ class Mechanism:
                 bodies[body[-1]].append(i + 1)
         self.homes, self.body_of, self.edges = homes, body, edges
         self.bodies = bodies
-        #: Joints that are taken in another order than the tree's, run by run.
+        #: Joint orders that differ from the tree's, one for each reordered run of joints.
         self.orders: tuple[tuple[str, ...], ...] = ()
-        #: How far (m) the way from the root to each link is, and how many joints it passes, fixed ones too.
+        #: For each link: length (m) of the path from the root, and number of joints on it, fixed ones too.
         self.lengths, self.depths = lengths, depths
         self._screws: dict[int, Screw] = {}
 
     def joint(self, edge: Edge) -> Joint:
-        """What the tree says of it."""
+        """Return the tree's joint of an edge."""
         return self.tree.joints[edge.joint]
 
     def screw(self, edge: Edge) -> Screw:
-        """Of a joint that turns or slides, at home, seen from the root."""
+        """Return the screw of a revolute or prismatic joint in the zero configuration, in the root frame."""
         if (known := self._screws.get(edge.joint)) is None:
             T = self.homes[edge.joint + 1]
             known = self._screws[edge.joint] = Screw(T[:3, :3] @ self.joint(edge).axis, T[:3, 3])
         return known
 
     def in_order(self, names: Sequence[str]) -> Mechanism:
-        """The same motion with joints one behind the other taken in another order, which their axes allow.
+        """Return the same mechanism with consecutive joints in another order that their axes allow.
 
-        Links between them that other joints then carry are on no body any more.
+        Links between reordered joints belong to no body in the result.
 
         Args:
-            names: Joints of a run, from the inner body outwards.
+            names: Joints of a run of consecutive joints, from the inner body outwards.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -276,7 +273,7 @@ class Mechanism:
         return other
 
     def may_be_taken(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Whether joints are such a run, and axes allow that order: any two that change places commute."""
+        """Return whether joints are consecutive, and all pairs that change places commute."""
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
         one_line = all(
@@ -292,9 +289,9 @@ class Mechanism:
         return len(run) == len(names) and one_line and all(self._commute(*two, tolerance) for two in changed)
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """For each run of joints, nothing else on the bodies between, its orders that move alike."""
+        """For each run of consecutive joints, yield its orders with the same motion."""
         run: list[Edge] = []
-        for edge in self.edges:  # depth first: what follows is next where the body between has no other
+        for edge in self.edges:  # depth first: the next edge continues the run if the body has no other
             if run and edge.inner == run[-1].outer and len(self.edges_of[edge.inner]) == 2:
                 run.append(edge)
                 continue
@@ -303,7 +300,7 @@ class Mechanism:
         yield self._orders(run, tolerance)
 
     def _orders(self, run: Sequence[Edge], tolerance: Tolerance) -> Iterator[list[str]]:
-        """All that exchanging neighbours leads to, the run's own first."""
+        """Yield all orders reached by exchanging commuting neighbours, the given order first."""
         if not run:
             yield []
         for k, edge in enumerate(run):
@@ -312,7 +309,11 @@ class Mechanism:
                     yield [self.joint(edge).name, *others]
 
     def _commute(self, one: Edge, other: Edge, tolerance: Tolerance) -> bool:
-        """Two slides, a slide along a turn's axis, two turns about one line."""
+        """Return whether two joints commute.
+
+        These do: two prismatic joints, a prismatic joint along the axis of a revolute one, and two revolute
+        joints about one line.
+        """
         kinds = [self.joint(edge).kind for edge in (one, other)]
         if not all(kind.has_axis and kind.nv for kind in kinds):
             return False
@@ -333,44 +334,44 @@ class Mechanism:
 
     @cached_property
     def size(self) -> float:
-        """Metres: the longest way from the root to a link, the scale of its lengths."""
+        """Length (m) of the longest path from the root to a link, the scale of the mechanism's lengths."""
         return max(self.lengths)
 
     @cached_property
     def rounding(self) -> float:
-        """By how much (rad, and as a share of `size`) what is read from a text may be off, for all links.
+        """Rounding error (rad, and as a share of `size`) of poses read from a file, summed over all links.
 
-        Pinocchio turns about some axes that are tilted by as little (URDF514).
+        It includes the small tilts of Pinocchio's axes (URDF514).
         """
         return EPS * of_two_texts(max(self.depths)) + 2.0 * sum(joint.tilt for joint in self.tree.joints)
 
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """What of an angle (rad) and of a way (m) is rounding."""
+    """The largest angle (rad) and distance (m) that count as rounding."""
 
     angle: float
     way: float
 
     def holds(self, angle: float, way: float) -> bool:
-        """Whether both are."""
+        """Return whether both are within the tolerance."""
         return angle <= self.angle and way <= self.way
 
 
 def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
-    """What two texts of one robot may differ by."""
+    """Return the largest difference of two files of one robot that rounding can cause."""
     k = a.rounding + b.rounding
     return Tolerance(k, k * size_of(a, b))
 
 
 def size_of(a: Mechanism, b: Mechanism) -> float:
-    """Metres: what angles are counted with where both are compared."""
+    """Return the length (m) that converts angles to distances in a comparison."""
     return max(a.size, b.size, LEAST_SIZE)
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
-    """By what angle (rad), and if they have a place by what way (m), two axes differ as lines."""
-    ux, uy, uz = s.direction.tolist()  # a walk asks this thousands of times: plain numbers
+    """Return the angle (rad) and the distance (m) between two axes as lines; distance 0 without `placed`."""
+    ux, uy, uz = s.direction.tolist()  # called thousands of times; plain floats are faster
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
     angle = math.atan2(sine, abs(ux * vx + uy * vy + uz * vz))

@@ -1,28 +1,26 @@
-"""Where a point of a moving chain can come at most: support functions, bounded from above.
+"""Upper bounds on the distance between a frame in two models, proven for all configurations at once.
 
-The support function of a set W of points is h(u) = max over p in W of u . p. It is all that a bound on
-distances asks of W, and it passes through joints: where W is turned by any angle of a range about an axis,
-h'(u) is the largest h over the directions u turned back, and where it slides, the slide's own is added. So
-the whole reach of a chain is a function on directions, however many joints it has: no search in all its
-coordinates together.
+Support functions. The support function of a set W of points is h(u) = max over p in W of u . p. A bound on
+distances needs only h. A joint transforms h directly: if W rotates about an axis by any angle of a range,
+h'(u) is the largest h over the directions u rotated back; if W translates, the translation's term is added.
+So the reach of a chain is one function of the direction, for any number of joints. A search over all joint
+values is not needed.
 
-h is kept at the points of a grid on the cube's surface, and is convex with h(s u) = s h(u): at any direction
-it is at most what interpolation between grid points says, which therefore is a bound, not a guess. A turn is
-bounded likewise: an arc of directions lies in the polygon drawn about it, and h on the polygon is largest at
-a corner. Each makes a bound larger by a share that falls with the square of the grid's step.
+h is stored at the points of a grid on the surface of a cube. It is convex with h(s u) = s h(u), so
+interpolation between grid points gives an upper bound. A rotation is bounded in the same way: an arc of
+directions lies in a circumscribed polygon, and h on the polygon is largest at a corner. Each step enlarges
+the bound by a share that decreases with the square of the grid's step.
 
-
-How far apart a frame of two models can be at most: proven for all configurations at once.
-
-Behind joint i, seen from A's home, let y be where B's frame is and d how far B's is from A's. In front of it
+Recursion. Let y be the position of B's frame behind joint i, in A's zero configuration, and d its difference
+from A's frame. In front of the joint
 
     d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d.
 
-All but the last are nothing where nothing differs. For each direction u the largest u . d' is at most the sum
-of the largest of each term, which support functions of y and d give (`urdfkin.model.mechanisms.upper_bound`).
-Where a single thing differs there is one term, and nothing is given away but what the grid costs; where
-several do, each may have its own worst configuration, and the bound is larger than the truth by what they do
-not share. Where nothing is but moved, the lengths of the ways add up to a bound that costs nothing.
+All terms but the last vanish if nothing differs. For each direction u, the largest u . d' is at most the sum
+of the largest values of the terms, which the support functions of y and d give. If one thing differs, there
+is one term, and only the grid enlarges the bound. If several differ, each may have its own worst
+configuration, and the bound is larger than the true maximum. If only fixed offsets differ, a sum of path
+lengths gives a second bound, without grid error.
 """
 
 from __future__ import annotations
@@ -42,17 +40,17 @@ from urdfkin.model.mechanisms.variables import Pair, Variables
 from urdfkin.model.tree import FloatArray
 
 _WHOLE = 2.0 * math.pi
-#: Corners of the polygon about a circle: they lie farther out by a thousandth.
+#: Number of corners of the polygon around a circle; the corners are 0.1 % farther out.
 _AROUND = 64
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Directions on a cube's surface.
+    """Directions on the surface of a cube.
 
     Attributes:
-        cells: Along an edge of a face.
-        segments: Into which a whole turn is divided.
+        cells: Number of cells along an edge of a face.
+        segments: Number of segments of a full turn.
     """
 
     cells: int
@@ -60,12 +58,12 @@ class Grid:
 
     @property
     def points(self) -> FloatArray:
-        """(n, 3) of largest coordinate 1."""
+        """The grid points (n, 3); the largest coordinate of each is 1."""
         return _points(self.cells)
 
     @property
     def lengths(self) -> FloatArray:
-        """(n,) of the points."""
+        """The lengths (n,) of the grid points."""
         return np.asarray(np.linalg.norm(self.points, axis=1))
 
 
@@ -86,13 +84,13 @@ def _points(cells: int) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Support:
-    """A bound on a support function, metres: its values at the grid's points."""
+    """An upper bound on a support function, metres: its values at the grid points."""
 
     grid: Grid
     values: FloatArray
 
     def at(self, u: FloatArray) -> FloatArray:
-        """(...) bounds at directions (..., 3) of any length; 0 at none."""
+        """Return bounds (...) for directions (..., 3) of any length; 0 for the zero vector."""
         cells, v = self.grid.cells, self.values
         x, y, z = u[..., 0].ravel(), u[..., 1].ravel(), u[..., 2].ravel()
         X, Y, Z = np.abs(x), np.abs(y), np.abs(z)
@@ -114,11 +112,11 @@ class Support:
             near = v[at] + up * (v[at + 1] - v[at])
             far = v[at + cells + 1] + up * (v[at + cells + 2] - v[at + cells + 1])
             found = (near + right * (far - near)) * largest
-        found[np.isnan(found)] = np.inf  # nothing of an infinite neighbour is not told from some
+        found[np.isnan(found)] = np.inf  # a zero weight times an infinite value: the bound is infinite
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def turned(self, screw: Screw, low: float, high: float) -> Support:
-        """Of the set turned about a screw by any angle of a range."""
+        """Return the support of the set rotated about a screw by any angle of a range."""
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
@@ -126,26 +124,29 @@ class Support:
         return Support(self.grid, best + G @ screw.point)
 
     def turned_back(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
-        """(angles, n) at the grid's points turned back about an axis, their part across it made longer."""
+        """Return the support (angles, n) at the grid points rotated back about an axis.
+
+        `factors` lengthen the component perpendicular to the axis.
+        """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
-        back = rotation_about(axis, angles)  # a row times R is R^T times the column
+        back = rotation_about(axis, angles)  # row vector times R equals R^T times the column vector
         across = (G - along) @ back * np.reshape(factors, (-1, 1, 1))
         return self.at(along + across)
 
     def slid(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Of the set slid along a direction by any way of a range."""
+        """Return the support of the set translated along a direction by any distance of a range."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             ways = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
         return Support(self.grid, self.values + ways)
 
     def moved(self, T: FloatArray) -> Support:
-        """Of the set after a rigid motion."""
+        """Return the support of the set after a rigid motion."""
         return Support(self.grid, self.at(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
 
     def radius(self, screw: Screw) -> float:
-        """How far from a screw's line the set comes at most, metres."""
+        """Return an upper bound (m) on the distance from a screw's line to any point of the set."""
         x, y, _ = axis_aligning(screw.direction).T
         corners = [
             factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in _corners(0.0, _WHOLE, _AROUND)
@@ -154,11 +155,11 @@ class Support:
         return float(max((self.at(u) - u @ screw.point).max(), 0.0))
 
     def largest(self) -> float:
-        """How far from the origin the set comes at most, metres.
+        """Return an upper bound (m) on the distance from the origin to any point of the set.
 
-        A direction between grid points g_k is a sum of them, c_k g_k, all within r of the middle of their
-        cell; so its length is cos r times that of all c_k |g_k| at least, and h there 1 / cos r of theirs at
-        most.
+        A direction between grid points g_k is a sum c_k g_k, all within an angle r of the cell's centre. So
+        its length is at least cos r times the sum of c_k |g_k|. Hence h per unit length there is at most
+        1 / cos r times the largest h per unit length at the g_k.
         """
         share = (self.values / self.grid.lengths).max(initial=0.0)
         return float(share) / math.cos(math.atan(math.sqrt(2.0) / self.grid.cells))
@@ -168,12 +169,12 @@ class Support:
 
 
 def point(grid: Grid, p: FloatArray) -> Support:
-    """Of a single point."""
+    """Return the support of a single point."""
     return Support(grid, grid.points @ p)
 
 
 def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]]:
-    """Angles and lengths of the corners of a polygon that holds an arc of radius 1."""
+    """Return angles and lengths of the corners of a polygon that contains an arc of radius 1."""
     if high - low >= _WHOLE:
         half = math.pi / segments
         return [(2.0 * half * k, 1.0 / math.cos(half)) for k in range(segments)]
@@ -185,19 +186,19 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
     return [(low, 1.0), *middles, (high, 1.0)]
 
 
-#: For every frame; for the one that is farthest.
+#: Grids: coarse for every frame, fine for the frame with the largest bound.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
-#: A joint that turns more often is bounded as a whole.
+#: Largest number of values of a variable that are treated one by one.
 MOST_VALUES = 1024
 
 
 def upper_bounds(
     found: Alignment, variables: Variables, frame: FramePair, grid: Grid = COARSE
 ) -> tuple[float, float]:
-    """(m, rad) that a frame's places, and its orientations, are apart at most, within limits.
+    """Return upper bounds (m, rad) on the distance and the angle between a frame in A and B, within limits.
 
-    0 where nothing on its way differs; inf where a joint that nothing bounds lets it grow, or a joint is of
-    another kind.
+    The bounds are 0 if nothing differs on the path. They are inf if an unlimited joint makes the difference
+    grow without bound, or if two joints are of different kinds.
     """
     steps, pairs = behind_first(found, variables, frame)
     if not steps and frame.end is IDENTITY:
@@ -205,7 +206,7 @@ def upper_bounds(
     if any(step.unlike and pair is None for step, pair in zip(steps, pairs, strict=True)):
         return math.inf, math.inf
     radians = _radians(steps, pairs, variables, frame)
-    if not steps:  # nothing that moves it one way in A and another in B: as far off everywhere
+    if not steps:  # no joint on the path differs: the difference is the same in every configuration
         d = frame.end[:3, :3] @ frame.home[:3, 3] + frame.end[:3, 3] - frame.home[:3, 3]
         return float(np.linalg.norm(d)), radians
     return _metres(steps, pairs, variables, frame, grid), radians
@@ -214,7 +215,7 @@ def upper_bounds(
 def behind_first(
     found: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[Step], list[Pair | None]]:
-    """The steps on the way to a frame, and their values, from the first one that differs."""
+    """Return the steps on the path to a frame, and their values, from the first step that differs."""
     steps = found.path(frame.previous)
     pairs = [variables.pairs[i] for i in found.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -228,14 +229,14 @@ def _differs(step: Step, pair: Pair | None) -> bool:
 def _radians(
     steps: Sequence[Step], pairs: Sequence[Pair | None], variables: Variables, frame: FramePair
 ) -> float:
-    """The angle of a product of rotations is at most the sum of theirs."""
+    """Return a bound (rad) on the frame's angle: that of a product is at most the sum of the angles."""
     total = apart(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
         total += apart(IDENTITY, step.before)[0]
         if step.kind != "turns" or pair is None:
             continue
         if step.other is not step.axis:
-            # Q R Q^T R^T, of a turn by t and a tilt by s: sin(its quarter) = sin(s/2) sin(t/2).
+            # Q R Q^T R^T, rotation by t, tilt by s: sin(a quarter of its angle) = sin(s/2) sin(t/2).
             most = min(max(map(abs, variables.range(pair.b))), math.pi)
             total += 4.0 * math.asin(math.sin(step.tilt / 2.0) * math.sin(most / 2.0))
         if pair.a != pair.b:
@@ -256,13 +257,13 @@ def _metres(
 
 
 def _off(L: FloatArray, reach: float) -> float:
-    """How far (m) L moves any point within reach at most: |(R - 1) y + p|, y before L or behind it."""
+    """Return a bound (m) on |(R - 1) y + p|: how far L moves a point with |y| up to `reach`."""
     turned, moved = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
     return moved + turned * reach if turned else moved
 
 
 def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """D and y behind the last joint."""
+    """Return the supports of d and y behind the last joint."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
@@ -271,8 +272,8 @@ def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def passed(
     step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """D and y in front of a step, from those behind it."""
-    if pair is None:  # a planar or floating joint may turn to where it is worst, and go anywhere
+    """Return the supports of d and y in front of a step, from those behind it."""
+    if pair is None:  # a planar or floating joint may rotate to the worst direction, and has no limits
         d = Support(d.grid, d.largest() * d.grid.lengths)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
     else:
@@ -283,7 +284,7 @@ def passed(
 
 
 def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
-    """D and y in front of a step's L."""
+    """Return the supports of d and y in front of a step's L."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
@@ -291,7 +292,7 @@ def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
 
 
 def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Support) -> Support:
-    """Of (e(S' t') - e(S t)) y + e(S t) d, over what t and t' range over."""
+    """Return the support of (e(S' t') - e(S t)) y + e(S t) d, over the ranges of t and t'."""
     same = step.other is step.axis and pair.a == pair.b
     if step.kind == "turns":
         about = Screw(step.axis.direction, np.zeros(3))
@@ -299,13 +300,13 @@ def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Supp
             return d.turned(about, *variables.range(pair.a)) if d.values.any() else d
         z = _values(pair, variables, d.grid)
         if z is not None:
-            return _together(step, pair, z, y, d)
-        return d.turned(about, *variables.range(pair.a)) + _set_off(step, pair, variables, y)
-    return d if same else d + _slid_apart(step, pair, variables, y.grid)
+            return _common_difference(step, pair, z, y, d)
+        return d.turned(about, *variables.range(pair.a)) + _independent_difference(step, pair, variables, y)
+    return d if same else d + _prismatic_difference(step, pair, variables, y.grid)
 
 
-def _slid_apart(step: Step, pair: Pair, variables: Variables, grid: Grid) -> Support:
-    """Of two slides' difference, which is largest at the ends of their ranges."""
+def _prismatic_difference(step: Step, pair: Pair, variables: Variables, grid: Grid) -> Support:
+    """Return the support of the difference of two translations; it is largest at the ends of the ranges."""
     if (name := pair.variable) is not None:
         ends = [(z, z) for z in variables.ranges.get(name, (0.0, 0.0))]
         values = [
@@ -327,7 +328,7 @@ def _slid_apart(step: Step, pair: Pair, variables: Variables, grid: Grid) -> Sup
 
 
 def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
-    """(n,) values of the variable that moves a turning joint in both models; None where one is not enough."""
+    """Return values (n,) of the variable of a revolute joint; None without one common bounded variable."""
     if (name := pair.variable) is None:
         return None
     low, high = variables.ranges[name]
@@ -340,13 +341,14 @@ def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
     return np.linspace(low, high, count + 1) if count <= MOST_VALUES else None
 
 
-def _together(step: Step, pair: Pair, z: FloatArray, y: Support, d: Support) -> Support:
-    """The same where one variable moves both: from each of its values to the next, the larger ends.
+def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Support) -> Support:
+    """Return the support of a joint's difference if one variable moves it in both models.
 
-    Between two values h apart a function exceeds both by h^2/8 of its second derivative at most. Where t' = t
-    + c that is R' P' x' - R P x, with x the way from the axis to y, P what takes its part across, and R' a
-    turn about the other axis: |R' - R| <= 2 |u' - u| + |c|, |P' - P| <= |u' - u|, and x' - x lies across by
-    what the axes are off. Else it is no more than what either turn has, squared with its rate.
+    Between two values of the variable, h apart, the bound is the larger end plus h^2/8 of the largest second
+    derivative. For t' = t + c this derivative is R' P' x' - R P x. Here x is the vector from the axis to y, P
+    projects perpendicular to the axis, and R' rotates about the other axis: |R' - R| <= 2 |u' - u| + |c|,
+    |P' - P| <= |u' - u|, and the perpendicular part of x' - x is the offset of the axes. Otherwise it is at
+    most the sum for the two rotations, each times its squared slope.
     """
     G = y.grid.points
     axis, other = step.axis, step.other
@@ -374,10 +376,11 @@ def _together(step: Step, pair: Pair, z: FloatArray, y: Support, d: Support) -> 
     return Support(y.grid, between.max(axis=0))
 
 
-def _set_off(step: Step, pair: Pair, variables: Variables, y: Support) -> Support:
-    """Of (e(S' t') - e(S t)) y where t' and t are moved by two variables, or by one without end.
+def _independent_difference(step: Step, pair: Pair, variables: Variables, y: Support) -> Support:
+    """Return the support of (e(S' t') - e(S t)) y if two variables, or an unlimited one, move t' and t.
 
-    Set off along a chord by what the values differ by; where the axis is another one too, all of either turn.
+    With one common axis, the bound is the chord of the largest difference of t' and t. With different axes,
+    it is the sum of the full ranges of both rotations.
     """
     G, u = y.grid.points, step.axis.direction
     if step.other is not step.axis:

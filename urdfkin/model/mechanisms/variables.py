@@ -1,8 +1,8 @@
-"""What the joints of both models stand at, as lines in shared variables, and how far those range.
+"""The joint values of both models as linear functions of shared variables, and the ranges of the variables.
 
-A's coordinates are variables; B's follow from them by sense and zero of the joints, so that each joint's
-value is a constant and a multiple of a variable in either model. What B can do and A cannot (a follower that
-is free there, a joint that is fixed in A) is a variable of its own.
+A's coordinates are variables. B's coordinates follow from them by the senses and zeros of the joints. So each
+joint value of either model is a constant plus a multiple of one variable. A motion that only B has is a
+variable of its own: a mimic joint that is independent in B, or a joint that is fixed in A.
 """
 
 from __future__ import annotations
@@ -18,35 +18,35 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """constant + slope * variable; no variable where the slope is 0."""
+    """constant + slope * variable; the variable has no meaning if the slope is 0."""
 
     variable: str
     slope: float
     constant: float
 
     def moved(self, slope: float, constant: float) -> Line:
-        """The line of slope * self + constant."""
+        """Return the line slope * self + constant."""
         return Line(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
-        """Its value."""
+        """Return the value of the line."""
         return self.constant + (self.slope * values[self.variable] if self.slope else 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """The values of one step's joint in both models, both as A counts it."""
+    """The values of one step's joint in both models, both as A's coordinate."""
 
     a: Line
     b: Line
-    #: What B's file calls the value: sense * b + offset.
+    #: The value in B's own coordinate: sense * b + offset.
     written: Line
     #: Difference of the constants (rad or m) that counts as rounding, beyond that of one step.
     rounding: float = 0.0
 
     @property
     def variable(self) -> str | None:
-        """What alone moves both; None where two variables do."""
+        """The one variable that moves both; None if there are two."""
         if self.a.slope and self.b.slope and self.a.variable != self.b.variable:
             return None
         return self.a.variable if self.a.slope else self.b.variable
@@ -54,15 +54,15 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variables:
-    """Values of all steps and what they range over.
+    """The values of all steps and the ranges of the variables.
 
     Attributes:
-        pairs: For each step, None for planar and floating joints.
-        ranges: Of each variable, rad or m; infinite where nothing bounds it.
-        freer_a: Steps (indices) whose joint is free in A and follows in B.
-        freer_b: Likewise the other way.
-        rules: Steps whose joint follows by another rule in B.
-        leaders: B's coordinates by the names of their joints.
+        pairs: For each step; None for planar and floating joints.
+        ranges: Of each variable, rad or m; infinite without a limit.
+        freer_a: Steps (indices) with a joint that is independent in A and a mimic joint in B.
+        freer_b: Steps (indices) with a joint that is independent in B and a mimic joint in A.
+        rules: Steps (indices) with different mimic rules in A and B.
+        leaders: B's coordinates, by joint name.
     """
 
     pairs: tuple[Pair | None, ...]
@@ -73,14 +73,14 @@ class Variables:
     leaders: dict[str, Line]
 
     def range(self, line: Line) -> tuple[float, float]:
-        """Between what a line's values lie."""
+        """Return the smallest and the largest value of a line."""
         if not line.slope:
             return line.constant, line.constant
         ends = sorted(line.slope * end + line.constant for end in self.ranges[line.variable])
         return ends[0], ends[1]
 
     def off(self, pair: Pair) -> float:
-        """By how much (rad, m) a joint's values differ at most."""
+        """Return the largest difference (rad, m) between a joint's values in A and B."""
         if (variable := pair.variable) is not None:
             low, high = self.range(
                 Line(variable, pair.b.slope - pair.a.slope, pair.b.constant - pair.a.constant)
@@ -92,7 +92,7 @@ class Variables:
 
 
 def variables_of(found: Alignment, tolerance: Tolerance) -> Variables:
-    """The lines of all steps of an alignment."""
+    """Return the values of all steps of an alignment, and the ranges of their variables."""
     return _Maker(found, tolerance).make()
 
 
@@ -105,7 +105,10 @@ class _Maker:
         self.deepest = found.deepest
 
     def _leaders(self) -> dict[str, Line]:
-        """Each coordinate of B as a line in A's, or as a variable of its own: A's own coordinates first."""
+        """Return each coordinate of B as a line in A's, or as its own variable.
+
+        A's independent joints come first.
+        """
         tree, used, lines = self.trees[1], set[str](), dict[str, Line]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
         followers_last = sorted(own, key=self._follows_in_a)
@@ -169,7 +172,7 @@ class _Maker:
         return Variables(tuple(pairs), ranges, tuple(freer_a), tuple(freer_b), tuple(rules), self.leaders)
 
     def _alike(self, a: Line, b: Line) -> bool:
-        """Whether two lines differ by rounding only; a slope counts for a turn or a metre.
+        """Return whether two lines differ by rounding only; a slope counts for a turn or a metre.
 
         A rule's constant compares the zeros of two joints. Each zero is found from poses at the end of a
         path, which are as inexact as all steps of the path together. A slope depends on no zero: the
@@ -183,9 +186,10 @@ class _Maker:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[Pair | None]) -> dict[str, tuple[float, float]]:
-        """The limits of each coordinate, in both models where it moves both; A's where they share nothing.
+        """Return the limits of each coordinate.
 
-        A mimic joint obeys its rule, not its limits: those count only where the coordinate has none.
+        They are the intersection of both models' limits if it moves joints of both; A's if that is empty. A
+        mimic joint obeys its rule, not its limits: its limits count only for a coordinate without limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}
@@ -193,7 +197,7 @@ class _Maker:
         for step, pair in zip(self.found.steps, pairs, strict=True):
             for k, j in enumerate((step.a, step.b)):
                 joint = self.trees[k].joints[j]
-                if pair is None:  # joints of two kinds, each moved by its own coordinate
+                if pair is None:  # joints of two kinds, each with its own coordinate
                     if step.unlike and joint.nq == 1:
                         own[f"{'ab'[k]}:{joint.name}"] = limits(joint)
                     continue
@@ -216,7 +220,7 @@ class _Maker:
 
 
 def limits(joint: Joint) -> tuple[float, float]:
-    """Between what a joint's value lies, infinite where nothing says."""
+    """Return the limits of a joint's value; infinite without limits."""
     if joint.kind is JointKind.CONTINUOUS or joint.limit is None:
         return -math.inf, math.inf
     low, high = sorted((joint.limit.lower, joint.limit.upper))
