@@ -66,7 +66,10 @@ PROGRAMS = [
 ]
 
 
-REFUSALS = "the expression .* is not allowed|not allowed in expressions|is not a function|may not index|'\\w+' is not defined"
+REFUSALS = (
+    "the expression .* is not allowed|not allowed in expressions|is not a function|may not index"
+    "|'\\w+' is not defined"
+)
 
 
 @pytest.mark.slow

@@ -202,7 +202,7 @@ def test_settings_beyond_the_repository_are_not_taken(here: Path, monkeypatch: p
         ("ignore = ['URDF5O3']", "[tool.urdfkin]: ignore: unknown code 'URDF5O3'; did you mean"),
         ("per-file-ignores = { x = 'URDF503' }", "per-file-ignores must be a table of lists of strings"),
         ("baseline = 'no.json'", "no.json: no such baseline; "),
-        ("ignore = [", "pyproject.toml: not TOML: found "),
+        ("ignore = [", "pyproject.toml: this file is not TOML: found "),
     ],
 )
 def test_a_wrong_setting_is_told_with_its_place(here: Path, text: str, message: str) -> None:

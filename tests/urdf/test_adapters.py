@@ -151,7 +151,7 @@ def test_a_quaternion_that_yourdfpy_dropped_is_no_secret(tmp_path: Path) -> None
 def test_a_yourdfpy_robot_in_two_pieces_is_refused() -> None:
     robot = yourdfpys(file("polar"))
     robot.robot.joints.pop()
-    with pytest.raises(InputError, match="a robot has one root link"):
+    with pytest.raises(InputError, match="a robot must have one root link"):
         urdfkin.load(robot)
 
 

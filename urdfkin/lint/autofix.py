@@ -55,28 +55,28 @@ def mend(
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
         chosen = filter(choose(), now.findings)
-        offered = [finding for finding in chosen if finding.fix and finding.code not in kept]
-        if not offered:
+        candidates = [finding for finding in chosen if finding.fix and finding.code not in kept]
+        if not candidates:
             break
-        code = offered[0].code
+        code = candidates[0].code
         if error := next((f.code for f in now.findings if f.severity is Severity.ERROR), None):
-            kept |= {finding.code: f"the file has an error ({error}), fix it first" for finding in offered}
+            kept |= {finding.code: f"the file has an error ({error}), fix it first" for finding in candidates}
             break
-        these = {id(f.fix): f for f in offered if f.code == code}
-        data, taken = apply(now.text.data, (f.fix for f in these.values() if f.fix))
-        cured = [these[id(fix)] for fix in taken]
+        by_fix = {id(f.fix): f for f in candidates if f.code == code}
+        data, applied = apply(now.text.data, (f.fix for f in by_fix.values() if f.fix))
+        fixable = [by_fix[id(fix)] for fix in applied]
         after = look(replace(now.text, data=data))
-        if objection := next(_objections(now, after, cured), None):
+        if objection := next(_objections(now, after, fixable), None):
             kept[code] = objection
         else:
             now = after
-            fixed += cured
+            fixed += fixable
     return Mended(now.text, tuple(fixed), kept)
 
 
-def _objections(before: Examined, after: Examined, cured: list[Finding]) -> Iterator[str]:
+def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     """Yield the reasons against a fix."""
-    code = cured[0].code
+    code = fixable[0].code
     # Skip kinds beyond the limit of complete findings: others replace the fixed ones.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
@@ -85,14 +85,14 @@ def _objections(before: Examined, after: Examined, cured: list[Finding]) -> Iter
     )
     if appeared := new - old:
         yield f"it would cause {min(code for code, *_ in appeared)}"
-    if sum(f.count for f in before.findings) - sum(f.count for f in after.findings) < len(cured):
+    if sum(f.count for f in before.findings) - sum(f.count for f in after.findings) < len(fixable):
         yield f"{code} would still be there"
     if before.robot is None or after.robot is None:
         if before.robot is not after.robot:
             yield "the result would not be a URDF"
         return
     turns = defaultdict[str, float](float)
-    for finding in cured:
+    for finding in fixable:
         turns[finding.name or ""] += finding.fix.turns if finding.fix else 0.0
     yield from differences(before.robot, after.robot, turns)
 

@@ -86,7 +86,7 @@ def read_baseline(path: Path) -> Baseline:
         )
     except (ValueError, TypeError, LookupError, RecursionError):
         raise InputError(
-            "not a baseline of urdfkin",
+            "this file is not a baseline of urdfkin",
             where=str(path),
             remedy="write one with: urdfkin check --write-baseline FILE ...",
         ) from None

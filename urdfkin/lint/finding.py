@@ -69,16 +69,16 @@ class Excerpts:
         first = max(start - BEFORE, 0) if len(self.text) > SHOWN else 0
         last = first + SHOWN
         end = min(start + finding.width, last)
-        before, meant, behind = map(
-            _shown, (self.text[first:start], self.text[start:end], self.text[end:last])
+        before, marked, behind = map(
+            _printable, (self.text[first:start], self.text[start:end], self.text[end:last])
         )
         lead, tail = "..." if first else "", "..." if len(self.text) > last else ""
         number = f"{finding.line:>3}"
-        caret = " " * (_cells(lead) + _cells(before)) + "^" * max(_cells(meant), 1)
-        return f"{number} | {lead}{before}{meant}{behind}{tail}\n{' ' * len(number)} | {caret}"
+        caret = " " * (_cells(lead) + _cells(before)) + "^" * max(_cells(marked), 1)
+        return f"{number} | {lead}{before}{marked}{behind}{tail}\n{' ' * len(number)} | {caret}"
 
 
-def _shown(text: str) -> str:
+def _printable(text: str) -> str:
     return printable(text.replace("\t", _TAB))
 
 
@@ -202,7 +202,7 @@ class Finding:
         return 1 + len(self.also)
 
     @property
-    def _again(self) -> str:
+    def _others(self) -> str:
         """The number of further findings and their lines."""
         others = tuple(sorted(set(self.also) - {self.line}))
         if len(others) == len(self.also):
@@ -216,9 +216,9 @@ class Finding:
         """The finding in one line, without its position and code."""
         subject = f"{self.subject}: " if self.element and self.name is not None else ""
         found = f": found {self.found}" if self.found else ""
-        again = f" ({self._again})" if self.also else ""
+        also = f" ({self._others})" if self.also else ""
         remedy = f"; {self.remedy}" if self.remedy else ""
-        return f"{subject}{self.message}{found}{again}{remedy}"
+        return f"{subject}{self.message}{found}{also}{remedy}"
 
     def __str__(self) -> str:
         place = f"{printable(self.file)}:{self.line}:{self.column}"
@@ -270,7 +270,7 @@ class UrdfError(UrdfkinError, ValueError):
         super().__init__(
             f"the URDF has {count}",
             where=file,
-            remedy=f"'urdfkin explain {errors[0].code}' tells more" if errors else None,
+            remedy=f"run 'urdfkin explain {errors[0].code}' for details" if errors else None,
         )
 
     def __str__(self) -> str:

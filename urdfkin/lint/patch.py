@@ -33,7 +33,7 @@ def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -
     if before == after:
         return ""
     name = _relative(file)
-    text = _unified(name, before, after)
+    text = _unified_diff(name, before, after)
     if shown(text) == text:
         return text
     lines = shown(text.replace("\r", "\\r")).splitlines()
@@ -46,10 +46,10 @@ def _relative(file: str) -> str:
     return file if below.startswith(os.pardir) else Path(below).as_posix()
 
 
-def _unified(name: str, before: bytes, after: bytes) -> str:
+def _unified_diff(name: str, before: bytes, after: bytes) -> str:
     # A tab after the name allows spaces in it.
     end = "\t" if " " in name else ""
-    old, new = (f"{_quoted(f'{side}/{name}')}{end}" for side in "ab")
+    old, new = (f"{_quote(f'{side}/{name}')}{end}" for side in "ab")
     found = difflib.unified_diff(_lines(before.decode()), _lines(after.decode()), old, new)
     return "".join(line if line.endswith("\n") else f"{line}\n{_NO_END}" for line in found)
 
@@ -59,7 +59,7 @@ def _lines(text: str) -> list[str]:
     return [*(f"{line}\n" for line in text.split("\n")[:-1]), *filter(None, text.split("\n")[-1:])]
 
 
-def _quoted(name: str) -> str:
+def _quote(name: str) -> str:
     """Quote a name like git, if it contains a quote, a control character or a non-ASCII letter."""
     if name.isascii() and name.isprintable() and not set(name) & {'"', "\\"}:
         return name
@@ -75,13 +75,13 @@ def _binary(name: str, before: bytes, after: bytes) -> str:
         (folder for folder in (Path.cwd(), *Path.cwd().parents) if (folder / ".git").exists()), Path.cwd()
     )
     place = os.path.relpath(name, top)
-    old, new = (_quoted(f"{side}/{Path(place).as_posix()}") for side in "ab")
+    old, new = (_quote(f"{side}/{Path(place).as_posix()}") for side in "ab")
     digests = (hashlib.sha1(b"blob %d\0" % len(data) + data).hexdigest() for data in (before, after))
     head = f"diff --git {old} {new}\nindex {'..'.join(digests)}\nGIT binary patch\n"
-    return head + "".join(f"literal {len(data)}\n{_encoded(data)}\n" for data in (after, before))
+    return head + "".join(f"literal {len(data)}\n{_encode(data)}\n" for data in (after, before))
 
 
-def _encoded(data: bytes) -> str:
+def _encode(data: bytes) -> str:
     packed = zlib.compress(data)
     pieces = (packed[i : i + _IN_A_LINE] for i in range(0, len(packed), _IN_A_LINE))
     return "".join(f"{_length(len(piece))}{base64.b85encode(piece, pad=True).decode()}\n" for piece in pieces)

@@ -180,7 +180,7 @@ def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = 
     sound = check_structure(report, robot)
     check_axes(report, robot)
     check_ranges(report, robot)
-    check_mimic(report, robot, obeyed=mimic)
+    check_mimic(report, robot, enabled=mimic)
     check_suspicious(report, robot, sound=sound)
     check_inertials(report, robot)
     check_shapes(report, robot)

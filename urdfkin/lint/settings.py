@@ -99,7 +99,7 @@ def read_settings(file: Path) -> Settings:
     """
     if (found := _table(file, pipes=True)) is None:
         raise InputError(
-            "no table [tool.urdfkin]", where=str(file), remedy="write one, or leave out --config"
+            "no table [tool.urdfkin]", where=str(file), remedy="add this table, or omit --config"
         )
     return _check_settings(file, found)
 
@@ -108,13 +108,13 @@ def _table(file: Path, *, pipes: bool = False) -> Any:
     try:
         return tomllib.loads(read_text(file, pipes=pipes)).get("tool", {}).get("urdfkin")
     except (tomllib.TOMLDecodeError, AttributeError, RecursionError) as error:
-        raise InputError("not TOML", where=str(file), found=str(error)) from None
+        raise InputError("this file is not TOML", where=str(file), found=str(error)) from None
 
 
 def _check_settings(file: Path, table: Any) -> Settings:
     where = f"{file} [tool.urdfkin]"
     if not isinstance(table, dict):
-        raise InputError("not a table", where=where, found=repr(table))
+        raise InputError("this setting is not a table", where=where, found=repr(table))
     for name, value in table.items():
         if name not in _KINDS:
             raise UnknownNameError("setting", name, _KINDS, where=where)
@@ -122,7 +122,7 @@ def _check_settings(file: Path, table: Any) -> Settings:
         lists = (
             [value] if kind is list else [*value.values()] if kind is dict and isinstance(value, dict) else []
         )
-        if not isinstance(value, kind) or not all(_is_words(each) for each in lists):
+        if not isinstance(value, kind) or not all(_is_list_of_strings(each) for each in lists):
             raise InputError(f"{name} must be {_WORDS[kind]}", where=where, found=repr(value))
         if name in ("select", "ignore", "per-file-ignores"):
             try:
@@ -130,11 +130,11 @@ def _check_settings(file: Path, table: Any) -> Settings:
             except UnknownNameError as error:
                 raise InputError(f"{name}: {error.what}", where=where, remedy=error.remedy) from None
     if "baseline" in table and not exists(baseline := file.parent / table["baseline"]):
-        raise SourceError("no such baseline", where=str(baseline), remedy=f"{where} names it")
+        raise SourceError("no such baseline", where=str(baseline), remedy=f"change the setting in {where}")
     return Settings(file, table)
 
 
-def _is_words(value: Any) -> bool:
+def _is_list_of_strings(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(word, str) for word in value)
 
 

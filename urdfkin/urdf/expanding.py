@@ -96,7 +96,9 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
     except xacro.XacroException as error:
         if isinstance(error.exc, RefusedError):
             return
-    raise RefusedError("this version of xacro evaluates expressions in a way that is not known here")
+    raise RefusedError(
+        "this version of xacro evaluates expressions in an unknown way; urdfkin does not support it"
+    )
 
 
 def _tables(symbols: Mapping[str, Any]) -> Iterator[dict[str, Any]]:

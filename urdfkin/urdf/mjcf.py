@@ -119,8 +119,8 @@ class Mjcf:
         mujoco, (kind, i) = library(), frame
         what = mujoco.mjtObj.mjOBJ_BODY if kind == "body" else mujoco.mjtObj.mjOBJ_SITE
         name = mujoco.mj_id2name(self.model, what, i)
-        there = mujoco.mj_name2id(self.fused, what, name) if name else -1
-        return (kind, there) if there >= 0 else None
+        index = mujoco.mj_name2id(self.fused, what, name) if name else -1
+        return (kind, index) if index >= 0 else None
 
     def lengths(self, q: FloatArray) -> FloatArray:
         """Return the sum (n, frames), in m, of the lengths from the world to each frame, for error bounds."""
@@ -259,12 +259,12 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
     fused = None
     try:
         spec = _spec(mujoco, source)
-        aligned, fuses = list(_aligned(mujoco, spec)), bool(spec.compiler.fusestatic)
+        aligned, fuses = list(_aligned_bodies(mujoco, spec)), bool(spec.compiler.fusestatic)
         if whole and fuses:
             _refuse_fused(aligned, name)
             fused = compiled(_spec(mujoco, source))
         spec.compiler.fusestatic = False
-        left = list(_left_out(mujoco, spec))
+        notes = list(_left_out(mujoco, spec))
         if not whole:
             _strip(mujoco, spec)
         model = compiled(spec)
@@ -283,15 +283,15 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         found = str(error).strip().replace("\n", "; ")
         raise InputError("MuJoCo does not accept this MJCF", where=name, found=found) from None
-    left += [_align_note(body.name, whole=whole) for body in aligned]
-    listed = (*reader.listed, *left)
+    notes += [_align_note(body.name, whole=whole) for body in aligned]
+    listed = (*reader.listed, *notes)
     return Mjcf(
         tree,
         model,
         fused,
         reader.frames,
         reader.coordinates,
-        reader.taken,
+        reader.mimic_equalities,
         frozenset(reader.apart),
         listed,
         whole,
@@ -306,15 +306,15 @@ def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     return spec
 
 
-def _aligned(mujoco: Any, spec: Any) -> Iterator[Any]:
+def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
     """Yield the free bodies that MuJoCo aligns with their inertial frame; they have no moving descendants."""
     kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
     for joint in spec.joints:
         if joint.type != kinds.mjJNT_FREE:
             continue
-        wanted = spec.compiler.alignfree if joint.align == choices.mjALIGNFREE_AUTO else joint.align
+        align = spec.compiler.alignfree if joint.align == choices.mjALIGNFREE_AUTO else joint.align
         bodies = joint.parent.bodies
-        if wanted and not (bodies and not spec.compiler.fusestatic) and not _moving_below(joint.parent):
+        if align and not (bodies and not spec.compiler.fusestatic) and not _moving_below(joint.parent):
             yield joint.parent
 
 
@@ -332,7 +332,7 @@ def _refuse_fused(aligned: list[Any], name: str) -> None:
     for body in aligned:
         if body.bodies:
             raise InputError(
-                "MuJoCo fuses static bodies into a free body and aligns its frame with the inertia of all",
+                "MuJoCo fuses static bodies into a free body and aligns its frame with their common inertia",
                 where=f"{name}: body {body.name}",
                 remedy='write fusestatic="false" or align="false"',
             )
@@ -373,15 +373,15 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
     """Yield the parts of a file that the tree does not represent, except equalities between joints."""
     for i, one in enumerate(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
-            kind, names = str(one.type).rpartition("_")[2].lower(), _joined(one.name1, one.name2)
+            kind, names = str(one.type).rpartition("_")[2].lower(), _join_names(one.name1, one.name2)
             what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot represent"
             yield Listed(what, f"equality {one.name or i}", moves=bool(one.active))
-    gone = dict(_useless(spec))
+    useless = dict(_useless(spec))
     for words in ("tendons", "flexes"):
-        if words in gone:
+        if words in useless:
             yield Listed(f"{words} have no effect here", words, moves=True)
-    if gone:
-        counts = ", ".join(f"{len(found)} {words}" for words, found in gone.items())
+    if useless:
+        counts = ", ".join(f"{len(found)} {words}" for words, found in useless.items())
         yield Listed(f"left out, since kinematics does not use them: {counts}")
 
 
@@ -403,7 +403,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
         body.inertia, body.iquat, body.fullinertia = (1.0,) * 3, (1.0, 0.0, 0.0, 0.0), (np.nan,) * 6
 
 
-def _joined(*names: str) -> str:
+def _join_names(*names: str) -> str:
     return " and ".join(name for name in names if name)
 
 
@@ -418,7 +418,7 @@ class _Reader:
     frames: dict[str, tuple[str, int]] = field(default_factory=dict)
     coordinates: dict[str, int] = field(default_factory=dict)
     listed: list[Listed] = field(default_factory=list)
-    taken: dict[int, str] = field(default_factory=dict)
+    mimic_equalities: dict[int, str] = field(default_factory=dict)
     apart: set[int] = field(default_factory=set)
     _joints: list[tuple[Joint, str, str]] = field(default_factory=list)
     _names: dict[str, set[str]] = field(default_factory=lambda: {"link": set(), "joint": set()})
@@ -527,13 +527,13 @@ class _Reader:
                 self.listed.append(Listed("a constraint that is not active", where))
                 continue
             if rule is None:
-                names = _joined(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
+                names = _join_names(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
                 what = f"a constraint ({names}) that is not linear in one other joint"
             elif rule[0] in rules or _leads(rules, rule[1].leader, rule[0]):
                 what = f"joint {rule[0]} has two rules, or its rules form a circle"
             else:
                 rules[rule[0]] = rule[1]
-                self.taken[i] = rule[0]
+                self.mimic_equalities[i] = rule[0]
                 continue
             self.apart.add(i)
             self.listed.append(Listed(what, where, moves=True))

@@ -101,13 +101,15 @@ def _rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Jo
 def _root(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
-        raise InputError("a robot has one root link", where=name, found=", ".join(sorted(roots)) or "none")
+        raise InputError(
+            "a robot must have one root link", where=name, found=", ".join(sorted(roots)) or "none"
+        )
     return roots.pop()
 
 
 def _root_kind(word: str) -> JointKind:
     if word not in ("floating", "planar"):
-        raise InputError("root_joint is 'floating', 'planar' or None", found=repr(word))
+        raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(word))
     return JointKind(word)
 
 

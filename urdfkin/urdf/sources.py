@@ -91,13 +91,13 @@ class Origin:
         >>> Origin("panda", mimic=False).python
         "urdfkin.load('panda', mimic=False)"
         """
-        given = {
+        values = {
             "mimic": self.mimic,
             "root_joint": self.root_joint,
             "xacro_args": dict(self.xacro_args) or None,
             "oracle": self.oracle,
         }
-        arguments = [f"{name}={value!r}" for name, value in given.items() if value is not None]
+        arguments = [f"{name}={value!r}" for name, value in values.items() if value is not None]
         return f"urdfkin.load({', '.join([repr(self.again), *arguments])})"
 
 
@@ -145,11 +145,11 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
         InputError: the type of the source is wrong.
     """
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
-        raise InputError("xacro_args are a mapping from names to values", found=safe_repr(xacro_args))
+        raise InputError("xacro_args must be a mapping from names to values", found=safe_repr(xacro_args))
     if isinstance(source, str) and (address := split_uri(source)) is not None:
         source = _in_package(*address)
     if is_xacro(source):
-        return _expanded(at_home(source), xacro_args or {})
+        return _expand_xacro(at_home(source), xacro_args or {})
     if xacro_args:
         raise InputError(
             "xacro_args go with the path of a .xacro file", found=", ".join(map(str, xacro_args))
@@ -159,12 +159,12 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     if isinstance(source, os.PathLike):
         return _read_file(Path(source), most)
     if isinstance(source, str):
-        return _read_word(source, most)
+        return _read_string(source, most)
     if hasattr(source, "read"):
         label = str(getattr(source, "name", "<file>"))
-        return _encoded(source.read(most + 1), label, label)
+        return _encode(source.read(most + 1), label, label)
     raise InputError(
-        "a robot comes from a path, a catalogue name, URDF text, bytes or an open file",
+        "the source must be a path, a catalogue name, URDF text, bytes or an open file",
         found=type(source).__name__,
     )
 
@@ -180,14 +180,14 @@ def is_xacro(source: object) -> TypeGuard[str | os.PathLike[str]]:
     return isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == ".xacro"
 
 
-def _expanded(path: Path, arguments: Mapping[str, object]) -> Text:
+def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> Text:
     from urdfkin.urdf.xacro import expand  # noqa: PLC0415  only .xacro files need it
 
     words = {name: str(value) for name, value in arguments.items()}
     return Text(expand(path, words), f"{path} (expanded)", as_word(path), xacro_args=tuple(words.items()))
 
 
-def _read_word(word: str, most: int) -> Text:
+def _read_string(word: str, most: int) -> Text:
     if not word.strip():
         raise InputError(
             "the robot's name is empty",
@@ -197,7 +197,7 @@ def _read_word(word: str, most: int) -> Text:
     if word == "-":
         return Text(read_start_of_standard_input(most + 1), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):
-        return _encoded(word, "<text>", "<text>")
+        return _encode(word, "<text>", "<text>")
     if (entry := catalogue().get(word)) is not None:
         read = _read_file(entry.path, most)
         return Text(read.data, read.label, word, entry)
@@ -220,7 +220,7 @@ def _in_package(name: str, path: str) -> Path:
     return folder / path
 
 
-def _encoded(content: str | bytes, label: str, source: str) -> Text:
+def _encode(content: str | bytes, label: str, source: str) -> Text:
     # UTF-8 has no lone surrogate; "surrogatepass" encodes one as bytes that the checks reject.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return Text(data, label, source)
@@ -234,7 +234,7 @@ def _read_file(path: Path, most: int) -> Text:
             raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
         if isinstance(error.__cause__, IsADirectoryError):
             raise SourceError(
-                "a folder, not a file", where=str(path), remedy="name the .urdf inside"
+                "this is a folder, not a file", where=str(path), remedy="name the .urdf file in it"
             ) from None
         raise
 
@@ -249,6 +249,6 @@ def _nearest_file(path: Path) -> str:
     try:
         names = [entry.name for entry in path.parent.iterdir()]
     except OSError:
-        return f"there is no folder {path.parent}"
+        return f"the folder {path.parent} does not exist"
     close = nearest(path.name, names)
     return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists names that need no file"

@@ -82,7 +82,7 @@ def arguments_of(path: Path, find: Find) -> set[str] | None:
             if "xacro" in namespace and tag == "arg":
                 names.add(element.get("name", ""))
             if "xacro" in namespace and tag == "include":
-                included = _included(element.get("filename", ""), file, find)
+                included = _included_file(element.get("filename", ""), file, find)
                 if included is None:
                     return None
                 files.append(included)
@@ -96,7 +96,7 @@ def _read(file: Path) -> Xml.Element | None:
         return None
 
 
-def _included(name: str, beside: Path, find: Find) -> Path | None:
+def _included_file(name: str, beside: Path, find: Find) -> Path | None:
     """Return the path of an included file, or None if the name is computed or the package is not found."""
     folder = beside.parent
     if match := _FIND.match(name):
@@ -159,8 +159,8 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         where=str(path),
         found=str(reason).strip() or None,
         remedy="give arguments with --xacro-arg NAME:=VALUE; packages are found by ROS_PACKAGE_PATH,"
-        " AMENT_PREFIX_PATH and, if they hold a package.xml, beside the folders above the file; docs/xacro.md"
-        " lists the operations that a file may do",
+        " AMENT_PREFIX_PATH and, if they contain a package.xml, beside the folders above the file;"
+        " docs/xacro.md lists the operations that a file may do",
         question=Question.XACRO,
     )
 

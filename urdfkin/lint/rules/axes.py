@@ -75,7 +75,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
             attribute="xyz",
             found=_written(joint),
             remedy=f'write xyz="{written}"',
-            fix=lambda: None if _snapped(unit) else report.rewritten(element, "xyz", written),
+            fix=lambda: None if _snap(unit) else report.rewritten(element, "xyz", written),
             severity=Severity.NOTE if abs(length - 1.0) < ROUNDING else None,
             weight=abs(length - 1.0),
         )
@@ -95,7 +95,7 @@ def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
 
 
 def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
-    if snapped := _snapped(axis):
+    if snapped := _snap(axis):
         unit, tilt = snapped
         written = " ".join(f"{x:g}" for x in unit)
         report.add(
@@ -111,11 +111,11 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
 
 def tilts(robot: RobotRecord) -> dict[str, float]:
     """Return the angle (rad) between the axis in Pinocchio and in the file, for joints with URDF514."""
-    snapped = ((joint.name, _snapped(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
+    snapped = ((joint.name, _snap(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
     return {name: result[1] for name, result in snapped if result is not None}
 
 
-def _snapped(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
+def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """Return the coordinate axis that Pinocchio uses instead of an axis, and their angle (rad), or None."""
     if axis is None:
         return None

@@ -53,7 +53,7 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
         return None
     marked = data.startswith(codecs.BOM_UTF8)
     text = data.removeprefix(codecs.BOM_UTF8)
-    declared = _declared(text)
+    declared = _declared_encoding(text)
     if not (_is_utf8(report, text, declared) and _agrees(report, text, declared)):
         return None
     if marked:
@@ -61,7 +61,7 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
     return text
 
 
-def _declared(text: bytes) -> str | None:
+def _declared_encoding(text: bytes) -> str | None:
     """Return the encoding in the XML declaration, as written."""
     declaration = _DECLARATION.match(text.lstrip())
     match = _ENCODING.search(declaration[0]) if declaration else None

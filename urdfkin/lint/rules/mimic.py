@@ -30,15 +30,15 @@ LARGEST = 1e6
 LEAST_LOST = 1e-3
 
 
-def check_mimic(report: Reporter, robot: RobotRecord, *, obeyed: bool) -> None:
+def check_mimic(report: Reporter, robot: RobotRecord, *, enabled: bool) -> None:
     """Report problems of mimic joints.
 
     Args:
         report: The reporter, which receives the findings.
         robot: The records of the robot.
-        obeyed: Whether the mimic rules are used. If not, every finding is a note.
+        enabled: Whether the mimic rules are used. If not, every finding is a note.
     """
-    checker = _MimicChecker(report, robot.by_name, obeyed)
+    checker = _MimicChecker(report, robot.by_name, enabled)
     for joint in robot.joints:
         if joint.mimic is not None:
             checker.check(joint, joint.mimic)
@@ -47,9 +47,9 @@ def check_mimic(report: Reporter, robot: RobotRecord, *, obeyed: bool) -> None:
 class _MimicChecker:
     """Check one mimic joint after another."""
 
-    def __init__(self, report: Reporter, joints: dict[str, JointRecord], obeyed: bool) -> None:
-        self.report, self.joints, self.obeyed = report, joints, obeyed
-        self.looped = _joints_in_loops(joints)
+    def __init__(self, report: Reporter, joints: dict[str, JointRecord], enabled: bool) -> None:
+        self.report, self.joints, self.enabled = report, joints, enabled
+        self.in_loops = _joints_in_loops(joints)
 
     def add(
         self,
@@ -69,7 +69,7 @@ class _MimicChecker:
             attribute=attribute,
             found=None if written is None else f"{attribute}={quoted(written)}",
             remedy=remedy,
-            severity=None if self.obeyed else Severity.NOTE,
+            severity=None if self.enabled else Severity.NOTE,
             fix=fix,
         )
 
@@ -92,7 +92,7 @@ class _MimicChecker:
         leader = self.joints.get(mimic.leader)
         if leader is None:
             self.unknown(mimic)
-        elif joint.name in self.looped:
+        elif joint.name in self.in_loops:
             itself = leader is joint
             message = "the joint mimics itself" if itself else "the joints mimic each other in a circle"
             self.add(MIMIC_LOOP, message, mimic, "joint", "name a joint that is not a mimic joint")
@@ -107,7 +107,7 @@ class _MimicChecker:
         """Report that the mimicked joint does not exist."""
         nearest = self.report.nearest(mimic.leader, self.joints)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
-        if self.obeyed:
+        if self.enabled:
             remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
         self.add(MIMIC_UNKNOWN, "the mimicked joint does not exist", mimic, "joint", remedy)
 
@@ -162,12 +162,12 @@ class _MimicChecker:
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
             MIMIC_RANGE,
-            f"{message}the limits hold {allowed}",
+            f"{message}but may move {allowed}",
             limit.element,
             attribute="lower",
             found=f'lower="{limits[0]:g}" upper="{limits[1]:g}"',
             remedy=f'write lower="{ends[0]:.6g}" upper="{ends[1]:.6g}", the range of the rule',
-            severity=None if self.obeyed else Severity.NOTE,
+            severity=None if self.enabled else Severity.NOTE,
         )
 
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
@@ -177,7 +177,7 @@ class _MimicChecker:
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
         leader = self.joints.get(rule.leader)
         while leader is not None and (next_ := leader.mimic) is not None:
-            if leader.name in self.looped:
+            if leader.name in self.in_loops:
                 return rule, None
             offset = rule.multiplier * next_.offset + rule.offset
             rule = Mimic(next_.leader, rule.multiplier * next_.multiplier, offset)
@@ -197,7 +197,7 @@ def _range_of(joint: JointRecord) -> tuple[float, float] | None:
 
 def _joints_in_loops(joints: dict[str, JointRecord]) -> set[str]:
     """Return the names of the joints in circles of mimic rules; each joint is visited once."""
-    looped: set[str] = set()
+    in_loops: set[str] = set()
     visited: set[str] = set()
     for start in joints:
         path: dict[str, int] = {}
@@ -208,5 +208,5 @@ def _joints_in_loops(joints: dict[str, JointRecord]) -> set[str]:
             rule = joints[name].mimic
             name = None if rule is None else rule.leader
         if name is not None and name in path:
-            looped |= {member for member, place in path.items() if place >= path[name]}
-    return looped
+            in_loops |= {member for member, place in path.items() if place >= path[name]}
+    return in_loops

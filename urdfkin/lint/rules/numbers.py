@@ -50,7 +50,7 @@ class NumberReader:
             return None
         value = self._number(element, attribute, _BLANKS.sub(" ", written).strip(" "))
         if value is not None and written != written.rstrip():
-            self._refused(element, attribute, "a space after the number")
+            self._report_refused(element, attribute, "a space after the number")
         elif value is not None and self.report.has_raw_blanks:
             self._check_raw(element, attribute, 1)
         return value
@@ -137,9 +137,9 @@ class NumberReader:
         seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw))
         pieces = [seen] if count == 1 else [piece for piece in seen.split(" ") if piece]
         if not all(DECIMAL.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
-            self._refused(element, attribute, "a tab or line end between or after the numbers")
+            self._report_refused(element, attribute, "a tab or line end between or after the numbers")
 
-    def _refused(self, element: Element, attribute: str, what: str) -> None:
+    def _report_refused(self, element: Element, attribute: str, what: str) -> None:
         needed = self.bad_number is BAD_NUMBER
         self.report.add(
             # If kinematics does not use the number, urdfdom ignores it and accepts the file.

@@ -31,7 +31,7 @@ class _Use:
 
 def check_prefixes(report: Reporter, root: Element) -> None:
     """Report each undeclared prefix once."""
-    for prefix, use in _undeclared(root).items():
+    for prefix, use in _undeclared_prefixes(root).items():
         more = f" and {use.times - 1} more" if use.times > 1 else ""
         report.add(
             UNDECLARED_PREFIX,
@@ -43,7 +43,7 @@ def check_prefixes(report: Reporter, root: Element) -> None:
         )
 
 
-def _undeclared(root: Element) -> dict[str, _Use]:
+def _undeclared_prefixes(root: Element) -> dict[str, _Use]:
     """Return the undeclared prefixes with their uses."""
     found: dict[str, _Use] = {}
     declared = Counter(_PREDECLARED)
@@ -58,13 +58,13 @@ def _undeclared(root: Element) -> dict[str, _Use]:
         if own:
             stack.append((element, True))
         stack += [(child, False) for child in reversed(element.children)]
-        for prefix, attribute in _prefixed(element):
+        for prefix, attribute in _prefixes_of(element):
             if declared[prefix] < 1:
                 found.setdefault(prefix, _Use(element, attribute)).times += 1
     return found
 
 
-def _prefixed(element: Element) -> Iterator[tuple[str, str | None]]:
+def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
     """Yield the prefixes of an element's tag (attribute None) and of its attributes."""
     if ":" in element.tag and not element.tag.startswith(_REPORTED):
         yield element.tag.partition(":")[0], None

@@ -65,13 +65,13 @@ def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[Join
         children.add(joint.child)
     first: dict[str, JointRecord] = {}
     repeated: list[tuple[JointRecord, bool]] = []
-    done: set[str] = set()
+    visited: set[str] = set()
     for start in [link for link in robot.links if link not in children] + list(robot.links):
-        if start in done:
+        if start in visited:
             continue
         path: set[str] = {start}
         stack: list[tuple[str, list[JointRecord]]] = [(start, list(reversed(below.get(start, []))))]
-        done.add(start)
+        visited.add(start)
         while stack:
             link, pending = stack[-1]
             if not pending:
@@ -80,10 +80,10 @@ def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[Join
                 continue
             joint = pending.pop()
             child = joint.child or ""
-            if child in done:
+            if child in visited:
                 repeated.append((joint, child in path))
                 continue
-            done.add(child)
+            visited.add(child)
             first[child] = joint
             path.add(child)
             stack.append((child, list(reversed(below.get(child, [])))))

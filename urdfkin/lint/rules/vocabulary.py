@@ -124,7 +124,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
     )
     report.add(
         UNKNOWN_ELEMENT,
-        f"<{element.tag}> means nothing in <{parent.tag if parent else ''}> and is skipped",
+        f"URDF has no <{element.tag}> in <{parent.tag if parent else ''}>; it is skipped",
         element,
         remedy=remedy,
         severity=Severity.NOTE if element.tag in EXTENSIONS else None,
