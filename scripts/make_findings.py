@@ -1,7 +1,7 @@
-"""Write docs/findings.md: every code, and what the robots of the catalogue are told.
+"""Write docs/findings.md: the codes, and the warnings of the robots in the catalogue.
 
-Run it after a code or a robot has changed: `python scripts/make_findings.py`. A test holds the page against
-what this script would write.
+Run it after a change of a code or a robot: `python scripts/make_findings.py`. A test compares the page with
+the output of this script.
 """
 
 from __future__ import annotations
@@ -28,53 +28,59 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: Code -> what the warning means for the robots that have it, in a few words.
+#: Code -> the meaning of the warning for the robots of the catalogue.
 REMARKS = {
-    "URDF207": "A link has no origin of its own; the pose is lost, as it is for every reader.",
-    "URDF405": "A slash in a name is legal; urdfkin never uses names as paths.",
-    "URDF508": "Limits were left out or set to zero, so samples within them leave the joint at rest.",
-    "URDF510": "The value has no effect, and none is expected.",
-    "URDF527": "A mirrored finger has the limits of the one that it mimics; kinematics obeys the rule.",
+    "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
+    "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
+    "URDF508": "The limits are missing or zero, so samples within them do not move the joint.",
+    "URDF510": "The value has no effect, as expected.",
+    "URDF527": "A mirrored finger has the limits of the mimicked one; kinematics applies the rule.",
     "URDF702": "No body has these moments of inertia; kinematics does not use them.",
-    "URDF706": "The address of the mesh is wrong or points into another machine; kinematics needs no mesh.",
+    "URDF706": "The address of the mesh is wrong, or is a path on another machine; kinematics needs no mesh.",
     "URDF708": "Only a colour is missing.",
 }
 
 HEAD = """\
 # Findings
 
-`urdfkin check FILE` and `urdfkin.check(source)` say what is wrong with a URDF; `urdfkin.load` refuses a file
-with an error and warns of the rest. `urdfkin explain CODE` prints a code's page. This file is written by
-`scripts/make_findings.py`.
+`urdfkin check FILE` and `urdfkin.check(source)` report the problems of a URDF. `urdfkin.load` refuses a file
+with an error, and warns of the other problems. `urdfkin explain CODE` prints the page of a code.
+`scripts/make_findings.py` writes this file.
 
-- An **error** means that the file has no one meaning: it is refused.
-- A **warning** is legal and almost certainly not meant, or not what every reader makes of it.
-- A **note** is worth knowing.
+- An **error** means that the file has no unique meaning. It is refused.
+- A **warning** is legal, but almost certainly a mistake, or read differently by some readers.
+- A **note** is information.
 
-Codes marked *refuses* or *differs* are legal, but Pinocchio refuses the file or reads another robot from it:
+Codes marked *refuses* or *differs* are legal, but Pinocchio refuses the file or reads another robot from it.
 urdfkin computes the robot and reports every result as **not verified**, with the finding as the reason.
 
-[check.md](check.md) is about the command: folders, settings, comments that silence, baselines, cures.
+[check.md](check.md) describes the command: folders, settings, silencing comments, baselines, automatic fixes.
 
-Time and memory grow with the file, and no faster (`scripts/check_growth.py` measures it for every kind of
-content). Limits, which options raise: {limits.bytes:,} bytes (`--max-bytes`), {limits.depth:,} levels of
-nesting (`--max-depth`), {limits.elements:,} elements (`--max-elements`), {limits.attributes:,} attributes of
-one element (`--max-attributes`), {limits.name:,} characters of a name (`--max-name`), {limits.number:,} of a
-number (`--max-number`) and {limits.markup:,} bytes of one tag or comment (`--max-markup`). `load` keeps the
-same limits.
+Time and memory grow linearly with the file (`scripts/check_growth.py` measures this for every kind of
+content). These limits apply to `check` and `load`; an option of `check` raises each:
 
-On a terminal, many warnings of one kind become one that tells the lines, and so do errors from the hundredth
-of a kind on; `--each` prints each. Of every kind, {written:,} findings of a file are written out, in JSON and
-SARIF too; the last of them tells the lines of the others (`also` in JSON).
+| limit | option |
+|---|---|
+| {limits.bytes:,} bytes | `--max-bytes` |
+| {limits.depth:,} levels of nesting | `--max-depth` |
+| {limits.elements:,} elements | `--max-elements` |
+| {limits.attributes:,} attributes of one element | `--max-attributes` |
+| {limits.name:,} characters of a name | `--max-name` |
+| {limits.number:,} characters of a number | `--max-number` |
+| {limits.markup:,} bytes of one tag or comment | `--max-markup` |
+
+On a terminal, many warnings of one kind are combined into one that lists the lines. Errors are combined from
+the hundredth of a kind on. `--each` prints each finding. At most {written:,} findings of a kind are complete,
+also in JSON and SARIF; the last of them lists the lines of the others (`also` in JSON).
 
 ## Codes
 """
 
 ROBOTS = """\
-## What the robots of the catalogue are told
+## Warnings of the robots in the catalogue
 
-No robot has an error (alex_psyonic_hands is loaded with mimic off, which its catalogue entry says). These are
-the warnings; robots that are not listed have none. Notes, such as rounded multiples of pi, are left out.
+No robot has an error (alex_psyonic_hands is loaded with mimic=False, as its catalogue entry states). The
+table lists the warnings. The other robots have none. Notes, such as rounded multiples of pi, are not listed.
 
 | robot | code | where | what | meaning |
 |---|---|---|---|---|
@@ -82,7 +88,7 @@ the warnings; robots that are not listed have none. Notes, such as rounded multi
 
 
 def page() -> str:
-    """The page as it should be."""
+    """Return the page."""
     head = HEAD.format(limits=DEFAULT_LIMITS, written=WRITTEN_OUT)
     return head + "".join(_tables()) + "\n" + ROBOTS + "".join(_robots())
 
@@ -106,12 +112,12 @@ def _robots() -> Iterator[str]:
 
 
 def warnings_of(robot: str) -> list[Finding]:
-    """The warnings and errors of a robot of the catalogue."""
+    """Return the warnings and errors of a robot of the catalogue."""
     return [finding for finding in check(robot, fold=True) if finding.severity is not Severity.NOTE]
 
 
 def _cell(text: str) -> str:
-    """Text that cannot break out of a table's cell."""
+    """Escape a text for a cell of a Markdown table."""
     return shortened(text, 200).replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
 
 

@@ -89,7 +89,7 @@ def test_a_pattern_stands_for_what_it_matches(here: Path) -> None:
 def test_a_folder_or_pattern_without_a_urdf_is_an_error_not_a_success(here: Path, word: str) -> None:
     (here / "empty").mkdir()
     done = check(word)
-    assert (done.code, done.err.startswith(f"urdfkin: error: {word}: no URDF there")) == (2, True)
+    assert (done.code, done.err.startswith(f"urdfkin: error: {word}: no URDF found")) == (2, True)
 
 
 def test_a_file_in_a_folder_that_is_called_as_a_robot_or_an_option_is_a_file(here: Path) -> None:
@@ -197,12 +197,12 @@ def test_settings_beyond_the_repository_are_not_taken(here: Path, monkeypatch: p
     ("text", "message"),
     [
         ("ignor = []", "[tool.urdfkin]: unknown setting 'ignor'; did you mean ignore?"),
-        ("strict = 1", "[tool.urdfkin]: strict is true or false: found 1"),
-        ("ignore = 'URDF503'", "[tool.urdfkin]: ignore is a list of strings: found 'URDF503'"),
+        ("strict = 1", "[tool.urdfkin]: strict must be true or false: found 1"),
+        ("ignore = 'URDF503'", "[tool.urdfkin]: ignore must be a list of strings: found 'URDF503'"),
         ("ignore = ['URDF5O3']", "[tool.urdfkin]: ignore: unknown code 'URDF5O3'; did you mean"),
-        ("per-file-ignores = { x = 'URDF503' }", "per-file-ignores is a table of lists of strings"),
+        ("per-file-ignores = { x = 'URDF503' }", "per-file-ignores must be a table of lists of strings"),
         ("baseline = 'no.json'", "no.json: no such baseline; "),
-        ("ignore = [", "pyproject.toml: not TOML: found "),
+        ("ignore = [", "pyproject.toml: this file is not TOML: found "),
     ],
 )
 def test_a_wrong_setting_is_told_with_its_place(here: Path, text: str, message: str) -> None:

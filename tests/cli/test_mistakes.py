@@ -14,9 +14,9 @@ ZEROS = "0,0,0,-1,0,0,0,0"
 MISTAKES = {
     "no such name": (["jacobian", "pandaa"], "unknown robot 'pandaa'; did you mean panda"),
     "no such file": (["info", "./nowhere.urdf"], "nowhere.urdf: no such file"),
-    "no such folder": (["info", "nowhere/arm.urdf"], "no such file; there is no folder nowhere"),
-    "a folder": (["info", "."], "a folder, not a file; name the .urdf inside"),
-    "nothing": (["info", ""], "no robot is named"),
+    "no such folder": (["info", "nowhere/arm.urdf"], "no such file; the folder nowhere does not exist"),
+    "a folder": (["info", "."], "this is a folder, not a file; name the .urdf file in it"),
+    "nothing": (["info", ""], "the robot's name is empty"),
     "no urdf": (["info", __file__], "URDF105 error: not well-formed XML"),
     "an empty file": (["info", "/dev/null"], "URDF101 error: the file is empty"),
     "a web page": (["info", "<html><body/></html>"], "this is a web page"),

@@ -30,7 +30,7 @@ def test_an_error_carries_all_findings_and_prints_the_first() -> None:
     error = UrdfError(findings)
     assert isinstance(error, UrdfkinError)
     assert len(error.findings) == 8
-    assert str(error).startswith("<text>: the URDF has 8 errors; 'urdfkin explain URDF402' tells more")
+    assert str(error).startswith("<text>: the URDF has 8 errors; run 'urdfkin explain URDF402' for details")
     assert str(error).count("another link has this name") == UrdfError.SHOWN
     assert "3 more" in str(error)
     again = pickle.loads(pickle.dumps(error))

@@ -115,7 +115,7 @@ def test_what_takes_judgement_is_left(text: str) -> None:
         (b'<origin xyz="0 0 0.3"', "joint j1 would have another origin"),
         (b'rpy="0.1 0.2', "joint j1 would have another orientation"),
         (b'<link name="l1"', "links or joints would not be the same"),
-        (b"</robot>", "it would bring URDF105"),
+        (b"</robot>", "it would cause URDF105"),
     ],
 )
 def test_a_fix_that_does_more_than_it_says_is_not_made(damage: bytes, objection: str) -> None:
@@ -140,7 +140,7 @@ def test_a_fix_that_does_more_than_it_says_is_not_made(damage: bytes, objection:
     done = mend(Text(text.encode(), "<bytes>", "<bytes>"), look, all_of)
     assert done.text.data == text.encode()
     assert done.fixed == ()
-    assert done.kept["URDF503"].startswith((objection, "URDF503 would still be there", "it would bring"))
+    assert done.kept["URDF503"].startswith((objection, "URDF503 would still be there", "it would cause"))
 
 
 numbers = st.floats(-1e3, 1e3).filter(lambda x: x == 0.0 or abs(x) > 1e-6)
@@ -216,7 +216,7 @@ def test_the_differences_that_are_looked_for_are_all_there_are() -> None:
 
 def test_a_file_with_an_error_has_no_meaning_to_keep() -> None:
     done = mended(limit('lower="1" upper="-1" effort="1" velocity="1"').replace("<axis ", '<axis shade="3" '))
-    assert done.kept == {"URDF208": "errors come first, URDF507 here"}
+    assert done.kept == {"URDF208": "the file has an error (URDF507), fix it first"}
 
 
 @pytest.mark.slow

@@ -186,9 +186,9 @@ def test_a_file_with_everything_is_verified_and_says_what_it_does_not_hold(tmp_p
     assert {"world", "base", "imu", "tool"} <= set(robot.link_names)
     said = {f.message for f in robot.findings if f.code == "MJCF101"}
     assert {
-        "equality curve: a constraint (g and f) that is no line between two joints",
-        "equality glue: a constraint (weld of tip and base) that a tree cannot hold",
-        "tendons: tendons move nothing here",
+        "equality curve: a constraint (g and f) that is not linear in one other joint",
+        "equality glue: a constraint (weld of tip and base) that a tree cannot represent",
+        "tendons: tendons have no effect here",
     } <= said
     noted = " ".join(f.message for f in robot.findings if f.code == "MJCF102")
     assert "joint root: qpos0 places it at (0, 0, 1)" in noted
@@ -233,7 +233,7 @@ def test_a_slip_in_the_reading_is_found_when_it_is_loaded(
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        (one_joint('<joint name="j" type="ball"/>'), "joint j: a ball joint cannot be held"),
+        (one_joint('<joint name="j" type="ball"/>'), "joint j: urdfkin does not support ball joints"),
         ("<mujoco><worldbody><body/></mujoco>", "MuJoCo does not accept this MJCF"),
         ("<mujoco><include file='nowhere.xml'/></mujoco>", "MuJoCo does not accept this MJCF"),
     ],
@@ -464,7 +464,7 @@ def wrong_multiplier(right: Callable[..., Any]) -> Callable[..., Any]:
 
 @pytest.mark.parametrize(
     ("where", "name", "slip"),
-    [(mjcf._Reader, "_rule", wrong_offset), (mjcf, "_resolved", wrong_multiplier)],
+    [(mjcf._Reader, "_rule", wrong_offset), (mjcf, "_resolve", wrong_multiplier)],
     ids=["an offset", "the multiplier of a mimic of a mimic"],
 )
 def test_a_slip_in_a_mimic_rule_is_found_by_mujocos_own_equality(
@@ -595,7 +595,7 @@ def test_a_name_that_is_not_utf_8_is_one_clear_error(tmp_path: Path) -> None:
     path = tmp_path / "odd.xml"
     for odd in (b'<mujoco model="\xff">', b'<mujoco><worldbody><body name="\xff"/></worldbody>'):
         path.write_bytes(odd + b"</mujoco>")
-        with pytest.raises(InputError, match=r"odd.xml: this MJCF holds a name that is not UTF-8"):
+        with pytest.raises(InputError, match=r"odd.xml: this MJCF contains a name that is not UTF-8"):
             loaded(path)
 
 

@@ -1,4 +1,4 @@
-"""Strict, located, coded findings about a URDF, before anything else is asked to read it."""
+"""Check a URDF: each finding has a code and a position. Every URDF is checked before it is used."""
 
 from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
 from urdfkin.lint.limits import DEFAULT_LIMITS, Limits

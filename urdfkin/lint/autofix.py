@@ -1,8 +1,11 @@
-"""Findings cured where that takes no judgement, and the proof that nothing else changed.
+"""Apply automatic fixes, and check that the robot does not change.
 
-A fix is kept if the file that it makes has fewer findings of its code and no new ones, and says the same
-robot: every name, number and limit that has a meaning is equal, but for axes, whose directions may differ by
-the last rounding, and for angles by no more than the fix says that it turns.
+A fix is accepted under three conditions:
+
+- The new file has fewer findings of its code.
+- It has no new findings.
+- It describes the same robot. Every name, number and limit with a meaning is equal. The direction of an axis
+  may differ by rounding, and the angles of an origin by at most `Fix.turns`.
 """
 
 from __future__ import annotations
@@ -17,21 +20,21 @@ from urdfkin.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: How often a file is gone through: once for each code, and again for what overlapped or was one too many.
+#: Largest number of passes over a file: one for each code, and further ones for overlapping fixes.
 PASSES = 100
 
-#: By how much (rad) a unit vector may tilt when each of its numbers is rounded: 2**-53, and as much to spare.
+#: Bound (rad) on the change of direction when the numbers of a unit vector are rounded: twice 2**-53.
 TILT = Fraction(1, 2**52)
 
 
 @dataclass(frozen=True, slots=True)
 class Mended:
-    """A file after its fixes.
+    """The result of `mend`.
 
     Attributes:
-        text: The file.
-        fixed: The findings that were cured.
-        kept: Code -> why its fixes were not made.
+        text: The fixed file.
+        fixed: The fixed findings.
+        kept: Code -> the reason why its fixes are not applied.
     """
 
     text: Text
@@ -42,65 +45,65 @@ class Mended:
 def mend(
     text: Text, look: Callable[[Text], Examined], choose: Callable[[], Callable[[Finding], bool]]
 ) -> Mended:
-    """Cure what can be cured, one code after another; a file with errors has no meaning to keep.
+    """Apply the automatic fixes of a file, one code after another. A file with errors is not changed.
 
     Args:
-        text: A file's.
-        look: What examines a text, and finds all there is.
-        choose: What makes, for each time that the file is gone through, what says which findings to cure.
+        text: The file.
+        look: A function that examines a text and returns all findings.
+        choose: A function that returns the filter of the findings to fix; called once for each pass.
     """
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
         chosen = filter(choose(), now.findings)
-        offered = [finding for finding in chosen if finding.fix and finding.code not in kept]
-        if not offered:
+        candidates = [finding for finding in chosen if finding.fix and finding.code not in kept]
+        if not candidates:
             break
-        code = offered[0].code
+        code = candidates[0].code
         if error := next((f.code for f in now.findings if f.severity is Severity.ERROR), None):
-            kept |= {finding.code: f"errors come first, {error} here" for finding in offered}
+            kept |= {finding.code: f"the file has an error ({error}), fix it first" for finding in candidates}
             break
-        these = {id(f.fix): f for f in offered if f.code == code}
-        data, taken = apply(now.text.data, (f.fix for f in these.values() if f.fix))
-        cured = [these[id(fix)] for fix in taken]
+        by_fix = {id(f.fix): f for f in candidates if f.code == code}
+        data, applied = apply(now.text.data, (f.fix for f in by_fix.values() if f.fix))
+        fixable = [by_fix[id(fix)] for fix in applied]
         after = look(replace(now.text, data=data))
-        if objection := next(_objections(now, after, cured), None):
+        if objection := next(_objections(now, after, fixable), None):
             kept[code] = objection
         else:
             now = after
-            fixed += cured
+            fixed += fixable
     return Mended(now.text, tuple(fixed), kept)
 
 
-def _objections(before: Examined, after: Examined, cured: list[Finding]) -> Iterator[str]:
-    """What speaks against a fix, the first first."""
-    code = cured[0].code
-    # Of a kind of which there are too many to be written out, others take the places of those that are gone.
+def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
+    """Yield the reasons against a fix."""
+    code = fixable[0].code
+    # Skip kinds beyond the limit of complete findings: others replace the fixed ones.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
         for seen in (before, after)
     )
     if appeared := new - old:
-        yield f"it would bring {min(code for code, *_ in appeared)}"
-    if sum(f.count for f in before.findings) - sum(f.count for f in after.findings) < len(cured):
+        yield f"it would cause {min(code for code, *_ in appeared)}"
+    if sum(f.count for f in before.findings) - sum(f.count for f in after.findings) < len(fixable):
         yield f"{code} would still be there"
     if before.robot is None or after.robot is None:
         if before.robot is not after.robot:
-            yield "it would make another document"
+            yield "the result would not be a URDF"
         return
     turns = defaultdict[str, float](float)
-    for finding in cured:
+    for finding in fixable:
         turns[finding.name or ""] += finding.fix.turns if finding.fix else 0.0
     yield from differences(before.robot, after.robot, turns)
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """In what two descriptions differ that has a meaning.
+    """Yield the differences of two robots, except those without a meaning.
 
     Args:
-        a: One.
-        b: The other.
-        turns: Joint -> by how much (rad) its frame may be turned.
+        a: The first robot.
+        b: The second robot.
+        turns: Joint -> bound on the rotation (rad) of its frame.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "links or joints would not be the same"
@@ -111,14 +114,14 @@ def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> I
 
 
 def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
-    """What of a joint differs, if anything does."""
-    # Each of the three angles turns the frame by no more than it changes.
-    turned = sum(abs(Fraction(y) - Fraction(x)) for x, y in zip(a.rpy, b.rpy, strict=True))
+    """Return the first property in which two joints differ, or None."""
+    # A change of one of the three angles rotates the frame by no more than this change.
+    rotation = sum(abs(Fraction(y) - Fraction(x)) for x, y in zip(a.rpy, b.rpy, strict=True))
     equal = {
         "name, type, parent or child": (a.name, a.kind, a.parent, a.child)
         == (b.name, b.kind, b.parent, b.child),
         "origin": (a.xyz, a.quaternion) == (b.xyz, b.quaternion),
-        "orientation": turned <= Fraction(turns) * _SLACK,
+        "orientation": rotation <= Fraction(turns) * _SLACK,
         "axis": a.kind not in AXIAL or _same_direction(a.axis, b.axis),
         "limit": _limits(a) == _limits(b),
         "mimic": a.kind == "fixed" or _rule(a) == _rule(b),
@@ -126,12 +129,12 @@ def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: What a fix says of its turns is a sum of doubles.
+#: Allowance for rounding: `Fix.turns` is a sum of doubles.
 _SLACK = 1 + Fraction(1, 2**50)
 
 
 def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> bool:
-    """Whether two vectors point one way, computed without rounding."""
+    """Return whether two vectors have the same direction within `TILT`, computed without rounding."""
     if a is None or b is None:
         return a is b
     (ax, ay, az), (bx, by, bz) = map(Fraction, a), map(Fraction, b)
@@ -141,7 +144,7 @@ def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) ->
 
 
 def _limits(joint: JointRecord) -> tuple[float | None, ...]:
-    """The limits that the joint's type has."""
+    """Return the limits that have a meaning for the type of a joint."""
     if joint.limit is None:
         return ()
     bounded = ("lower", "upper") if joint.kind in ("revolute", "prismatic") else ()

@@ -1,7 +1,7 @@
-"""Findings that were there before: they block nobody, and new ones stand out.
+"""Baseline: a file of known findings, so that `check` reports only new ones.
 
-A finding is known again by its file, code, severity, element, name and what was found, not by its line: an
-edit elsewhere does not make it new, and touching the value that it is about does.
+A finding is known if its file, code, severity, element, name and found text are in the baseline. The line
+does not count: an edit elsewhere does not make a finding new, but a change of its value does.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from urdfkin.errors import InputError
 from urdfkin.lint.finding import Finding
 from urdfkin.system.files import read_text
 
-#: Version of the file; it changes when a field changes its meaning or goes away.
+#: Version of the file format; it changes when a field changes its meaning or is removed.
 VERSION = 1
 
 Key = tuple[str, ...]
@@ -25,19 +25,19 @@ _FIELDS = ("file", "code", "severity", "element", "name", "found")
 
 
 def key_of(finding: Finding, file: str) -> Key:
-    """What a finding is known by."""
+    """Return the key that identifies a finding in a baseline."""
     words = (finding.severity.value, finding.element or "", finding.name or "", finding.found or "")
     return (file, finding.code, *words)
 
 
 @dataclass(slots=True)
 class Baseline:
-    """How many findings of each kind are known.
+    """The number of known findings of each key.
 
     Attributes:
-        counts: How many there may be.
-        root: The folder that files are named from.
-        met: How many known ones were met.
+        counts: The known findings that have no match yet, by key.
+        root: The folder that file names are relative to.
+        met: The number of matches.
     """
 
     counts: Counter[Key]
@@ -45,7 +45,7 @@ class Baseline:
     met: int = 0
 
     def knows(self, finding: Finding) -> bool:
-        """Whether a finding is one of them; each is used up by one."""
+        """Return whether a finding is known. A known finding matches only once."""
         key = key_of(finding, relative(finding.file, self.root))
         if self.counts[key] <= 0:
             return False
@@ -54,13 +54,13 @@ class Baseline:
         return True
 
     def gone(self, files: Iterable[str]) -> int:
-        """How many known findings of the files that were checked were not met again."""
+        """Return the number of known findings without a match, in the files that were checked."""
         checked = {relative(file, self.root) for file in files}
         return sum(count for (file, *_), count in self.counts.items() if count > 0 and file in checked)
 
 
 def relative(file: str, root: Path) -> str:
-    """A file's name as a baseline in some folder writes it."""
+    """Return the name of a file relative to a folder, with forward slashes."""
     if file.startswith("<"):
         return file
     path = os.path.relpath(Path(file.removesuffix(" (expanded)")).resolve(), root.resolve())
@@ -68,11 +68,11 @@ def relative(file: str, root: Path) -> str:
 
 
 def read_baseline(path: Path) -> Baseline:
-    """The known findings that a file holds.
+    """Read a baseline.
 
     Raises:
-        SourceError: it cannot be read.
-        InputError: it is no baseline.
+        SourceError: the file cannot be read.
+        InputError: the file is not a baseline.
     """
     try:
         document = json.loads(read_text(path))
@@ -86,7 +86,7 @@ def read_baseline(path: Path) -> Baseline:
         )
     except (ValueError, TypeError, LookupError, RecursionError):
         raise InputError(
-            "not a baseline of urdfkin",
+            "this file is not a baseline of urdfkin",
             where=str(path),
             remedy="write one with: urdfkin check --write-baseline FILE ...",
         ) from None
@@ -94,17 +94,17 @@ def read_baseline(path: Path) -> Baseline:
 
 
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
-    """The file that makes all of these findings known.
+    """Return the text of a baseline that contains some findings.
 
-    What an older baseline there knows of files that were not checked now, and still exist, stays known.
+    If the path has an older baseline, its entries for other existing files are copied.
 
     Args:
-        findings: Of the files that were checked.
-        files: These files.
-        path: Where it will be written.
+        findings: The findings of the checked files.
+        files: The checked files.
+        path: The path of the new baseline.
 
     Raises:
-        InputError: something else is there.
+        InputError: the path has a file that is not a baseline.
     """
     counts = Counter(key_of(finding, relative(finding.file, path.parent)) for finding in findings)
     if path.exists():

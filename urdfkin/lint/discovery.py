@@ -1,4 +1,4 @@
-"""Which files are meant by what was named: files, folders with all robots in them, and patterns."""
+"""Find the files to check: the arguments of `urdfkin check` are files, folders or patterns."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from urdfkin.system.files import exists, is_folder
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.sources import as_word
 
-#: Files by which ROS's build tools are told to leave a folder alone: copies of what is elsewhere.
+#: Marker files of ROS's build tools: a folder with one of them is skipped.
 LEFT_ALONE = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 
 def collected(word: str, settings: Settings, include: Sequence[str], exclude: Sequence[str]) -> list[str]:
-    """The files that a word means, in the order of their names.
+    """Return the files for one argument, sorted by name.
 
     Args:
-        word: A file, `-`, a name of the catalogue, a folder, or a pattern with `*`, `?`, `[`, `**`.
-        settings: Whose folder patterns are taken from.
-        include: Patterns of the names of files to take from a folder.
-        exclude: Patterns of files and folders to leave out, except a file that is named itself.
+        word: A file, `-`, a catalogue name, a folder, or a pattern with `*`, `?`, `[`, `**`.
+        settings: The settings; patterns are relative to their folder.
+        include: Patterns of file names to select in a folder.
+        exclude: Patterns of files and folders to skip. A file that is itself the argument is not skipped.
 
     Raises:
-        SourceError: a folder or pattern that means no file.
+        SourceError: a folder or pattern contains no file.
     """
     path = Path(word)
     if word == "-" or word in catalogue():
         return [word]
     if is_folder(path):
         found = sorted(_below(path, settings.root, include, exclude))
-        remedy = f"looked for {', '.join(include)}, but in hidden folders and those excluded"
+        remedy = f"searched for {', '.join(include)}, except in hidden and excluded folders"
     elif glob.has_magic(word) and not exists(path):
         found = [file for file in _matching(word) if not matches(file, exclude, settings.root)]
         remedy = None
     else:
         return [f"./{word}" if word.lstrip().startswith("<") else word]
     if not found:
-        raise SourceError("no URDF there", where=word, remedy=remedy)
+        raise SourceError("no URDF found", where=word, remedy=remedy)
     return found
 
 
@@ -62,6 +62,6 @@ def _below(folder: Path, root: Path, include: Sequence[str], exclude: Sequence[s
 
 
 def _matching(pattern: str) -> list[str]:
-    # Path.glob takes no absolute pattern and none that leads up.
+    # Path.glob accepts neither absolute patterns nor "..".
     names = map(Path, glob.glob(pattern, recursive=True))  # noqa: PTH207
     return sorted(as_word(name) for name in names if not is_folder(name))

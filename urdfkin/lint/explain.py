@@ -1,4 +1,4 @@
-"""The page of a rule as `urdfkin explain` prints it."""
+"""Format the page of a rule for `urdfkin explain`."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from urdfkin.errors.escape import printable
 from urdfkin.lint.pages import page
 from urdfkin.lint.rule import Rule
 
-#: Longest line of an example that is shown whole.
+#: Characters of an example's line; a longer one is cut.
 _WIDEST = 100
-#: How wide prose is on a terminal.
+#: Width of prose on a terminal, in characters.
 WIDTH = 88
 
 
 def explain(rule: Rule) -> str:
-    """The page as plain text."""
-    said = page(rule.id)
+    """Return the page of a rule as plain text."""
+    content = page(rule.id)
     paragraphs = [
         f"{rule.id} {rule.slug} ({rule.severity.value})",
-        textwrap.fill(said.title[0].upper() + said.title[1:] + ".", WIDTH),
-        textwrap.fill(said.why, WIDTH),
-        "Found in:\n\n" + _example(said.example),
-        "Better:\n\n" + _example(said.cure),
-        textwrap.fill(said.others, WIDTH),
+        textwrap.fill(content.title[0].upper() + content.title[1:] + ".", WIDTH),
+        textwrap.fill(content.why, WIDTH),
+        "Found in:\n\n" + _example(content.example),
+        "Better:\n\n" + _example(content.cure),
+        textwrap.fill(content.others, WIDTH),
     ]
     if rule.oracle is not None:
         paragraphs.append(
@@ -31,13 +31,13 @@ def explain(rule: Rule) -> str:
                 "Because of this, urdfkin computes the robot and reports every result as not verified.", WIDTH
             )
         )
-    if said.question is not None:
-        paragraphs.append(f"{said.question}.")
+    if content.question is not None:
+        paragraphs.append(f"{content.question}.")
     return "\n\n".join(paragraphs)
 
 
 def _example(text: str) -> str:
-    """An example, indented, with everything unprintable escaped and long lines cut."""
+    """Indent an example, escape unprintable characters and cut long lines."""
     lines = [printable(line) for line in text.strip("\n").split("\n")]
     cut = [line if len(line) <= _WIDEST else line[: _WIDEST - 4] + " ..." for line in lines]
     return textwrap.indent("\n".join(cut), "    ", lambda line: True).rstrip()

@@ -1,16 +1,9 @@
-"""Pieces of a file made safe to print: nothing in them may act on a terminal or pretend to be a message.
+"""`Finding`: a problem in a URDF, with a stable code, its position, the found text and a remedy.
 
-The line of the file that a finding is about, with a caret below what is meant.
-
-Mechanical cures: which bytes of a file to put others in place of, and everything else left as it is.
-
-Places count in the bytes that follow a byte order mark, as the findings' lines and columns do.
-
-
-One finding about a URDF: a stable code, where it is, what was found and what to do about it.
-
-A finding is plain data, so that it can be printed, compared, turned into JSON or SARIF and sent to another
-process. The rules stand in `urdfkin.lint.rules`, with their pages beside them.
+A finding is plain data: it can be printed, compared, converted to JSON or SARIF and sent to another process.
+This module also contains the automatic fix of a finding (`Fix`), the excerpt of its line (`Excerpts`), and
+functions that make quoted text safe to print. Positions count in the bytes after a byte order mark. The rules
+and their pages are in `urdfkin.lint.rules`.
 """
 
 from __future__ import annotations
@@ -27,31 +20,31 @@ from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import log_line, printable
 from urdfkin.system.files import Edit, edited
 
-#: Longest piece of a file that is quoted in a message.
+#: Longest quotation from a file in a message, in characters.
 QUOTED = 60
 
 
 def shortened(text: str, limit: int = QUOTED) -> str:
-    """At most `limit` characters of a text, safe to print."""
+    """Return at most `limit` characters of a text, safe to print."""
     return printable(text if len(text) <= limit else text[: limit - 3] + "...")
 
 
 def quoted(text: str, limit: int = QUOTED) -> str:
-    """A piece of the file in double quotes, safe to print, cut when it is long."""
+    """Return a text in double quotes, at most `limit` characters of it, safe to print."""
     return '"' + shortened(text, limit).replace('"', '\\"') + '"'
 
 
-#: Characters of a line that are shown, and how many of them before what is meant.
+#: Characters of a line in an excerpt, and how many of them are before the marked text.
 SHOWN, BEFORE = 100, 60
 
 _TAB = "    "
 
 
 class Excerpts:
-    """Lines of one file.
+    """Excerpts of one file: the line of a finding, with carets below the marked text.
 
     Args:
-        data: Its bytes behind a byte order mark.
+        data: The bytes of the file after a byte order mark.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -59,7 +52,7 @@ class Excerpts:
         self.number, self.text = 0, ""
 
     def of(self, finding: Finding) -> str | None:
-        """Two lines: the file's, and the caret's; None for a finding about the file as a whole.
+        """Return two lines, the file's and one with carets; None for a finding about the whole file.
 
         >>> from urdfkin.lint.finding import Severity
         >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
@@ -69,44 +62,44 @@ class Excerpts:
         """
         if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
             return None
-        if self.number != finding.line:  # one file may be one line, of megabytes
+        if self.number != finding.line:  # decode a line once: it may have megabytes
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
         start = finding.column - 1
         first = max(start - BEFORE, 0) if len(self.text) > SHOWN else 0
         last = first + SHOWN
         end = min(start + finding.width, last)
-        before, meant, behind = map(
-            _shown, (self.text[first:start], self.text[start:end], self.text[end:last])
+        before, marked, behind = map(
+            _printable, (self.text[first:start], self.text[start:end], self.text[end:last])
         )
         lead, tail = "..." if first else "", "..." if len(self.text) > last else ""
         number = f"{finding.line:>3}"
-        caret = " " * (_cells(lead) + _cells(before)) + "^" * max(_cells(meant), 1)
-        return f"{number} | {lead}{before}{meant}{behind}{tail}\n{' ' * len(number)} | {caret}"
+        caret = " " * (_cells(lead) + _cells(before)) + "^" * max(_cells(marked), 1)
+        return f"{number} | {lead}{before}{marked}{behind}{tail}\n{' ' * len(number)} | {caret}"
 
 
-def _shown(text: str) -> str:
+def _printable(text: str) -> str:
     return printable(text.replace("\t", _TAB))
 
 
 def _cells(text: str) -> int:
-    """How many columns of a terminal a text takes."""
+    """Return the number of terminal columns of a text."""
     return sum(
         0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
     )
 
 
-#: Radians: what rounding an angle of a turn to a double moves at most.
+#: Largest change (rad) of an angle of one revolution when it is rounded to a double.
 ROUNDING = 2.0**-50
 
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """What cures a finding.
+    """The automatic fix of a finding.
 
     Attributes:
-        edits: What to put where, in the order of the file, none into another.
-        turns: By how much it may turn the joint's frame, rad; with 0 the robot stays as it is.
+        edits: The edits of the text, in file order, without overlap.
+        turns: Bound on the rotation (rad) of the joint frame by the fix; 0: the robot does not change.
     """
 
     edits: tuple[Edit, ...]
@@ -114,12 +107,12 @@ class Fix:
 
     @property
     def is_safe(self) -> bool:
-        """Whether it turns no joint by more than the rounding of one number."""
+        """Whether the fix rotates no joint frame by more than the rounding of one number."""
         return self.turns <= ROUNDING
 
 
 def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
-    """A file with as many fixes as go together, and which these are; one that overlaps another waits.
+    """Apply the fixes that do not overlap; return the new bytes and the applied fixes.
 
     >>> apply(b'<axis xyz="0 0 2"/>', [Fix((Edit(11, 16, "0 0 1"),))])[0]
     b'<axis xyz="0 0 1"/>'
@@ -134,10 +127,11 @@ def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
 
 
 class Severity(Enum):
-    """How bad it is.
+    """The severity of a finding.
 
-    An error stops everything: the file has no meaning, or two readers would see two robots. A warning is
-    legal and almost certainly not meant, or not what every reader makes of it. A note is worth knowing.
+    An error makes the file unusable: it has no meaning, or two readers would read two different robots. A
+    warning is legal, but almost certainly a mistake, or read differently by some readers. A note is
+    information.
     """
 
     ERROR = "error"
@@ -151,7 +145,7 @@ class Severity(Enum):
 
 
 class PinocchioReading(Enum):
-    """What Pinocchio does with something that is legal, when it does not do what the specification says."""
+    """Pinocchio's behaviour for legal content, where it differs from the specification."""
 
     REFUSES = "refuses"
     DIFFERS = "differs"
@@ -159,24 +153,24 @@ class PinocchioReading(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What is wrong at one place of a file.
+    """A problem at one position of a file.
 
     Attributes:
-        code: The stable code, `URDF502`.
+        code: The stable code, for example `URDF502`.
         severity: Error, warning or note.
-        message: The claim in one clause, without a full stop.
-        found: The offending text as the file has it, or None.
-        remedy: What to do, or None.
-        file: The file's name as it was given, or `<text>`, `<stdin>`.
+        message: The problem in one clause, without a full stop.
+        found: The text in the file that causes the finding, or None.
+        remedy: The remedy, or None.
+        file: The name of the file as given by the user, or `<text>`, `<stdin>`.
         line: Line, from 1.
         column: Column in characters, from 1.
-        element: The element's tag (`joint`, `link`, `origin`, ...), or None for the file as a whole.
-        name: The name of the link, joint or material the finding is about, or None.
-        oracle: Set when Pinocchio refuses the file for this, or reads it differently: then nothing that is
-            computed from the file can be verified against it.
-        also: The line of each further finding that says the same and was folded into this one.
-        width: How many characters of the line, from `column` on, it is about; 0: no place of the text.
-        fix: What cures it without a person's judgement, or None.
+        element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
+        name: The name of the link, joint or material, or None.
+        oracle: Set if Pinocchio refuses the file for this reason or reads it differently. Then no result
+            from the file can be verified with Pinocchio.
+        also: The lines of further findings of the same kind, combined into this one.
+        width: Number of marked characters from `column` on; 0: no position in the text.
+        fix: The automatic fix, or None.
     """
 
     code: str
@@ -196,7 +190,7 @@ class Finding:
 
     @property
     def subject(self) -> str:
-        """What the finding is about, as a person would name it: `joint 'elbow'`, or an empty string."""
+        """The element and its name, for example `joint 'elbow'`; an empty string for the whole file."""
         if self.element is None:
             return ""
         tag = shortened(self.element)
@@ -204,12 +198,12 @@ class Finding:
 
     @property
     def count(self) -> int:
-        """How many findings it speaks for."""
+        """The number of findings, those in `also` included."""
         return 1 + len(self.also)
 
     @property
-    def _again(self) -> str:
-        """How many more there are, and on which lines."""
+    def _others(self) -> str:
+        """The number of further findings and their lines."""
         others = tuple(sorted(set(self.also) - {self.line}))
         if len(others) == len(self.also):
             return f"also on {_lines(others)}"
@@ -219,19 +213,19 @@ class Finding:
 
     @property
     def sentence(self) -> str:
-        """Everything but the place and the code, in one line."""
+        """The finding in one line, without its position and code."""
         subject = f"{self.subject}: " if self.element and self.name is not None else ""
         found = f": found {self.found}" if self.found else ""
-        again = f" ({self._again})" if self.also else ""
+        also = f" ({self._others})" if self.also else ""
         remedy = f"; {self.remedy}" if self.remedy else ""
-        return f"{subject}{self.message}{found}{again}{remedy}"
+        return f"{subject}{self.message}{found}{also}{remedy}"
 
     def __str__(self) -> str:
         place = f"{printable(self.file)}:{self.line}:{self.column}"
         return log_line(f"{place}: {self.code} {self.severity.value}: {self.sentence}")
 
     def as_dict(self) -> dict[str, Any]:
-        """The finding as a report's JSON has it: the words of the enums, lists for tuples, no `fix`."""
+        """Return the finding for the JSON of a report: enums as strings, tuples as lists, without `fix`."""
         data = asdict(self)
         del data["width"], data["fix"]
         data["severity"] = self.severity.value
@@ -241,14 +235,14 @@ class Finding:
 
 
 class Findings(list[Finding], Displayable):
-    """Findings about one file, by line: a list that shows itself."""
+    """The findings of one file, by line: a list that displays as a table."""
 
     def _sheet(self) -> TextDocument:
         rows = [(f"{f.file}:{f.line}:{f.column}", f.code, f.severity.value, f.sentence) for f in self]
         counts = {s: sum(f.count for f in self if f.severity is s) for s in Severity}
-        said = [f"{n} {s.value}{'s' if n > 1 else ''}" for s, n in counts.items() if n]
+        totals = [f"{n} {s.value}{'s' if n > 1 else ''}" for s, n in counts.items() if n]
         table = [Table(("place", "code", "severity", "what"), rows, left=4)] if rows else []
-        return TextDocument(", ".join(said) or "no findings", table)
+        return TextDocument(", ".join(totals) or "no findings", table)
 
 
 def _lines(lines: tuple[int, ...], shown: int = 4) -> str:
@@ -258,13 +252,13 @@ def _lines(lines: tuple[int, ...], shown: int = 4) -> str:
 
 
 class UrdfError(UrdfkinError, ValueError):
-    """A URDF that cannot be used; prints its errors as a linter does.
+    """A URDF with errors; its message lists them like a linter.
 
     Attributes:
-        findings: Everything that was found in the file, warnings and notes included, by line.
+        findings: All findings of the file by line, warnings and notes included.
     """
 
-    #: How many errors the message prints before it says how many there are.
+    #: Number of errors in the message; further errors are counted.
     SHOWN = 5
 
     def __init__(self, findings: Iterable[Finding]) -> None:
@@ -276,7 +270,7 @@ class UrdfError(UrdfkinError, ValueError):
         super().__init__(
             f"the URDF has {count}",
             where=file,
-            remedy=f"'urdfkin explain {errors[0].code}' tells more" if errors else None,
+            remedy=f"run 'urdfkin explain {errors[0].code}' for details" if errors else None,
         )
 
     def __str__(self) -> str:
@@ -288,4 +282,4 @@ class UrdfError(UrdfkinError, ValueError):
 
 
 class UrdfWarning(UserWarning):
-    """Warned for each warning in a URDF that was loaded all the same."""
+    """The Python warning for each warning in a loaded URDF."""

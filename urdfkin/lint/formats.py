@@ -1,9 +1,7 @@
-"""Findings as SARIF 2.1.0, which code-scanning services and editors read.
+"""Write findings as text, JSON, SARIF 2.1.0, or GitHub workflow commands.
 
-The format is OASIS "Static Analysis Results Interchange Format (SARIF) Version 2.1.0".
-
-
-Findings as text: for a terminal, as JSON, and as GitHub's workflow commands. SARIF has its own module.
+Code-scanning services and editors read SARIF: OASIS "Static Analysis Results Interchange Format (SARIF)
+Version 2.1.0".
 """
 
 from __future__ import annotations
@@ -25,12 +23,13 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 
 
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
-    """One SARIF run with every code as a rule and every finding as a result.
+    """Return one SARIF run with every code as a rule and every finding as a result.
 
     Args:
-        findings: What is told.
-        version: Of urdfkin.
-        silenced: What comments silence, each with its reason: results that are suppressed in the source.
+        findings: The reported findings.
+        version: The version of urdfkin.
+        silenced: The findings that comments silence, each with its reason; SARIF results "suppressed in
+            source".
     """
     index = {code: number for number, code in enumerate(RULES)}
     run = {
@@ -55,13 +54,13 @@ def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple
 
 
 def _rule(rule: Rule) -> dict[str, Any]:
-    said = page(rule.id)
+    content = page(rule.id)
     return {
         "id": rule.id,
         "name": "".join(word.capitalize() for word in rule.slug.split("-")),
-        "shortDescription": {"text": said.title},
-        "fullDescription": {"text": said.why},
-        "help": {"text": f"{said.why}\n\n{said.others}"},
+        "shortDescription": {"text": content.title},
+        "fullDescription": {"text": content.why},
+        "help": {"text": f"{content.why}\n\n{content.others}"},
         "defaultConfiguration": {"level": rule.severity.value},
     }
 
@@ -108,21 +107,21 @@ def _region(finding: Finding) -> dict[str, int]:
 
 
 def _uri(file: str) -> str:
-    """A file's name as a URI reference: relative where it was given so, `stdin` for standard input.
+    """Return a file name as a URI reference: a relative name stays relative; `stdin` for standard input.
 
-    A name is bytes, of whatever encoding; those that a URI cannot hold are written as %XX.
+    Bytes that a URI does not allow are written as %XX.
     """
     if file.startswith("<"):
         return file.strip("<>")
     return Path(file).as_uri() if Path(file).is_absolute() else quote(os.fsencode(Path(file).as_posix()))
 
 
-#: Version of the JSON below; it changes when a field changes its meaning or goes away.
+#: Version of the JSON format; it changes when a field changes its meaning or is removed.
 JSON_VERSION = 1
 
 
 def summary(findings: Sequence[Finding], files: int) -> str:
-    """One line: how many of what in how many files.
+    """Return one line with the number of errors, warnings, notes and files.
 
     >>> summary([], 1)
     'no findings in 1 file'
@@ -134,16 +133,16 @@ def summary(findings: Sequence[Finding], files: int) -> str:
 
 
 def statistics(findings: Sequence[Finding]) -> Iterator[str]:
-    """A line for each code: how many, how bad, whether --fix mends some, what it is; the most first."""
-    counts, worst, mended = Counter[str](), dict[str, Severity](), set[str]()
+    """Yield a line for each code, the most frequent first: count, severity, `[*]` if --fix applies, title."""
+    counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:
         counts[finding.code] += finding.count
         worst[finding.code] = min(
             worst.get(finding.code, finding.severity), finding.severity, key=lambda s: s.rank
         )
-        mended |= {finding.code} if finding.fix else set()
+        fixable |= {finding.code} if finding.fix else set()
     for code, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])):
-        mark = "[*]" if code in mended else "   "
+        mark = "[*]" if code in fixable else "   "
         yield f"{count:7}  {code}  {worst[code].value:7}  {mark}  {RULES[code].slug}: {page(code).title}"
 
 
@@ -153,11 +152,11 @@ def as_json(
     version: str,
     silenced: Sequence[tuple[Finding, str]] = (),
 ) -> str:
-    """The findings as one JSON document.
+    """Return the findings as one JSON document.
 
     `{"schema": "urdfkin-findings", "version": 1, "urdfkin": "...", "files": [...], "findings": [...],
-    "silenced": [...]}`; a finding has the fields of `Finding`, and `title`, the code's claim; one that a
-    comment silences has its `reason`. The places of a `fix` are bytes behind a byte order mark.
+    "silenced": [...]}`. A finding has the fields of `Finding`, and `title`, the title of its code. A silenced
+    finding also has the comment's `reason`. The positions of a `fix` count bytes after a byte order mark.
     """
     document = {
         "schema": "urdfkin-findings",
@@ -177,7 +176,7 @@ def _entry(finding: Finding) -> dict[str, Any]:
 
 
 def as_github(findings: Sequence[Finding]) -> str:
-    """One workflow command a finding, which GitHub shows beside the line; errors first."""
+    """Return a workflow command for each finding, errors first. GitHub shows them beside the line."""
     words = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
     return "\n".join(
         f"::{words[f.severity]} file={_property(f.file)},line={f.line},col={f.column},"

@@ -1,15 +1,15 @@
-"""How large a file, and what it is made of, may be before it is refused unread.
+"""Limits on the size of a file and its parts; a larger file is refused.
 
-Time and memory grow with the file; where something could grow faster (a name is compared with other names, a
-number is converted), it has a limit of its own. No real robot comes near any of them.
+Time and memory grow linearly with the file. A part with a faster growth has its own limit: names are compared
+with each other, and long numbers are slow to convert. No known robot is near a limit.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-#: urdfdom's XML parser, and with it Pinocchio, refuses deeper nesting: tinyxml2 counts to 500, with the
-#: document and the level that it refuses.
+#: Deepest nesting that Pinocchio accepts. Its XML parser, tinyxml2, has a limit of 500, in which it counts
+#: the document and the refused level.
 ORACLE_DEPTH = 498
 
 
@@ -19,12 +19,12 @@ class Limits:
 
     Attributes:
         bytes: Size of the file.
-        depth: How deep elements may be nested; urdfdom's parser refuses more.
-        elements: How many elements there may be.
-        attributes: How many attributes one element may have.
-        name: Characters of the name of an element, an attribute, a link or a joint.
-        number: Characters of one number.
-        markup: Bytes of one tag, comment or instruction, give or take a tenth; libxml2 has the same limit.
+        depth: Levels of nested elements; urdfdom's parser refuses more.
+        elements: Number of elements.
+        attributes: Number of attributes of one element.
+        name: Characters in the name of an element, an attribute, a link or a joint.
+        number: Characters in one number.
+        markup: Bytes of one tag, comment or processing instruction, within 10 %; libxml2 has the same limit.
     """
 
     bytes: int = 100_000_000

@@ -1,8 +1,9 @@
-"""Every rule by its code, and its page, read from the TOML file beside the rule's module when asked for.
+"""The rules by code, and the page of each rule.
 
-A topic is a module of `lint.rules` and the file of its name. At the top of the file stand `cure`, `others`
-and `question` for pages without their own, and `parts`: what `{name}` means in an example, a text or [text,
-times] (in the text `{i}` counts). Line ends in prose mean nothing.
+A topic is a module of `lint.rules`; its pages are in the TOML file of the same name, which is read on demand.
+At its top, `cure`, `others` and `question` are defaults for all pages of the file. `parts` defines `{name}`
+for examples: a text, or [text, times] for a repeated text, in which `{i}` is the index. Line breaks in prose
+have no meaning.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from urdfkin.lint.rules import (
     vocabulary,
 )
 
-#: Topic -> its rules.
+#: Topic -> rules.
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
     for module in (
@@ -49,10 +50,10 @@ TOPICS: dict[str, tuple[Rule, ...]] = {
 
 #: Code -> rule, in the order of the codes.
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
-#: The same for what `load` says of MJCF, which is no text that `check` reads.
+#: Code -> rule, for the findings of `load` about MJCF files, which `check` does not read.
 OF_MJCF = {rule.id: rule for rule in (left_out.LEFT_OUT_MOTION, left_out.LEFT_OUT)}
 
-#: What a code may be called, in lower case: itself, its number, its short name.
+#: Names of a rule in lower case (code, number, short name) -> code.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(
@@ -62,16 +63,16 @@ _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dic
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """What there is to say about a rule.
+    """The documentation of a rule.
 
     Attributes:
         title: The claim in one line, for tables.
-        why: Why it matters to someone who wants numbers.
-        example: A smallest one that has it. A whole document, or the inside of `<robot>`; when it begins
-            with a joint or a comment, the links `base` and `tip` are there already.
-        cure: The same example, put right.
-        others: What Pinocchio (urdfdom) and yourdfpy do with the example.
-        question: What people ask about it, if they do.
+        why: The consequences for a user.
+        example: A minimal example with the problem: a whole document, or the content of `<robot>`. If it
+            begins with a joint or a comment, the links `base` and `tip` are added.
+        cure: The corrected example.
+        others: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
+        question: The related entry of the questions page, or None.
     """
 
     title: str
@@ -83,13 +84,13 @@ class Page:
 
 
 def page(code: str) -> Page:
-    """The page of a code."""
+    """Return the page of a code."""
     return topic_pages(_TOPIC[code])[code]
 
 
 @cache
 def topic_pages(topic: str) -> dict[str, Page]:
-    """The pages of a topic's file."""
+    """Return the pages of a topic."""
     data = tomllib.loads((resources.files(rules) / f"{topic}.toml").read_text(encoding="utf-8"))
     defaults = {key: value for key, value in data.items() if isinstance(value, str)}
     return {
@@ -100,11 +101,11 @@ def topic_pages(topic: str) -> dict[str, Page]:
 def _page(entry: dict[str, Any]) -> Page:
     prose = {key: " ".join(entry[key].split()) for key in ("title", "why", "others")}
     parts = entry.get("parts", {})
-    texts = {key: _written_out(entry[key], parts) for key in ("example", "cure")}
+    texts = {key: _expand_parts(entry[key], parts) for key in ("example", "cure")}
     return Page(**prose, **texts, question=Question(entry["question"]) if "question" in entry else None)
 
 
-def _written_out(text: str, parts: dict[str, Any]) -> str:
+def _expand_parts(text: str, parts: dict[str, Any]) -> str:
     for name, part in parts.items():
         piece, times = part if isinstance(part, list) else (part, 1)
         text = text.replace(f"{{{name}}}", "".join(piece.replace("{i}", str(i)) for i in range(times)))
@@ -112,30 +113,30 @@ def _written_out(text: str, parts: dict[str, Any]) -> str:
 
 
 def find_rule(word: str) -> Rule:
-    """A rule by its code or its short name, in any case.
+    """Return a rule by its code or short name, in upper or lower case.
 
     Raises:
-        UnknownNameError: there is none; the nearest are offered.
+        UnknownNameError: there is no such rule. The message lists the nearest names.
     """
-    known, wanted = RULES | OF_MJCF, word.strip().lower()
+    known, name_or_code = RULES | OF_MJCF, word.strip().lower()
     codes = CODES | {name: rule.id for rule in OF_MJCF.values() for name in (rule.id.lower(), rule.slug)}
-    if wanted not in codes:
+    if name_or_code not in codes:
         raise UnknownNameError("code", word, [*known, *(rule.slug for rule in known.values())])
-    return known[codes[wanted]]
+    return known[codes[name_or_code]]
 
 
 def find_rules(word: str) -> tuple[Rule, ...]:
-    """The rules that a word stands for: one by its code or short name, a family by a code's beginning, ALL.
+    """Return the rules for a code, a short name, the first digits of codes, or ALL.
 
     Raises:
-        UnknownNameError: it stands for none; the nearest are offered.
+        UnknownNameError: there is no such rule. The message lists the nearest names.
 
     >>> [rule.id for rule in find_rules("rounded-pi")], len(find_rules("URDF30"))
     (['URDF601'], 5)
     """
-    wanted = word.strip().upper()
-    wanted = f"URDF{wanted}" if wanted.isdigit() else wanted
-    family = tuple(rule for rule in RULES.values() if rule.id.startswith(wanted))
-    if wanted == "ALL":
+    prefix = word.strip().upper()
+    prefix = f"URDF{prefix}" if prefix.isdigit() else prefix
+    family = tuple(rule for rule in RULES.values() if rule.id.startswith(prefix))
+    if prefix == "ALL":
         return tuple(RULES.values())
-    return family if family and wanted[4:] else (find_rule(word),)
+    return family if family and prefix[4:] else (find_rule(word),)

@@ -1,4 +1,4 @@
-"""What a rule is: the code that its findings carry, and how bad they are. Its page is in `lint.pages`."""
+"""`Rule`: a kind of finding, with its code and severity. `lint.pages` has the page of each rule."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ REFUSES, DIFFERS = PinocchioReading.REFUSES, PinocchioReading.DIFFERS
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One kind of finding.
+    """A kind of finding.
 
     Attributes:
-        id: `URDF` and three digits; never used again for anything else. The first digit tells the family:
+        id: The code: `URDF` and three digits. A code is never reused. The first digit is the family:
             1 text and XML, 2 dialect and elements, 3 numbers, 4 names and structure, 5 joints, 6 suspicious,
             7 inertials, geometry and materials.
-        slug: A short name in words.
-        severity: How bad it is unless a finding says otherwise.
-        oracle: What Pinocchio does when it departs from the specification.
+        slug: The short name.
+        severity: The default severity of its findings.
+        oracle: Pinocchio's behaviour, if it differs from the specification.
     """
 
     id: str

@@ -1,6 +1,6 @@
-"""The rules in their order, for a text or whatever holds one: bytes, XML, dialect, numbers, names, and so on.
+"""Run all rules on a URDF: bytes, XML, dialect, numbers, names, and so on.
 
-The text is read once: who loads a robot makes it of the same records that the rules were applied to.
+The text is read once. `urdfkin.load` builds the robot from the same records that the rules have checked.
 """
 
 from __future__ import annotations
@@ -43,30 +43,31 @@ def check(
     xacro_args: Mapping[str, object] | None = None,
     fold: bool = False,
 ) -> Findings:
-    """Findings about a URDF, by line, without computing anything.
+    """Check a URDF and return the findings by line.
 
-    Besides what the text itself tells, packages and files that meshes are said to lie in are looked for; no
-    mesh is opened.
+    The check uses the text. It also searches the packages and mesh files that the text names, but opens no
+    mesh.
 
     Args:
-        source: A path, a name of the catalogue, URDF text, bytes, an open file, or `-` for standard input.
-        limits: How large the file may be.
-        mimic: Whether mimic joints are to follow; without, what is wrong with them is a note. None: True,
-            except for the robots whose catalogue entry says that theirs cannot work.
-        root_joint: `"floating"` or `"planar"` when the robot will hang from such a joint.
-        xacro_args: Arguments for a .xacro file, which is expanded first; lines are those of the result.
-        fold: Whether many warnings of one kind are folded into one that lists the lines, and errors from the
-            hundredth of a kind on into that one.
+        source: A path, a catalogue name, URDF text, bytes, an open file, or `-` for standard input.
+        limits: Limits on the size of the file.
+        mimic: Whether mimic joints follow their mimicked joints. False: problems with them are notes. None:
+            True, except for catalogue robots whose mimic rules are known to be invalid.
+        root_joint: `"floating"` or `"planar"` if you will load the robot with such a joint.
+        xacro_args: Arguments for a .xacro file, which is expanded first. Lines refer to the expanded text.
+        fold: Whether to combine many warnings of one kind into one that lists the lines. Errors are combined
+            from the hundredth of a kind on.
 
     Returns:
-        The findings that no comment of the file silences, a list that a notebook shows as a table; an empty
-        one for a file nothing can be said against. Of each kind 10,000 are written out; `also` of the last
-        holds the lines of the others.
+        The findings that no comment silences, as a list that displays as a table in notebooks. It is empty if
+        the file has no problem. At most 10,000 findings of a kind are complete; `also` of the last one
+        contains the lines of the others.
 
     Raises:
         SourceError: the file cannot be read.
-        UnknownNameError: neither a file nor a name of the catalogue; the nearest names are offered.
-        InputError: something else than a source.
+        UnknownNameError: the source is neither a file nor a catalogue name. The message lists the nearest
+            names.
+        InputError: the type of the source is wrong.
 
     >>> for finding in check('<robot name="r"><link name="base"/><link name="stray"/></robot>'):
     ...     print(finding)  # doctest: +ELLIPSIS
@@ -83,14 +84,14 @@ def check(
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """A text and what was found in it.
+    """The result of a check.
 
     Attributes:
-        text: What was read.
-        data: Its bytes behind a byte order mark: lines, columns and fixes count in them.
-        robot: What it says; None where it is no URDF.
-        findings: By line.
-        silenced: Findings that a comment silences, each with its reason.
+        text: The text.
+        data: The bytes after a byte order mark; lines, columns and fixes refer to them.
+        robot: The records of the robot; None if the text is not a URDF.
+        findings: The findings by line.
+        silenced: The findings that a comment silences, each with the reason.
     """
 
     text: Text
@@ -109,15 +110,15 @@ def examine(
     fold: bool = False,
     wanted: Callable[[Finding], bool] | None = None,
 ) -> Examined:
-    """As `check`, of a text that was read already.
+    """Check a text that is already read.
 
     Args:
         text: The text.
-        limits: As for `check`, and so the next three.
-        mimic: See there.
-        root_joint: See there.
-        fold: See there.
-        wanted: Which findings, asked before any are folded; None: all.
+        limits: As for `check`.
+        mimic: As for `check`.
+        root_joint: As for `check`.
+        fold: As for `check`.
+        wanted: A filter, applied before findings are combined; None: all findings.
     """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
@@ -132,19 +133,19 @@ def examine(
 
 
 def file_of(text: Text) -> Path | None:
-    """The file a text was read from, which tells where its packages may lie; None where there is none."""
+    """Return the file of a text, from which the search for packages begins; None if there is none."""
     path = Path(text.source if text.entry is None else text.label)
     return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path
 
 
 def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = True) -> tuple[Finding, ...]:
-    """Everything there is to say about a URDF, by line: a pure function of the bytes.
+    """Check the bytes of a URDF and return the findings by line.
 
-    It opens no file and no connection, and asks neither yourdfpy nor Pinocchio.
+    The function opens no file and no connection, and uses neither yourdfpy nor Pinocchio.
 
     Args:
-        data: The file's bytes.
-        limits: How large the file may be.
+        data: The bytes.
+        limits: Limits on the size of the file.
         fold: As for `check`.
 
     >>> [finding.code for finding in check_text(b"<robot name='r'><link name='base'/></robot>")]
@@ -156,13 +157,16 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 
 
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
-    """What the reporter's file says, with findings about it; None when it is no URDF.
+    """Read the reporter's file, add findings to the reporter, and return the records of the robot.
 
     Args:
-        report: The file's name, bytes and limits, and where findings go.
-        mimic: Whether mimic joints are to follow their leaders; without, what is wrong with them is a note.
-        root_joint: `"floating"` or `"planar"` when the robot will hang from such a joint: then the names that
-            joint takes are errors.
+        report: The name, the bytes and the limits of the file; it receives the findings.
+        mimic: Whether mimic joints follow their mimicked joints. False: problems with them are notes.
+        root_joint: `"floating"` or `"planar"` if the robot gets such a joint. Then the names of this joint
+            are errors in the file.
+
+    Returns:
+        The records, or None if the file is not a URDF.
     """
     root = read_document(report)
     read_comments(report, CODES)
@@ -176,7 +180,7 @@ def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = 
     sound = check_structure(report, robot)
     check_axes(report, robot)
     check_ranges(report, robot)
-    check_mimic(report, robot, obeyed=mimic)
+    check_mimic(report, robot, enabled=mimic)
     check_suspicious(report, robot, sound=sound)
     check_inertials(report, robot)
     check_shapes(report, robot)

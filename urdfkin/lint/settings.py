@@ -1,4 +1,4 @@
-"""What a repository wants of `check`: the table [tool.urdfkin] of its pyproject.toml.
+"""Settings of `check`, from the table [tool.urdfkin] of pyproject.toml, and the selection of findings.
 
     [tool.urdfkin]
     ignore = ["URDF601"]
@@ -6,10 +6,8 @@
     baseline = "urdfkin-baseline.json"
     per-file-ignores = { "legacy/*" = ["URDF5"] }
 
-Files and patterns are taken from the folder of that file.
-
-
-Which findings of a file are told: those of the codes that were asked for, and that nobody knew before.
+Files and patterns are relative to the folder of pyproject.toml. A finding is reported if its code is selected
+and neither the baseline nor the older version of the file contains it.
 """
 
 from __future__ import annotations
@@ -33,7 +31,7 @@ from urdfkin.system.files import exists, read_text
 from urdfkin.system.git import Version
 from urdfkin.urdf.sources import Text, is_xacro
 
-#: Setting -> what it is.
+#: Setting -> type.
 _KINDS = {
     "select": list, "ignore": list, "per-file-ignores": dict, "strict": bool, "notes": bool,
     "include": list, "exclude": list, "baseline": str,
@@ -45,7 +43,7 @@ _WORDS = {
     str: "a string",
 }
 
-#: Names of files in a folder that are robots: a .xacro file is mostly a part of one.
+#: Patterns of robot files in a folder. A .xacro file is not among them: most are only a part of a robot.
 INCLUDE = ("*.urdf",)
 
 
@@ -54,8 +52,8 @@ class Settings:
     """A table of settings.
 
     Attributes:
-        file: Where it stands; None where there is none.
-        values: Setting -> value, of the right kinds.
+        file: The file with the table; None if there is none.
+        values: Setting -> value; the types are checked.
     """
 
     file: Path | None = None
@@ -63,11 +61,11 @@ class Settings:
 
     @property
     def root(self) -> Path:
-        """The folder that patterns are taken from."""
+        """The folder that patterns are relative to."""
         return Path() if self.file is None else self.file.parent
 
     def ignored_in(self, file: str) -> frozenset[str]:
-        """The codes that are ignored in a file."""
+        """Return the codes that `per-file-ignores` ignores in a file."""
         table = self.values.get("per-file-ignores", {}).items()
         return codes(
             word for pattern, words in table if matches(file, [pattern], self.root) for word in words
@@ -75,48 +73,48 @@ class Settings:
 
 
 def find_settings(start: Path) -> Settings:
-    """The settings of the repository that a folder lies in; none without a table [tool.urdfkin].
+    """Return the settings of the repository of a folder; empty settings without a table [tool.urdfkin].
 
-    Looked for in the folder and those above it, up to the first that holds .git.
+    The search goes from the folder upwards, to the first folder that contains .git.
 
     Raises:
         SourceError: a pyproject.toml cannot be read.
-        InputError: it is no TOML, or a setting in it is wrong.
+        InputError: a pyproject.toml is not TOML, or a setting in it is wrong.
     """
     for folder in (start, *start.absolute().parents):
         file = folder / "pyproject.toml"
         if exists(file) and (found := _table(file)) is not None:
-            return _checked(file, found)
+            return _check_settings(file, found)
         if exists(folder / ".git"):
             break
     return Settings()
 
 
 def read_settings(file: Path) -> Settings:
-    """The settings of a file that was named: those of its table [tool.urdfkin].
+    """Return the settings in the table [tool.urdfkin] of a given file.
 
     Raises:
-        SourceError: it cannot be read.
+        SourceError: the file cannot be read.
         InputError: it has no such table, or a setting in it is wrong.
     """
     if (found := _table(file, pipes=True)) is None:
         raise InputError(
-            "no table [tool.urdfkin]", where=str(file), remedy="write one, or leave out --config"
+            "no table [tool.urdfkin]", where=str(file), remedy="add this table, or omit --config"
         )
-    return _checked(file, found)
+    return _check_settings(file, found)
 
 
 def _table(file: Path, *, pipes: bool = False) -> Any:
     try:
         return tomllib.loads(read_text(file, pipes=pipes)).get("tool", {}).get("urdfkin")
     except (tomllib.TOMLDecodeError, AttributeError, RecursionError) as error:
-        raise InputError("not TOML", where=str(file), found=str(error)) from None
+        raise InputError("this file is not TOML", where=str(file), found=str(error)) from None
 
 
-def _checked(file: Path, table: Any) -> Settings:
+def _check_settings(file: Path, table: Any) -> Settings:
     where = f"{file} [tool.urdfkin]"
     if not isinstance(table, dict):
-        raise InputError("not a table", where=where, found=repr(table))
+        raise InputError("this setting is not a table", where=where, found=repr(table))
     for name, value in table.items():
         if name not in _KINDS:
             raise UnknownNameError("setting", name, _KINDS, where=where)
@@ -124,27 +122,27 @@ def _checked(file: Path, table: Any) -> Settings:
         lists = (
             [value] if kind is list else [*value.values()] if kind is dict and isinstance(value, dict) else []
         )
-        if not isinstance(value, kind) or not all(_is_words(each) for each in lists):
-            raise InputError(f"{name} is {_WORDS[kind]}", where=where, found=repr(value))
+        if not isinstance(value, kind) or not all(_is_list_of_strings(each) for each in lists):
+            raise InputError(f"{name} must be {_WORDS[kind]}", where=where, found=repr(value))
         if name in ("select", "ignore", "per-file-ignores"):
             try:
                 codes(word for each in lists for word in each)
             except UnknownNameError as error:
                 raise InputError(f"{name}: {error.what}", where=where, remedy=error.remedy) from None
     if "baseline" in table and not exists(baseline := file.parent / table["baseline"]):
-        raise SourceError("no such baseline", where=str(baseline), remedy=f"{where} names it")
+        raise SourceError("no such baseline", where=str(baseline), remedy=f"change the setting in {where}")
     return Settings(file, table)
 
 
-def _is_words(value: Any) -> bool:
+def _is_list_of_strings(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(word, str) for word in value)
 
 
 def codes(words: Iterable[str]) -> frozenset[str]:
-    """The codes that words stand for.
+    """Return the codes for some words, each as in `find_rules`.
 
     Raises:
-        UnknownNameError: a word stands for none.
+        UnknownNameError: a word is neither a code nor a short name.
 
     >>> sorted(codes(["rounded-pi", "URDF52"]))[:3]
     ['URDF520', 'URDF521', 'URDF522']
@@ -153,10 +151,10 @@ def codes(words: Iterable[str]) -> frozenset[str]:
 
 
 def matches(file: str, patterns: Iterable[str], root: Path) -> bool:
-    """Whether one of some patterns means a file, or a folder that it lies in.
+    """Return whether a pattern matches a file or a folder above it.
 
-    A pattern without a slash is held against each name on the way from the root, one with a slash against the
-    way itself; `*` stands for any letters, slashes among them.
+    A pattern without a slash is compared with each folder and file name of the path, relative to `root`. A
+    pattern with a slash is compared with the relative path. `*` matches any characters, including slashes.
 
     >>> matches("robots/old/arm.urdf", ["old"], Path()), matches("robots/arm.urdf", ["robots/o*"], Path())
     (True, False)
@@ -169,19 +167,19 @@ def matches(file: str, patterns: Iterable[str], root: Path) -> bool:
     )
 
 
-#: What xacro files are made of.
+#: Suffixes of the files that a xacro file can include.
 _PARTS = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """What was asked for.
+    """The selection of the findings to report.
 
     Attributes:
-        codes: The codes.
-        notes: Whether notes are told.
-        settings: What the repository wants of some files.
-        baseline: What is known from a file; it counts what it was asked.
+        codes: The selected codes.
+        notes: Whether notes are reported.
+        settings: The settings, for the codes that are ignored in some files.
+        baseline: The known findings, or None. Each match is counted in it.
     """
 
     codes: frozenset[str]
@@ -190,23 +188,24 @@ class Choice:
     baseline: Baseline | None = None
 
     def of(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """What says of each finding of a file, in their order, whether it is told.
+        """Return a function that decides for each finding of a file, in file order, whether it is reported.
 
         Args:
             text: The file.
-            before: What an older version of it had.
+            before: The findings of an older version of the file, or None.
         """
         codes = self.codes - self.settings.ignored_in(text.label)
         known = [baseline for baseline in (self.baseline, before) if baseline is not None]
 
-        def wanted(finding: Finding) -> bool:
-            asked = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            return asked and not sum(baseline.knows(finding) for baseline in known)  # each uses one up
+        def is_reported(finding: Finding) -> bool:
+            selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
+            # sum, not any: both baselines must count the match
+            return selected and not sum(baseline.knows(finding) for baseline in known)
 
-        return wanted
+        return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """The same, of copies of what is known, so that a file can be asked about more than once."""
+        """Do the same as `of` with copies of the baselines, so that a file can be checked more than once."""
         copies = [
             None if known is None else replace(known, counts=Counter(known.counts))
             for known in (self.baseline, before)
@@ -215,20 +214,20 @@ class Choice:
 
 
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
-    """What there was to find in a file before; None where it says what it said.
+    """Return the findings of an older version of a file; None if all its findings are the same.
+
+    If a deleted file has the name of one of the text's meshes, a missing mesh is a new finding.
 
     Args:
-        text: The file as it is.
-        version: The version before.
-        look: What examines a text, and finds all there is.
-
-    A mesh that is missing was there before, where a file that is gone is called as one of the text's.
+        text: The present file.
+        version: The older version of the repository.
+        look: A function that examines a text and returns all findings.
     """
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
-        # What it expanded to before, nobody has: all that is found counts if any part of it may have changed.
+        # The older expansion is not available. If any part may have changed, every finding counts as new.
         return Baseline(Counter()) if version.changed(_PARTS) else None
     same = version.holds(text.data)
     old = text.data if same else version.read(path)

@@ -1,9 +1,12 @@
-"""Comments of a URDF that silence findings, each by its code and with a reason.
+"""Comments in a URDF that silence findings. A comment names the codes and gives a reason.
 
     <!-- urdfkin: ignore[URDF601] the vendor's own digits -->
 
-Behind something on its line a comment speaks for that line; otherwise for the element that follows it, with
-everything in it; before the root element for the whole file.
+| Position of the comment | It applies to |
+|---|---|
+| after other text on the same line | this line |
+| on its own line, before an element | this element and its content |
+| before the root element | the whole file |
 """
 
 from __future__ import annotations
@@ -12,20 +15,20 @@ from dataclasses import dataclass, field
 
 from urdfkin.urdf.element import Element
 
-#: What a comment for urdfkin begins with, after blanks.
+#: The beginning of a comment for urdfkin, after spaces.
 MARK = "urdfkin:"
 
 
 @dataclass(slots=True)
 class Comment:
-    """A comment for urdfkin: what it says and where it stands.
+    """A comment for urdfkin.
 
     Attributes:
-        text: Between its marks.
-        line: From 1.
-        column: From 1.
-        behind: Whether something stands before it on its line.
-        element: The element that follows it; None where none does.
+        text: The text between `<!--` and `-->`.
+        line: The line, from 1.
+        column: The column, from 1.
+        behind: Whether other text precedes it on its line.
+        element: The next element, or None.
     """
 
     text: str
@@ -37,13 +40,13 @@ class Comment:
 
 @dataclass(slots=True, eq=False)
 class Silence:
-    """What a comment silences.
+    """The codes that a comment silences.
 
     Attributes:
         comment: The comment.
-        codes: Which codes.
-        reason: Why.
-        used: Those that there were findings of.
+        codes: The codes.
+        reason: The reason.
+        used: The codes that silenced at least one finding.
     """
 
     comment: Comment
@@ -52,13 +55,20 @@ class Silence:
     used: set[str] = field(default_factory=set)
 
 
-#: Code -> what silences it at some place; the first comment that does.
+#: Code -> the first comment that silences it.
 Codes = dict[str, Silence]
 
 
 @dataclass(slots=True)
 class Silences:
-    """The comments of a file, found by the places that they speak for: the file, a line, an element's id."""
+    """The silencing comments of a file.
+
+    Attributes:
+        everywhere: Comments for the whole file.
+        lines: Comments for a line, by line number.
+        elements: Comments for an element, by the element's `id()`.
+        all: All comments.
+    """
 
     everywhere: Codes = field(default_factory=dict)
     lines: dict[int, Codes] = field(default_factory=dict)
@@ -69,7 +79,7 @@ class Silences:
         return bool(self.all)
 
     def add(self, silence: Silence) -> None:
-        """One more."""
+        """Add a comment."""
         self.all.append(silence)
         place = self._place(silence.comment)
         for code in silence.codes:
@@ -85,12 +95,12 @@ class Silences:
         return self.elements.setdefault(id(comment.element), {})
 
     def reason(self, code: str, line: int, at: Element | None) -> str | None:
-        """Why a finding is silenced, by the nearest comment that speaks for its place; None: it is not.
+        """Return the reason of the nearest comment that silences a finding; None if there is none.
 
         Args:
-            code: The finding's.
-            line: Its line.
-            at: The element it is about.
+            code: The code of the finding.
+            line: The line of the finding.
+            at: The element of the finding.
         """
         silence = self.lines.get(line, {}).get(code)
         while silence is None and at is not None:

@@ -1,1 +1,1 @@
-"""URDF text to `KinematicTree` and back."""
+"""Read robot descriptions (URDF, xacro, MJCF) as a `KinematicTree`, and write a tree as URDF."""

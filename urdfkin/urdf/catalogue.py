@@ -1,4 +1,4 @@
-"""Robots by short names: those of example-robot-data, and urdfkin's own."""
+"""Catalogue of robots by short name: those of example-robot-data, and urdfkin's own."""
 
 from __future__ import annotations
 
@@ -15,16 +15,17 @@ from urdfkin.system.resources import example_robots_dir, robots_dir
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One robot of the catalogue.
+    """A robot of the catalogue.
 
     Attributes:
         name: The short name.
         family: arm, hand, humanoid, quadruped, ...
-        limbs: (base frame, tip frame) of each arm, leg or finger; the first one's are the defaults.
-        mimic: Whether its mimic joints can be followed.
-        reason: Why not.
-        poses: Named poses: a value (rad, m) for each of some joints; the others are at 0.
-        own: Whether it is one of urdfkin's own robots, not of example-robot-data.
+        relative_path: The path of the URDF below the folder of its collection.
+        limbs: (base frame, tip frame) of each arm, leg or finger; the first pair is the default.
+        mimic: Whether the mimic rules are valid and can be used.
+        reason: The reason, if `mimic` is False.
+        poses: Named poses: joint values (rad, m) by joint name; the other joints are at 0.
+        own: Whether it is one of urdfkin's own robots instead of example-robot-data's.
     """
 
     name: str
@@ -38,7 +39,7 @@ class Entry:
 
     @property
     def path(self) -> Path:
-        """The URDF file."""
+        """The path of the URDF file."""
         return (robots_dir() if self.own else example_robots_dir()) / self.relative_path
 
     @property
@@ -54,18 +55,18 @@ class Entry:
 
 @cache
 def catalogue() -> Mapping[str, Entry]:
-    """Every entry by name: example-robot-data's, then urdfkin's own."""
+    """Return all entries by name: those of example-robot-data, then urdfkin's own."""
     return {**_read("catalogue.toml", own=False), **_read("own.toml", own=True)}
 
 
 def robots(family: str | None = None) -> tuple[str, ...]:
-    """Names that `load` knows.
+    """Return the robot names that `load` accepts.
 
     Args:
-        family: Only those of one: arm, biped, gripper, hand, humanoid, quadruped, text, ...
+        family: Return one family only: arm, biped, gripper, hand, humanoid, quadruped, text, ...
 
     Raises:
-        UnknownNameError: no such family.
+        UnknownNameError: there is no such family.
 
     >>> "panda" in robots("arm"), robots("text")
     (True, ('one_link', 'planar_two_link', 'polar', 'elbow'))
@@ -77,7 +78,7 @@ def robots(family: str | None = None) -> tuple[str, ...]:
 
 
 def examples() -> tuple[str, ...]:
-    """The names of example-robot-data's robots."""
+    """Return the names of the robots of example-robot-data."""
     return tuple(name for name, entry in catalogue().items() if not entry.own)
 
 

@@ -1,8 +1,9 @@
-"""A process that can compute and read the files it was shown, and nothing else.
+"""Confine the current process: it can compute and read allowed files, and nothing else.
 
-Limits of the kernel bound what it takes; Python's audit events, which every open file, new process, socket
-and import raises, refuse the rest. Neither can be taken back. This is a second wall, behind `expressions`: a
-program in full control of the interpreter may find a way around events, not around limits.
+The kernel's limits bound memory, time, files and processes. A Python audit hook refuses other events: Python
+raises one for each opened file, new process, socket and import. Neither can be undone. This is a second
+defence behind `expressions`. A program with full control of the interpreter may evade the hook, but not the
+limits.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from typing import Any
 
 from urdfkin.urdf.expressions import RefusedError
 
-#: Bytes of memory, of which an interpreter with its libraries takes a tenth.
+#: Memory limit in bytes. The interpreter and its libraries need a tenth of it.
 MEMORY = 2 * 1024**3
 
-#: What an expansion has to do with, beyond the files, which are looked at one by one.
+#: Audit events that are allowed without a check. `_READING` events are allowed for allowed files only.
 _HARMLESS = {"builtins.id", "compile", "glob.glob", "glob.glob/2", "object.__getattr__", "sys._getframe"}
 _READING = {"open", "os.listdir", "os.scandir"}
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
@@ -27,13 +28,13 @@ _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 @dataclass(slots=True)
 class Ground:
-    """The files that may be read: of strangers' making, and no one else's.
+    """The files that an expansion may read.
 
     Attributes:
-        roots: Folders and files that may be read, but nothing hidden below them. What links lead to must lie
-            in one of them, too.
-        installed: Folders in which links may lead to a package elsewhere, as where sources are installed by
-            links.
+        roots: Folders and files that may be read, except hidden ones below them. The target of a symbolic
+            link must also lie in one of them.
+        installed: Folders in which a symbolic link may lead to a package elsewhere, for example the install
+            folder of `colcon build --symlink-install`.
     """
 
     roots: list[str] = field(default_factory=list)
@@ -41,17 +42,17 @@ class Ground:
 
     @classmethod
     def around(cls, path: Path, search: list[str], arguments: list[str]) -> Ground:
-        """What belongs to a file: its folder, its package, its repository, and what the user named.
+        """Allow the folder, the package and the repository of a file, and the paths in its arguments.
 
         Args:
             path: The xacro file.
-            search: Folders in which the user has packages.
-            arguments: Values the user gave; those that are paths may be read.
+            search: The folders on the user's search paths.
+            arguments: The values of the user's arguments; those that are paths may be read.
         """
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for mark in ("package.xml", ".git"):
             wide += [folder for folder in path.resolve().parents if _exists(folder / mark)][:1]
-        home = os.path.expanduser("~")  # noqa: PTH111  which says nothing where there is none
+        home = os.path.expanduser("~")  # noqa: PTH111  Path.home() raises without a home
         everything = {Path(home).resolve(), Path("/")}
         real = [place.resolve() for place in wide if _exists(place)]
         near = [path, path.parent, path.resolve().parent, *map(Path, search)]
@@ -59,9 +60,9 @@ class Ground:
         return cls([str(root) for root in roots], search)
 
     def holds(self, path: str) -> bool:
-        """Whether a file or folder may be read."""
+        """Return whether a file or folder may be read."""
         real = os.path.realpath(path)
-        if os.path.basename(real) == "package.xml":  # noqa: PTH119  whose name the search for packages reads
+        if os.path.basename(real) == "package.xml":  # noqa: PTH119  the package search reads it
             return True
         roots = self.roots
         if any(_lies_in(root, os.path.abspath(path)) for root in self.installed):  # noqa: PTH100  no links
@@ -70,12 +71,12 @@ class Ground:
 
 
 def _package_of(path: str) -> list[str]:
-    """The package a file lies in, if it does."""
+    """Return the folder of the package that contains a file, as a list of one or none."""
     return [str(folder) for folder in Path(path).parents if _exists(folder / "package.xml")][:1]
 
 
 def _lies_in(root: str, path: str) -> bool:
-    """Whether a path is a root or lies below, and nothing below the root is hidden."""
+    """Return whether a path is a root, or below it without a hidden folder in between."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep
@@ -85,12 +86,12 @@ def _lies_in(root: str, path: str) -> bool:
 def _exists(path: Path) -> bool:
     try:
         return path.exists()
-    except OSError:  # too long a name is no path
+    except OSError:  # the name is too long for a path
         return False
 
 
 def limit(seconds: int) -> None:
-    """Bound this process's memory and time; it may write no file and start no process."""
+    """Limit the memory and time of this process; forbid it to write files and start processes."""
     import resource  # noqa: PLC0415  not on every system
 
     bounds = {
@@ -108,24 +109,24 @@ def limit(seconds: int) -> None:
 
 
 def confine(holds: Callable[[str], bool]) -> None:
-    """From here on this process reads the files it may and does nothing else that Python tells of.
+    """Allow this process only to read certain files, from now on; refuse every other audit event.
 
     Args:
-        holds: Whether a file or folder may be read.
+        holds: A function that returns whether a file or folder may be read.
     """
 
     def watch(event: str, arguments: tuple[Any, ...]) -> None:
         if event in _HARMLESS:
             return
         if event not in _READING:
-            raise RefusedError(f"a xacro file may not do that: {event} {arguments!r:.80}")
+            raise RefusedError(f"a xacro file may not do this: {event} {arguments!r:.80}")
         path, *how = arguments
         if event == "open" and how[-1] & _WRITING:
-            raise RefusedError(f"a xacro file may write no file: {path!r}")
+            raise RefusedError(f"a xacro file may not write a file: {path!r}")
         if not isinstance(path, str | bytes | os.PathLike) or not holds(os.fsdecode(path)):
             raise RefusedError(
-                f"{path!r} lies neither in the file's folder, package or repository nor in a package on"
-                " ROS_PACKAGE_PATH or AMENT_PREFIX_PATH, or it is hidden"
+                f"{path!r} may not be read: it is hidden, or it is neither in the file's folder, package or"
+                " repository nor in a package on ROS_PACKAGE_PATH or AMENT_PREFIX_PATH"
             )
 
     sys.addaudithook(watch)

@@ -1,4 +1,4 @@
-"""An element of a URDF as the file has it, and its place: the tree that the parsed document is."""
+"""`Element`: a node of a parsed URDF, with its position in the file."""
 
 from __future__ import annotations
 
@@ -6,17 +6,25 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-#: From an element's offset on, a start tag: '<', then quoted values, in which '>' may stand, and all else.
+#: A start tag, matched from an element's offset. A quoted value may contain '>'.
 START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
 ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
 
 
 @dataclass(slots=True, eq=False)
 class Element:
-    """One element: tag and attributes as written, children in order, the beginning of its text, its place.
+    """An element of a URDF.
 
     Attributes:
-        above: The link, joint or other child of `<robot>` around it; None for those themselves.
+        tag: The tag as written.
+        attributes: The attributes as written.
+        parent: The parent element; None for the root.
+        line: The line of the start tag, from 1.
+        column: The column of the start tag.
+        offset: The position of the start tag in bytes.
+        above: The child of `<robot>` that contains this element; None for the children of `<robot>`.
+        children: The child elements, in file order.
+        text: The beginning of the element's text.
     """
 
     tag: str
@@ -30,22 +38,22 @@ class Element:
     text: str = ""
 
     def append(self, child: Element) -> None:
-        """Add a child; most elements have none, and a list for each would double their size."""
+        """Add a child. An element without children has no list, which halves its size."""
         if isinstance(self.children, list):
             self.children.append(child)
         else:
             self.children = [child]
 
     def all(self, tag: str) -> list[Element]:
-        """Children of one tag."""
+        """Return the children with a tag."""
         return [child for child in self.children if child.tag == tag]
 
     def first(self, tag: str) -> Element | None:
-        """The first child of a tag, which is the one every reader takes."""
+        """Return the first child with a tag, or None. Every URDF reader uses the first."""
         return next((child for child in self.children if child.tag == tag), None)
 
     def walk(self) -> Iterator[Element]:
-        """This element and everything below it, in the order of the file, without recursion."""
+        """Yield this element and all elements below it, in file order, without recursion."""
         stack = [self]
         while stack:
             element = stack.pop()
@@ -54,15 +62,15 @@ class Element:
 
     @property
     def holder(self) -> Element:
-        """The link, joint or other child of `<robot>` this element belongs to; itself at the top."""
+        """The child of `<robot>` that contains this element, or the element itself."""
         return self.above or self
 
     @property
     def owner(self) -> str:
-        """The tag a person would name: `joint` for everything inside a joint."""
+        """The tag of the holder: `joint` for every element inside a joint."""
         return self.holder.tag
 
     @property
     def label(self) -> str | None:
-        """The name of the link or joint this element belongs to."""
+        """The name of the link or joint that contains this element."""
         return self.holder.attributes.get("name") if self.parent is not None else None

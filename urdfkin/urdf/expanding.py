@@ -1,7 +1,7 @@
-"""The process that expands a xacro file, through xacrodoc; the only module that imports it.
+"""Expand a xacro file with xacrodoc, inside the confined process. No other module imports xacrodoc.
 
-xacro takes a file for a program and the environment for its input. Here its expressions go through
-`expressions`, the environment is empty, and the process is confined to the files it may read.
+By itself, xacro lets a file run Python code and read the environment. Here `expressions` evaluates the
+expressions, the environment is empty, and `confinement` limits the files that the process can read.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.packages import find_package
 from urdfkin.urdf.xacro import arguments_of
 
-#: What xacro lets expressions call although it gives them more than values.
+#: Functions of xacro that give an expression access to more than values.
 _NEVER = ("type", "vars")
 
-#: An expression that no guard of xacro's own stops; if it comes through, the library is not the one we know.
+#: An expression that xacro's own guard does not stop. If it is evaluated, the replacement had no effect.
 _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
-    """A request on standard input, an answer as the last line of standard output."""
+    """Read a request from standard input and write the answer as the last line of standard output."""
     request = json.load(sys.stdin)
     limit(request["seconds"])
     os.environ.clear()
-    os.chdir(Path(request["path"]).parent)  # what the file includes without a package is relative to it
+    os.chdir(Path(request["path"]).parent)  # includes without a package are relative to it
     ground = Ground(**request["ground"])
     try:
         answer = _expand(Path(request["path"]), request["arguments"], request["search"], ground)
@@ -43,17 +43,17 @@ def serve() -> None:
         answer = {"error": f"{type(error).__name__}: {error}"[:2000]}
     sys.stdout.write("\n" + json.dumps(answer) + "\n")
     sys.stdout.flush()
-    os._exit(0)  # what an interpreter does at its end may not be allowed any more
+    os._exit(0)  # the confinement may forbid the interpreter's normal exit
 
 
 def _expand(
     path: Path, arguments: dict[str, str], search: Mapping[str, str], ground: Ground
 ) -> dict[str, Any]:
-    """The URDF, and which arguments the file takes: None where that is not known, or nobody asks."""
-    import xacrodoc  # noqa: PLC0415  the border: nobody else needs it
+    """Return the URDF and the declared arguments; None if these are not known or no argument is given."""
+    import xacrodoc  # noqa: PLC0415  only here
 
-    _tame(path, search, ground)
-    importlib.import_module("xml.dom.expatbuilder")  # which minidom imports when it first reads a file
+    _replace_evaluation(path, search, ground)
+    importlib.import_module("xml.dom.expatbuilder")  # minidom imports it when it first reads a file
     confine(ground.holds)
     document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, walk_up=False, resolve_packages=False)
     urdf = document.to_urdf_string()
@@ -61,11 +61,11 @@ def _expand(
     return {"urdf": urdf, "takes": None if takes is None else sorted(takes)}
 
 
-def _tame(path: Path, search: Mapping[str, str], ground: Ground) -> None:
-    """Put our own in the place of what xacro and xacrodoc evaluate, look up and find.
+def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -> None:
+    """Replace the functions of xacro and xacrodoc that evaluate expressions and find packages.
 
     Raises:
-        RefusedError: it had no effect.
+        RefusedError: the replacement has no effect.
     """
     import xacro  # noqa: PLC0415
     import xacrodoc.packages  # noqa: PLC0415
@@ -79,7 +79,7 @@ def _tame(path: Path, search: Mapping[str, str], ground: Ground) -> None:
     def value_of(expression: str, names: Mapping[str, Any], local: object = None) -> object:
         try:
             return evaluate(expression, names, functions)
-        except MemoryError:  # which has no words of its own
+        except MemoryError:  # its own message is empty
             raise RefusedError(_TOO_MUCH) from None
 
     def value_of_arguments(expression: str, context: Mapping[str, Any]) -> str:
@@ -96,20 +96,22 @@ def _tame(path: Path, search: Mapping[str, str], ground: Ground) -> None:
     except xacro.XacroException as error:
         if isinstance(error.exc, RefusedError):
             return
-    raise RefusedError("this version of xacro evaluates expressions in a way that is not known here")
+    raise RefusedError(
+        "this version of xacro evaluates expressions in an unknown way; urdfkin does not support it"
+    )
 
 
 def _tables(symbols: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """All names that xacro gives a file, its namespaces' too."""
+    """Yield the tables of names that a file can use: the global one and those of the namespaces."""
     yield dict(symbols)
     yield from (value for value in symbols.values() if isinstance(value, dict))
 
 
 def _finder(path: Path, search: Mapping[str, str], ground: Ground) -> Callable[[str], str]:
-    """What finds packages for xacro's $(find name)."""
+    """Return the function that finds packages for xacro's $(find name)."""
 
     def is_package(folder: Path) -> bool:
-        """A folder outside is one only if it says so: else $(find etc) would be one."""
+        """Outside the allowed folders a package needs a package.xml: `$(find etc)` is not a package."""
         return ground.holds(str(folder)) or (folder / "package.xml").is_file()
 
     def get_path(name: str) -> str:

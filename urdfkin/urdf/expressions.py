@@ -1,9 +1,9 @@
-"""Values of the expressions in a xacro file, `${...}`, without Python's `eval`.
+"""Evaluate the expressions `${...}` of a xacro file without Python's `eval`.
 
-xacro hands them to `eval` and looks for forbidden names in the outermost code object only: what stands in a
-lambda, a comprehension or a chain of attributes can do all that a program can. Here the syntax tree is walked
-instead. Nothing is compiled; there are values, operators, the functions that xacro offers and the methods
-listed below, and whatever is not named here is refused.
+xacro itself passes them to `eval` and searches forbidden names in the outermost code object only. A lambda,
+a comprehension or a chain of attributes can therefore run any program. This module interprets the syntax tree
+and compiles nothing. It allows values, operators, the functions of xacro and the methods listed below, and
+refuses everything else.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.NotIn: lambda value, many: value not in many,
 }
 
-#: Methods that an expression may call. `str.format` is not among them: it reads attributes.
+#: Methods that an expression may call. `str.format` is excluded because it can read attributes.
 _METHODS: dict[type, str] = {
     str: "capitalize count endswith find index isalnum isalpha isdigit isnumeric join ljust lower lstrip"
     " partition removeprefix removesuffix replace rfind rjust rpartition rsplit rstrip split splitlines"
@@ -54,20 +54,20 @@ _CONTAINERS = (str, list, tuple, dict, range)
 
 
 class RefusedError(Exception):
-    """A xacro file asks for what an expansion does not do."""
+    """A xacro file does something that an expansion does not allow."""
 
 
 def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[object]) -> Any:
-    """The value of an expression.
+    """Return the value of an expression.
 
     Args:
-        expression: Its text.
-        names: What its names stand for.
-        functions: What it may call besides methods.
+        expression: The text of the expression.
+        names: The values of the names in it.
+        functions: The functions that it may call, besides the allowed methods.
 
     Raises:
-        RefusedError: it is written with something else than values, operators and calls of these.
-        SyntaxError: it is no expression.
+        RefusedError: it contains more than values, operators and allowed calls.
+        SyntaxError: the text is not an expression.
 
     >>> evaluate("2 * a[1] + max(a)", {"a": [1, 2], "max": max}, [max])
     6
@@ -77,7 +77,7 @@ def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[ob
 
 
 class _Evaluation:
-    """The walk; each method is called as the node whose value it gives."""
+    """Evaluate a syntax tree; the method for a node has the name of the node's class."""
 
     def __init__(self, names: Mapping[str, Any], functions: Collection[object]) -> None:
         self._names, self._functions = names, functions
@@ -85,7 +85,7 @@ class _Evaluation:
     def value(self, node: ast.expr) -> Any:
         rule: Callable[[Any], Any] | None = getattr(self, type(node).__name__, None)
         if rule is None:
-            raise RefusedError(f"'{ast.unparse(node)[:80]}' is none of the expressions that are evaluated")
+            raise RefusedError(f"the expression '{ast.unparse(node)[:80]}' is not allowed")
         return rule(node)
 
     def Constant(self, node: ast.Constant) -> Any:
@@ -106,15 +106,17 @@ class _Evaluation:
                 return getattr(owner, name)
         if isinstance(owner, dict) and not name.startswith("_"):
             try:
-                return owner[name]  # a namespace, or what a YAML file holds
+                return owner[name]  # a namespace, or the content of a YAML file
             except (KeyError, AttributeError):
                 raise NameError(f"{name!r} is not defined in '{ast.unparse(node.value)[:80]}'") from None
-        raise RefusedError(f"the attribute {name!r} of {type(owner).__name__!r} is not open to expressions")
+        raise RefusedError(
+            f"the attribute {name!r} of {type(owner).__name__!r} is not allowed in expressions"
+        )
 
     def Subscript(self, node: ast.Subscript) -> Any:
         owner = self.value(node.value)
         if not isinstance(owner, _CONTAINERS):
-            raise RefusedError(f"{type(owner).__name__!r} has no elements that expressions may take")
+            raise RefusedError(f"expressions may not index a {type(owner).__name__!r}")
         return owner[self.value(node.slice)]
 
     def Slice(self, node: ast.Slice) -> slice:
@@ -125,7 +127,7 @@ class _Evaluation:
         called = self.value(node.func)
         method = isinstance(getattr(called, "__self__", None), tuple(_METHODS))
         if not method and not any(called is function for function in self._functions):
-            raise RefusedError(f"'{ast.unparse(node.func)[:80]}' is no function of xacro")
+            raise RefusedError(f"'{ast.unparse(node.func)[:80]}' is not a function of xacro")
         words: dict[str, Any] = {}
         for word in node.keywords:
             words |= self.value(word.value) if word.arg is None else {word.arg: self.value(word.value)}
@@ -151,9 +153,9 @@ class _Evaluation:
         return _rule(_UNARY, node, node.op)(self.value(node.operand))
 
     def BoolOp(self, node: ast.BoolOp) -> Any:
-        wanted = isinstance(node.op, ast.Or)
+        decisive = isinstance(node.op, ast.Or)
         for part in node.values[:-1]:
-            if bool(value := self.value(part)) is wanted:
+            if bool(value := self.value(part)) is decisive:
                 return value
         return self.value(node.values[-1])
 
@@ -175,7 +177,7 @@ class _Evaluation:
     GeneratorExp = ListComp
 
     def _rounds(self, loops: list[ast.comprehension]) -> Iterator[_Evaluation]:
-        """An evaluation for each round of nested loops, with the loops' names."""
+        """Yield an evaluation for each iteration of nested loops, with the values of the loop names."""
         if not loops:
             yield self
             return
@@ -187,7 +189,10 @@ class _Evaluation:
 
 
 class _Scope(Mapping[str, Any]):
-    """Names of a loop before those around it, which may be evaluated on access and are not copied."""
+    """The names of a loop, then those of the scope around it.
+
+    The outer names are not copied, because access may evaluate them.
+    """
 
     def __init__(self, outer: Mapping[str, Any], own: Mapping[str, Any]) -> None:
         self._outer, self._own = outer, own
@@ -209,10 +214,12 @@ def _bound(target: ast.expr, value: Any) -> Iterator[tuple[str, Any]]:
         for part, one in zip(target.elts, value, strict=True):
             yield from _bound(part, one)
     else:
-        raise RefusedError(f"'{ast.unparse(target)[:80]}' is no name for the values of a loop")
+        raise RefusedError(
+            f"'{ast.unparse(target)[:80]}' is not a loop variable: use a name or a tuple of names"
+        )
 
 
 def _rule(rules: Mapping[Any, Callable[..., Any]], node: ast.expr, op: ast.AST) -> Callable[..., Any]:
     if type(op) not in rules:
-        raise RefusedError(f"the operator in '{ast.unparse(node)[:80]}' is not evaluated")
+        raise RefusedError(f"the operator in '{ast.unparse(node)[:80]}' is not allowed")
     return rules[type(op)]

@@ -1,14 +1,17 @@
-"""MJCF to a kinematic tree, through MuJoCo's compiled model: a file's meaning with defaults and classes in.
+"""Convert an MJCF file to a kinematic tree.
 
-A body's link is its frame. Its joints turn and slide one after the other, each about its anchor p_k in it:
-F <- F Trans(p_k) J_k Trans(-p_k), so that a body of several joints is several joints and links here, the last
-of them the body's own. A joint's reference value is put into its place, so that q is MuJoCo's qpos (but for a
-free joint's quaternion, whose scalar is first there). Sites become links that are fixed.
+MuJoCo compiles the file, which resolves defaults and classes. The tree is built from the compiled model:
 
-What a tree cannot hold is listed, never dropped in silence.
+- A body becomes a link with the body's frame. A named site becomes a link on a fixed joint.
+- The joints of a body move one after the other, each about its anchor p_k: F <- F Trans(p_k) J_k Trans(-p_k).
+  A body with several joints becomes several joints and links; the last link is the body's own.
+- A joint's reference value (`ref`) becomes part of its origin, so that q equals MuJoCo's qpos. The exception
+  is the quaternion of a free joint: MuJoCo writes its scalar part first.
 
-A free body that MuJoCo aligns (`align`, `alignfree`) has its inertial frame as its frame, which only the file
-with its shapes tells: such a file is compiled as it is.
+Parts of the file that a tree cannot represent are listed in the result.
+
+MuJoCo can align the frame of a free body with its inertial frame (`align`, `alignfree`). That frame depends
+on the shapes, so such a file must be compiled with its meshes.
 """
 
 from __future__ import annotations
@@ -30,23 +33,23 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 
-#: A sliding joint that the file does not bound: a URDF must say something. A kilometre either way.
+#: Limit (m) in both directions of a slide joint without limits: a URDF requires limits.
 UNBOUNDED = 1000.0
-#: Nothing that matched is tried another way: a text with many comments takes no longer than it is long.
+#: Possessive matching: linear time in the length of the text.
 _ROOT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _ENDINGS = (".xml", ".mjcf")
-#: How much of a file is looked at to see what it is.
+#: Bytes of a file that are read to recognize MJCF.
 _HEAD = 65_536
 
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """Something that the tree does not hold, or holds in another way.
+    """A part of the file that the tree does not represent, or represents differently.
 
     Attributes:
-        what: In one clause.
-        where: Which element, or None for the file.
-        moves: Whether motion depends on it.
+        what: A description in one clause.
+        where: The element, or None for the file.
+        moves: Whether the motion depends on it.
     """
 
     what: str
@@ -59,16 +62,16 @@ class Mjcf:
     """A robot from an MJCF file.
 
     Attributes:
-        tree: Its links and joints.
-        model: MuJoCo's compiled model of the file, in which each body is still there.
-        fused: The same with static bodies fused, where the file says `fusestatic`; otherwise None.
-        frames: Names of links, each with its body's or site's number in MuJoCo's model.
-        coordinates: Names of the joints that move, each with its place in MuJoCo's qpos; mimic joints too.
-        rules: Equalities of the model that are mimic rules: their numbers, and which joint each couples.
-        apart: Other equalities between joints that are active, which the tree does not hold: their numbers.
-        listed: What the tree does not hold.
-        whole: Whether the model has the file's shapes and inertias.
-        aligns: Whether the file has MuJoCo move a free body's frame to its inertial frame.
+        tree: The links and joints.
+        model: MuJoCo's compiled model with all bodies.
+        fused: The compiled model with fused static bodies if the file sets `fusestatic`; otherwise None.
+        frames: For each link: "body" or "site", and its index in MuJoCo's model.
+        coordinates: For each moving joint, mimic joints included: its index in MuJoCo's qpos.
+        rules: The equalities that are mimic rules: index in the model and name of the mimic joint.
+        apart: Indices of the other active joint equalities, which the tree does not represent.
+        listed: The parts of the file that the tree does not represent.
+        whole: Whether the model contains the shapes and inertias of the file.
+        aligns: Whether MuJoCo aligns the frame of a free body with its inertial frame.
     """
 
     tree: KinematicTree
@@ -83,7 +86,7 @@ class Mjcf:
     aligns: bool
 
     def qpos(self, q: FloatArray) -> FloatArray:
-        """(n, MuJoCo's nq) for (n, nq): mimic joints stand where the tree's rules put them."""
+        """Return MuJoCo's qpos (n, MuJoCo's nq) for q (n, nq); the mimic rules set the mimic joints."""
         tree, full = self.tree, np.tile(self.model.qpos0, (len(q), 1))
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
             if joint.name not in self.coordinates:
@@ -100,27 +103,27 @@ class Mjcf:
         return full
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """(n, frames, 4, 4) of `frames`, by `mj_kinematics`; where the file fuses bodies, on the fused model.
+        """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), by `mj_kinematics`.
 
-        A frame that the fused model does not have is placed by the other one.
+        They come from the fused model if there is one. A frame that it does not contain comes from `model`.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
         if self.fused is not None:
-            kept = {f: at for f, at in enumerate(map(self._in_fused, self.frames.values())) if at is not None}
-            out[:, list(kept)] = _placements(self.fused, qpos, kept)
+            own = {f: at for f, at in enumerate(map(self._in_fused, self.frames.values())) if at is not None}
+            out[:, list(own)] = _placements(self.fused, qpos, own)
         return out
 
     def _in_fused(self, frame: tuple[str, int]) -> tuple[str, int] | None:
-        """The same body or site in the fused model, by its name."""
+        """Return the body or site of the same name in the fused model, or None."""
         mujoco, (kind, i) = library(), frame
         what = mujoco.mjtObj.mjOBJ_BODY if kind == "body" else mujoco.mjtObj.mjOBJ_SITE
         name = mujoco.mj_id2name(self.model, what, i)
-        there = mujoco.mj_name2id(self.fused, what, name) if name else -1
-        return (kind, there) if there >= 0 else None
+        index = mujoco.mj_name2id(self.fused, what, name) if name else -1
+        return (kind, index) if index >= 0 else None
 
     def lengths(self, q: FloatArray) -> FloatArray:
-        """(n, frames) the sum of the lengths that MuJoCo adds up on its way from the world to each frame."""
+        """Return the sum (n, frames), in m, of the lengths from the world to each frame, for error bounds."""
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
         for i in range(1, m.nbody):
@@ -135,7 +138,7 @@ class Mjcf:
         return self._of_frames(at_body, np.linalg.norm(m.site_pos, axis=1))
 
     def reference_angles(self, q: FloatArray) -> FloatArray:
-        """(n, frames) the sum of |q| + |ref| of the hinges on the way that have a reference value: rad."""
+        """Return the sum (n, frames), in rad, of |q| + |ref| over a path's hinges with a reference value."""
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
         for i in range(1, m.nbody):
@@ -146,7 +149,7 @@ class Mjcf:
         return self._of_frames(at_body, np.zeros(m.nsite))
 
     def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
-        """The joints of a body: number, kind, place in qpos."""
+        """Yield the joints of a body: index, kind, index in qpos."""
         m, kinds = self.model, library().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         first = int(m.body_jntadr[body])
@@ -154,7 +157,7 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """(n, frames) from (n, bodies), and what each site adds to its body's."""
+        """Return values (n, frames): those of the bodies (n, bodies), plus `own` for each site."""
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
             for kind, i in self.frames.values()
@@ -162,9 +165,9 @@ class Mjcf:
         return np.stack(columns, axis=1)
 
     def residuals(self, q: FloatArray) -> FloatArray:
-        """(n, equalities) how far off each equality between joints is, by MuJoCo: its own `efc_pos`.
+        """Return MuJoCo's residuals `efc_pos` (n, equalities) of the equalities between joints.
 
-        It is NaN where MuJoCo holds nothing: an equality that is not active, or of another kind.
+        An equality that is inactive or of another kind has NaN.
         """
         mujoco, m = library(), self.model
         off = mujoco.mjtDisableBit
@@ -181,9 +184,10 @@ class Mjcf:
         return out
 
     def rule_sizes(self, q: FloatArray) -> FloatArray:
-        """(n, equalities) the size of the terms of each mimic rule, times its rules up to the leader.
+        """Return the size (n, equalities) of the terms of each mimic rule, for error bounds.
 
-        That of y = y0 + c0 + c1 (x - x0) is |y0| + |c0| + |c1| (x's size + |x0|).
+        The size of y = y0 + c0 + c1 (x - x0) is |y0| + |c0| + |c1| (size of x + |x0|). It is multiplied by
+        the number of rules in the chain, plus one.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.rules}
@@ -206,7 +210,7 @@ class Mjcf:
 
 
 def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]) -> FloatArray:
-    """(n, frames, 4, 4) by `mj_kinematics`."""
+    """Return the placements (n, frames, 4, 4), by `mj_kinematics`."""
     mujoco = library()
     data = mujoco.MjData(model)
     out = np.zeros((len(qpos), len(frames), 4, 4))
@@ -221,7 +225,7 @@ def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]
 
 
 def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
-    """Whether a source is MJCF: text, bytes, or a file ending in .xml or .mjcf, whose root is <mujoco>.
+    """Return whether a source is MJCF: text, bytes, or a .xml or .mjcf file, with the root <mujoco>.
 
     >>> is_mjcf("<mujoco/>"), is_mjcf(b"<mujoco/>"), is_mjcf("<robot/>"), is_mjcf("panda")
     (True, True, False, False)
@@ -235,32 +239,32 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
     try:
         head = read_start(at_home(source), _HEAD)
     except OSError:
-        return False  # whoever reads it says so
+        return False  # the reader of the file reports the error
     return _ROOT.match(head.decode("utf-8-sig", "replace")) is not None
 
 
 def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False) -> Mjcf:
-    """The robot of an MJCF file or text, read in this process: `urdfkin.verify.mjcf_check` confines it.
+    """Read an MJCF file or text in this process (`urdfkin.verify.mjcf_check` confines the process).
 
     Args:
-        source: A path, or text; files that the file includes are read.
-        name: What to call it in messages.
-        whole: Whether MuJoCo compiles the file as it is, with its meshes; otherwise shapes and inertias are
-            taken out first, so that no mesh has to be there.
+        source: A path or text; included files are read, too.
+        name: The name of the source in messages.
+        whole: True: MuJoCo compiles the unchanged file, with its meshes. False: shapes and inertias are
+            removed first, so that the meshes may be missing.
 
     Raises:
-        InputError: MuJoCo is not installed, does not accept the file, or the robot has a ball joint.
+        InputError: MuJoCo is not installed or does not accept the file, or the robot has a ball joint.
     """
     mujoco = library()
     fused = None
     try:
         spec = _spec(mujoco, source)
-        aligned, fuses = list(_aligned(mujoco, spec)), bool(spec.compiler.fusestatic)
+        aligned, fuses = list(_aligned_bodies(mujoco, spec)), bool(spec.compiler.fusestatic)
         if whole and fuses:
             _refuse_fused(aligned, name)
             fused = compiled(_spec(mujoco, source))
         spec.compiler.fusestatic = False
-        left = list(_left_out(mujoco, spec))
+        notes = list(_left_out(mujoco, spec))
         if not whole:
             _strip(mujoco, spec)
         model = compiled(spec)
@@ -269,7 +273,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
         tree = reader.tree()
     except UnicodeDecodeError as error:
         raise InputError(
-            "this MJCF holds a name that is not UTF-8",
+            "this MJCF contains a name that is not UTF-8",
             where=name,
             found=repr(error.object)[:80],
             remedy="save the file as UTF-8",
@@ -279,15 +283,15 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         found = str(error).strip().replace("\n", "; ")
         raise InputError("MuJoCo does not accept this MJCF", where=name, found=found) from None
-    left += [_aligned_words(body.name, whole=whole) for body in aligned]
-    listed = (*reader.listed, *left)
+    notes += [_align_note(body.name, whole=whole) for body in aligned]
+    listed = (*reader.listed, *notes)
     return Mjcf(
         tree,
         model,
         fused,
         reader.frames,
         reader.coordinates,
-        reader.taken,
+        reader.mimic_equalities,
         frozenset(reader.apart),
         listed,
         whole,
@@ -296,21 +300,21 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
 
 
 def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
-    made = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
-    made.compiler.usethread = False  # a confined process may start none
-    made.memory = made.njmax = made.nconmax = made.nstack = -1  # of the file's own dynamics, maybe gigabytes
-    return made
+    spec = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
+    spec.compiler.usethread = False  # a confined process cannot start threads
+    spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1  # the file may demand gigabytes for dynamics
+    return spec
 
 
-def _aligned(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Free bodies whose frame MuJoCo moves to their inertial frame: those that nothing movable hangs from."""
+def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
+    """Yield the free bodies that MuJoCo aligns with their inertial frame; they have no moving descendants."""
     kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
     for joint in spec.joints:
         if joint.type != kinds.mjJNT_FREE:
             continue
-        wanted = spec.compiler.alignfree if joint.align == choices.mjALIGNFREE_AUTO else joint.align
+        align = spec.compiler.alignfree if joint.align == choices.mjALIGNFREE_AUTO else joint.align
         bodies = joint.parent.bodies
-        if wanted and not (bodies and not spec.compiler.fusestatic) and not _moving_below(joint.parent):
+        if align and not (bodies and not spec.compiler.fusestatic) and not _moving_below(joint.parent):
             yield joint.parent
 
 
@@ -328,32 +332,35 @@ def _refuse_fused(aligned: list[Any], name: str) -> None:
     for body in aligned:
         if body.bodies:
             raise InputError(
-                "MuJoCo fuses static bodies into a free body and aligns its frame with the inertia of all",
+                "MuJoCo fuses static bodies into a free body and aligns its frame with their common inertia",
                 where=f"{name}: body {body.name}",
                 remedy='write fusestatic="false" or align="false"',
             )
 
 
-def _aligned_words(body: str, *, whole: bool) -> Listed:
+def _align_note(body: str, *, whole: bool) -> Listed:
     where = f"body {body}" if body else "a body without a name"
     if whole:
-        return Listed("its frame is its inertial frame: MuJoCo aligns this free body", where)
-    said = "MuJoCo aligns the frame of this free body with its inertia, which needs its shapes; here it is"
-    return Listed(f"{said} where the file writes it", where, moves=True)
+        return Listed("MuJoCo aligns this free body: its frame is its inertial frame", where)
+    what = (
+        "MuJoCo aligns the frame of this free body with its inertial frame, which depends on its shapes;"
+        " here the frame is the one in the file"
+    )
+    return Listed(what, where, moves=True)
 
 
 def name_of(source: str | bytes | os.PathLike[str]) -> str:
-    """What to call a source in messages."""
+    """Return the name of a source in messages."""
     return "<bytes>" if isinstance(source, bytes) else "<text>" if is_text(source) else str(source)
 
 
 def is_text(source: object) -> bool:
-    """Whether a source is MJCF itself, not the path of a file."""
+    """Return whether a source is the text of an MJCF, not the path of a file."""
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
 def _useless(spec: Any) -> Iterator[tuple[str, list[Any]]]:
-    """What kinematics does not need, kind by kind."""
+    """Yield the elements that kinematics does not need, by kind."""
     for words in (
         "keys", "sensors", "actuators", "tendons", "excludes", "pairs", "skins", "flexes", "geoms", "cameras",
         "lights", "meshes", "hfields", "materials", "textures",
@@ -363,23 +370,23 @@ def _useless(spec: Any) -> Iterator[tuple[str, list[Any]]]:
 
 
 def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
-    """In words, what of a file the tree does not hold, its joints' own constraints aside."""
+    """Yield the parts of a file that the tree does not represent, except equalities between joints."""
     for i, one in enumerate(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
-            kind, names = str(one.type).rpartition("_")[2].lower(), _joined(one.name1, one.name2)
-            what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot hold"
+            kind, names = str(one.type).rpartition("_")[2].lower(), _join_names(one.name1, one.name2)
+            what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot represent"
             yield Listed(what, f"equality {one.name or i}", moves=bool(one.active))
-    gone = dict(_useless(spec))
+    useless = dict(_useless(spec))
     for words in ("tendons", "flexes"):
-        if words in gone:
-            yield Listed(f"{words} move nothing here", words, moves=True)
-    if gone:
-        said = ", ".join(f"{len(found)} {words}" for words, found in gone.items())
-        yield Listed(f"left out, since kinematics does not use them: {said}")
+        if words in useless:
+            yield Listed(f"{words} have no effect here", words, moves=True)
+    if useless:
+        counts = ", ".join(f"{len(found)} {words}" for words, found in useless.items())
+        yield Listed(f"left out, since kinematics does not use them: {counts}")
 
 
 def _strip(mujoco: Any, spec: Any) -> None:
-    """Take out what kinematics does not need, so that no mesh has to be there."""
+    """Remove the elements that kinematics does not need, so that meshes may be missing."""
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     for one in list(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
@@ -390,19 +397,19 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE  # with inertias that are none of the file's
+        joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE  # the inertias below are not the file's
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
         body.inertia, body.iquat, body.fullinertia = (1.0,) * 3, (1.0, 0.0, 0.0, 0.0), (np.nan,) * 6
 
 
-def _joined(*names: str) -> str:
+def _join_names(*names: str) -> str:
     return " and ".join(name for name in names if name)
 
 
 @dataclass(slots=True)
 class _Reader:
-    """Reads one compiled model; `source` is what it is called in messages."""
+    """Convert one compiled model; `source` is its name in messages."""
 
     mujoco: Any
     model: Any
@@ -411,7 +418,7 @@ class _Reader:
     frames: dict[str, tuple[str, int]] = field(default_factory=dict)
     coordinates: dict[str, int] = field(default_factory=dict)
     listed: list[Listed] = field(default_factory=list)
-    taken: dict[int, str] = field(default_factory=dict)
+    mimic_equalities: dict[int, str] = field(default_factory=dict)
     apart: set[int] = field(default_factory=set)
     _joints: list[tuple[Joint, str, str]] = field(default_factory=list)
     _names: dict[str, set[str]] = field(default_factory=lambda: {"link": set(), "joint": set()})
@@ -419,7 +426,7 @@ class _Reader:
     _hinges: dict[int, str] = field(default_factory=dict)
 
     def tree(self) -> KinematicTree:
-        """The links and joints."""
+        """Return the tree of links and joints."""
         m = self.model
         self._links = [self._new("link", m.body(i).name or f"body{i}") for i in range(m.nbody)]
         self._hinges = {i: self._new("joint", m.joint(i).name or f"joint{i}") for i in range(m.njnt)}
@@ -438,7 +445,7 @@ class _Reader:
         return build_tree(self.name, self._links[0], joints)
 
     def _new(self, kind: str, name: str) -> str:
-        """The name, or one like it where it is taken."""
+        """Return the name, with underscores appended until it is unique."""
         while name in self._names[kind]:
             name += "_"
         self._names[kind].add(name)
@@ -449,12 +456,12 @@ class _Reader:
         self._joints.append((Joint(name, JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0])), parent, child))
 
     def _body(self, i: int) -> None:
-        """A body's joints one after the other, then its own frame."""
+        """Add the joints of a body one after the other, then its own link."""
         m, here = self.model, self._links[self.model.body_parentid[i]]
         T, link = _pose(m.body_pos[i], m.body_quat[i]), self._links[i]
         if m.body_mocapid[i] >= 0:
             self.listed.append(
-                Listed("a mocap body stands where the file puts it", f"body {link}", moves=True)
+                Listed("a mocap body is fixed at its pose in the file", f"body {link}", moves=True)
             )
         first, count = int(m.body_jntadr[i]), int(m.body_jntnum[i])
         for j in range(first, first + count):
@@ -469,30 +476,30 @@ class _Reader:
             self._fix(T, here, link)
 
     def _joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
-        """A joint that stands at T, and the way from its frame back to the body's."""
+        """Return a joint with origin T, and the transform from its frame back to the body frame."""
         m, kinds = self.model, self.mujoco.mjtJoint
         kind, axis, back = m.jnt_type[j], m.jnt_axis[j], pose(p=-m.jnt_pos[j])
         if kind == kinds.mjJNT_BALL:
             raise InputError(
-                "a ball joint cannot be held: urdfkin has no joint for it yet",
+                "urdfkin does not support ball joints",
                 where=f"{self.source}: joint {name}",
-                remedy="three hinges in one body turn likewise, but where the middle one is at a right angle",
+                remedy="use three hinges in one body (singular where the middle one is at a right angle)",
             )
         at = int(m.jnt_qposadr[j])
         if kind == kinds.mjJNT_FREE:
             place = ", ".join(f"{x:g}" for x in m.qpos0[at : at + 3])
             if m.qpos0[at : at + 3].any() or m.qpos0[at + 3] != 1.0:
-                said = f"qpos0 places it at ({place}); the neutral configuration has it at the origin"
-                self.listed.append(Listed(said, f"joint {name}"))
+                what = f"qpos0 places it at ({place}); in the neutral configuration it is at the origin"
+                self.listed.append(Listed(what, f"joint {name}"))
             return Joint(name, JointKind.FLOATING, 0, np.eye(4), np.array([1.0, 0.0, 0.0])), np.eye(4)
         zero, turns = float(m.qpos0[at]), kind == kinds.mjJNT_HINGE
         if zero:
             T = T @ (pose(rotation_about(axis, -zero)) if turns else pose(p=-zero * axis))
-        held_as, limit = self._range(j, name, turns=turns)
-        return Joint(name, held_as, 0, T, axis, limit), back
+        urdf_kind, limit = self._range(j, name, turns=turns)
+        return Joint(name, urdf_kind, 0, T, axis, limit), back
 
     def _range(self, j: int, name: str, *, turns: bool) -> tuple[JointKind, Limit | None]:
-        """What kind of joint a URDF makes of it, and its limits."""
+        """Return the kind of the joint in a URDF, and its limits."""
         m = self.model
         effort = float(m.jnt_actfrcrange[j].max()) if m.jnt_actfrclimited[j] else np.inf
         if m.jnt_limited[j]:
@@ -501,15 +508,15 @@ class _Reader:
             return kind, Limit(lower, upper, np.inf, effort)
         if turns:
             return JointKind.CONTINUOUS, None
-        said = Listed(
-            f"a slide without limits: a URDF must have some, {UNBOUNDED:g} m either way", f"joint {name}"
+        note = Listed(
+            f"a slide without limits: the URDF, which requires some, has +-{UNBOUNDED:g} m", f"joint {name}"
         )
-        if said not in self.listed:
-            self.listed.append(said)
+        if note not in self.listed:
+            self.listed.append(note)
         return JointKind.PRISMATIC, Limit(-UNBOUNDED, UNBOUNDED, np.inf, effort)
 
     def _rules(self) -> Iterator[tuple[str, Mimic]]:
-        """Equalities between two joints that are y = m x + c: mimic rules. What they lead to is free."""
+        """Yield the mimic rules: the equalities y = m x + c of two joints. Chains are resolved."""
         m, rules = self.model, dict[str, Mimic]()
         for i in range(m.neq):
             if m.eq_type[i] != self.mujoco.mjtEq.mjEQ_JOINT:
@@ -520,21 +527,21 @@ class _Reader:
                 self.listed.append(Listed("a constraint that is not active", where))
                 continue
             if rule is None:
-                names = _joined(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
-                said = f"a constraint ({names}) that is no line between two joints"
+                names = _join_names(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
+                what = f"a constraint ({names}) that is not linear in one other joint"
             elif rule[0] in rules or _leads(rules, rule[1].leader, rule[0]):
-                said = f"joint {rule[0]} is held twice, or in a circle"
+                what = f"joint {rule[0]} has two rules, or its rules form a circle"
             else:
                 rules[rule[0]] = rule[1]
-                self.taken[i] = rule[0]
+                self.mimic_equalities[i] = rule[0]
                 continue
             self.apart.add(i)
-            self.listed.append(Listed(said, where, moves=True))
-        for follower in rules:
-            yield follower, _resolved(rules, follower)
+            self.listed.append(Listed(what, where, moves=True))
+        for name in rules:
+            yield name, _resolve(rules, name)
 
     def _rule(self, i: int) -> tuple[str, Mimic] | None:
-        """Of y - y0 = c0 + c1 (x - x0), with the reference values y0 and x0."""
+        """Return the mimic rule of y - y0 = c0 + c1 (x - x0) with reference values y0 and x0, or None."""
         m = self.model
         y, x = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])
         c = m.eq_data[i, :5]
@@ -545,15 +552,15 @@ class _Reader:
 
 
 def _leads(rules: dict[str, Mimic], joint: str, to: str) -> bool:
-    """Whether following a joint's leaders ends at, or passes, another."""
+    """Return whether the chain of mimicked joints from one joint contains another joint."""
     while joint in rules and joint != to:
         joint = rules[joint].leader
     return joint == to
 
 
-def _resolved(rules: dict[str, Mimic], follower: str) -> Mimic:
-    """Followed to the joint that moves by itself."""
-    rule = rules[follower]
+def _resolve(rules: dict[str, Mimic], joint: str) -> Mimic:
+    """Return the mimic rule of a joint in terms of a joint that is not a mimic joint."""
+    rule = rules[joint]
     while rule.leader in rules:
         end = rules[rule.leader]
         rule = Mimic(end.leader, rule.multiplier * end.multiplier, rule.multiplier * end.offset + rule.offset)

@@ -1,4 +1,4 @@
-"""The door of MuJoCo: the only module that imports it, when somebody asks."""
+"""Import MuJoCo on demand. No other module imports it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from urdfkin.system.lazy_import import installed_version
 
 
 def library() -> Any:
-    """MuJoCo.
+    """Return the module `mujoco`.
 
     Raises:
-        InputError: it is not installed.
+        InputError: MuJoCo is not installed.
     """
     try:
         import mujoco  # noqa: PLC0415  an extra, and heavy
@@ -23,14 +23,14 @@ def library() -> Any:
 
 
 def compiled(spec: Any) -> Any:
-    """MuJoCo's model of a specification, whatever it warns of: that is about dynamics."""
+    """Compile a MuJoCo specification without its warnings, which concern dynamics."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         return spec.compile()
 
 
 def version() -> str:
-    """The version that is installed, found without importing it."""
+    """Return the installed version, without importing MuJoCo."""
     if (found := installed_version("mujoco")) is None:
         raise InputError("MuJoCo is not installed", remedy="pip install 'urdfkin[mujoco]'")
     return found

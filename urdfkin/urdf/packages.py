@@ -1,18 +1,15 @@
-"""Where `package://name/...` leads: a documented search that needs no ROS.
+"""Find the folder of a package (`package://name/...`) without ROS, and robots of robot_descriptions.
 
-In this order, the first folder that exists wins:
+The search for a package uses the first of these folders that exists:
 
-1. `ROS_PACKAGE_PATH`: each entry that is called `name`, holds a folder `name`, or holds one one level down
-   (as in `src/repository/name`);
-2. `AMENT_PREFIX_PATH`: `share/name` below each entry;
-3. the folders above the file: one that is called `name`, whose `package.xml` says so, or that holds a
-   folder `name`.
+1. `ROS_PACKAGE_PATH`: an entry called `name`, a folder `name` in an entry, or one level further down
+   (`src/repository/name`).
+2. `AMENT_PREFIX_PATH`: `share/name` below an entry.
+3. The folders above the file: one called `name`, one whose `package.xml` has this name, or a folder `name`
+   in one of them.
 
-
-The door of robot_descriptions: robots by the names of that package, which fetches them when first asked.
-
-Nothing is imported that the package does not list as a description; what it then does, cloning a repository
-into its own cache, it does because the user has named one.
+robot_descriptions is a Python package. It clones the repository of a robot into its own cache at the first
+use. Only modules that it lists as descriptions are imported.
 """
 
 from __future__ import annotations
@@ -31,17 +28,17 @@ from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.system.files import exists, is_folder, read_start
 from urdfkin.urdf.catalogue import catalogue
 
-#: The environment's search paths.
+#: Environment variables with search paths.
 VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 
 _NAME = re.compile(rb"<name>([^<]*)</name>")
 
-#: Schemes that name a package and a path inside it.
+#: URI schemes that name a package and a path inside it.
 SCHEMES = ("package://", "model://")
 
 
 def split_uri(uri: str) -> tuple[str, str] | None:
-    """Package and path of a `package://` address; None for anything else.
+    """Return the package and the path of a `package://` address; None for any other text.
 
     >>> split_uri("package://ur_description/meshes/base.stl")
     ('ur_description', 'meshes/base.stl')
@@ -59,13 +56,13 @@ def find_package(
     environ: Mapping[str, str] = os.environ,
     accepts: Callable[[Path], bool] = lambda folder: True,
 ) -> Path | None:
-    """The folder of a package, or None.
+    """Return the folder of a package, or None.
 
     Args:
         name: The package.
-        beside: The file that refers to it; its parents are searched.
-        environ: The environment.
-        accepts: Whether a folder that is found may be it.
+        beside: The file that refers to the package; the folders above it are searched.
+        environ: The environment variables.
+        accepts: A filter: returns whether a candidate folder is acceptable.
     """
     if not name or name in (".", "..") or "\0" in name:
         return None
@@ -89,7 +86,7 @@ def _candidates(name: str, beside: Path | None, environ: Mapping[str, str]) -> I
 
 
 def _declares(manifest: Path, name: str) -> bool:
-    """Whether a package's manifest gives it this name."""
+    """Return whether a package.xml contains this name."""
     try:
         match = _NAME.search(read_start(manifest, 100_000))
     except OSError:
@@ -114,19 +111,19 @@ _DESCRIPTION_NAME = re.compile(r"\w+_description")
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """Where a description's file lies, and what a .xacro file is to be expanded with."""
+    """The file of a robot description, and the arguments for a .xacro file."""
 
     path: Path
     xacro_args: Mapping[str, object] = field(default_factory=dict)
 
 
 def described(source: object) -> Described | None:
-    """The file of a description, by its module or its name; None for any other source.
+    """Return the file of a robot description, by its module or name; None for any other source.
 
     Raises:
         InputError: the package is not installed, or the description has no URDF and no MJCF.
-        UnknownNameError: it has none of that name; the nearest are offered.
-        SourceError: it cannot be fetched.
+        UnknownNameError: there is no description of this name. The message lists the nearest names.
+        SourceError: the description cannot be downloaded.
     """
     if isinstance(source, str) and _DESCRIPTION_NAME.fullmatch(source) is not None:
         if source in catalogue() or exists(Path(source)):
@@ -140,19 +137,19 @@ def _module(name: str) -> ModuleType:
         raise InputError(
             f"{_PACKAGE} is not installed", where=name, remedy=f"pip install {_PACKAGE}, or name a file"
         )
-    from robot_descriptions import DESCRIPTIONS  # noqa: PLC0415  only for who names one
+    from robot_descriptions import DESCRIPTIONS  # noqa: PLC0415  only for its descriptions
 
     if name not in DESCRIPTIONS:
         raise UnknownNameError("robot description", name, DESCRIPTIONS)
     try:
         return importlib.import_module(f"{_PACKAGE}.{name}")
-    except Exception as error:  # git's own, of which there are many kinds
-        said = str(error).strip().splitlines() or [type(error).__name__]
+    except Exception as error:  # git has many exception classes
+        message = str(error).strip().splitlines() or [type(error).__name__]
         raise SourceError(
-            "this robot description cannot be fetched",
+            "this robot description cannot be downloaded",
             where=name,
-            found=said[-1].strip(),
-            remedy="its repository is cloned when it is first asked for, which needs git and the network",
+            found=message[-1].strip(),
+            remedy="check git and the network: the repository is cloned at the first use",
         ) from error
 
 
@@ -164,7 +161,7 @@ def _file(module: Any) -> Described:
     if hasattr(module, "MJCF_PATH"):
         return Described(Path(module.MJCF_PATH))
     raise InputError(
-        "a module is a robot where it has URDF_PATH, XACRO_PATH or MJCF_PATH",
+        "this module has neither URDF_PATH nor XACRO_PATH nor MJCF_PATH",
         where=module.__name__,
-        remedy=f"a description of {_PACKAGE} has",
+        remedy=f"pass a description module of {_PACKAGE}",
     )

@@ -1,7 +1,8 @@
-"""A `pinocchio.Model` to a kinematic tree, from its joints and frames; Pinocchio itself is not needed for it.
+"""Convert a `pinocchio.Model` to a kinematic tree, without importing Pinocchio.
 
-A model keeps no URDF. Its joints are taken as they stand; a frame of a body that lies on a joint is that
-joint's child link, every other frame is fixed to where it lies, so that each can be asked for by its name.
+A model does not store its URDF, so the tree is built from its joints and frames. A body frame that coincides
+with a joint becomes the child link of this joint. Every other frame becomes a link on a fixed joint, so that
+each frame is available by its name.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 from urdfkin.urdf.mjcf import UNBOUNDED
 
 _ROOT = "universe"
-#: Joints about, or along, an axis of their frame, and about another, whose model says which.
+#: Joints about (R, RUB: unbounded) or along (P) an axis of their frame. The others are in `_KINDS`.
 _ALIGNED = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
     "R": JointKind.REVOLUTE,
@@ -32,13 +33,19 @@ _KINDS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: What Pinocchio writes where there is no limit is the largest double.
+#: A larger limit is none: Pinocchio writes the largest double.
 _ENDLESS = 1e300
 
 
 @dataclass(frozen=True, slots=True)
 class Modelled:
-    """A tree, and which of the model's joints each of its links lies on, or which of its frames it is."""
+    """The tree of a model.
+
+    Attributes:
+        tree: The kinematic tree.
+        joints: For a link that coincides with a joint: the index of this joint in the model.
+        frames: For every other link: the index of its frame in the model.
+    """
 
     tree: KinematicTree
     joints: dict[str, int]
@@ -46,22 +53,24 @@ class Modelled:
 
 
 def is_model(source: object) -> TypeGuard[Any]:
-    """Whether something is Pinocchio's, told by its class, so that nothing is imported for others."""
+    """Return whether an object is Pinocchio's Model or RobotWrapper, by its class name, without imports."""
     kinds = [(kind.__module__.partition(".")[0], kind.__name__) for kind in type(source).__mro__]
     return ("pinocchio", "Model") in kinds or ("pinocchio", "RobotWrapper") in kinds
 
 
 def tree_of_model(source: Any) -> Modelled:
-    """The tree of a model, or of a `RobotWrapper`'s.
+    """Return the tree of a model or of a `RobotWrapper`.
 
     Raises:
-        InputError: a joint that no URDF can hold.
+        InputError: URDF has no equivalent of a joint.
     """
     model = getattr(source, "model", source)
-    return _Reading(model).modelled()
+    return _ModelReader(model).read()
 
 
-class _Reading:
+class _ModelReader:
+    """Convert one model; the attributes are the intermediate results."""
+
     def __init__(self, model: Any) -> None:
         self.model = model
         self.frames = list(model.frames)
@@ -70,29 +79,30 @@ class _Reading:
         self.places = [np.array(frame.placement.homogeneous) for frame in self.frames]
         self.bodies = dict(self._bodies_on_joints())
         joints = range(int(model.njoints))
-        names = {j: self.frames[self.bodies[j]].name if j in self.bodies else self._made(j) for j in joints}
+        bodies = self.bodies
+        names = {j: self.frames[bodies[j]].name if j in bodies else self._default_name(j) for j in joints}
         self.carriers = {j: self._new("link", name) for j, name in names.items()}
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
-        """The first body that lies on each joint, and its frame."""
+        """Yield each joint with the frame of the first body that coincides with it."""
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.places[i] == np.eye(4)).all():
                 yield int(self.frames[i].parentJoint), i
 
-    def _made(self, joint: int) -> str:
+    def _default_name(self, joint: int) -> str:
         return f"{self.model.names[joint]}_link" if joint else _ROOT
 
     def _new(self, kind: str, name: str) -> str:
-        """The name, or one like it where it is taken."""
+        """Return the name, with underscores appended until it is unique."""
         while name in self.names[kind]:
             name += "_"
         self.names[kind].add(name)
         return name
 
-    def modelled(self) -> Modelled:
-        """Frames first, in their order, which has parents before children; then the joints that move."""
+    def read(self) -> Modelled:
+        """Convert the frames in their order (parents before children), then the moving joints."""
         for i in range(len(self.frames)):
             self._frame(i)
         own = {
@@ -100,14 +110,16 @@ class _Reading:
         }
         for j in range(1, int(self.model.njoints)):
             parent = int(self.model.parents[j])
-            link, T = self._hung(own.get(j), parent, np.array(self.model.jointPlacements[j].homogeneous))
+            link, T = self._attachment(
+                own.get(j), parent, np.array(self.model.jointPlacements[j].homogeneous)
+            )
             self.rows.append((self._joint(j, T), link, self.carriers[j]))
         tree = build_tree(str(self.model.name) or "robot", self.carriers[0], self.rows)
         joints = {link: j for j, link in self.carriers.items()}
         return Modelled(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
-    def _hung(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
-        """From which link something hangs that lies at T on a joint, and where it lies there."""
+    def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
+        """Return the parent link of a frame with pose T on a joint, and its pose relative to this link."""
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
             return self.carriers[joint], T
@@ -123,36 +135,35 @@ class _Reading:
         if kind == "BODY" and fixed and (self.places[i] == self.places[above]).all() and above in self.links:
             self.links[i] = self.links[above]
             return
-        link, T = self._hung(frame, joint, self.places[i])
+        link, T = self._attachment(frame, joint, self.places[i])
         if kind == "FIXED_JOINT":
             body = next((f for f in self.frames[i + 1 :] if int(f.parentFrame) == i), None)
             child, name = self._new("link", body.name if body is not None else frame.name), frame.name
         else:
             child, name = self._new("link", frame.name), f"{frame.name}_fixed"
-        held = Joint(self._new("joint", name), JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0]))
-        self.rows.append((held, link, child))
+        fixed_joint = Joint(self._new("joint", name), JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0]))
+        self.rows.append((fixed_joint, link, child))
         self.links[i] = child
 
     def _joint(self, j: int, T: FloatArray) -> Joint:
         model = self.model
         joint, name = model.joints[j], str(model.names[j])
-        shown = str(joint.shortname())
-        aligned = _ALIGNED.fullmatch(shown)
-        kind = _KINDS.get(aligned[1] if aligned else shown)
+        class_name = str(joint.shortname())
+        aligned = _ALIGNED.fullmatch(class_name)
+        kind = _KINDS.get(aligned[1] if aligned else class_name)
         if kind is None:
-            mimics = shown.endswith("Mimic")
-            what = (
-                "Python cannot see what moves in a mimic joint" if mimics else "no URDF can hold this joint"
-            )
+            mimics = class_name.endswith("Mimic")
             raise InputError(
-                f"{what} of a pinocchio.Model",
+                "Pinocchio's Python interface does not show the axis of a mimic joint"
+                if mimics
+                else "URDF has no equivalent of this joint of a pinocchio.Model",
                 where=f"joint {name}",
-                found=shown,
+                found=class_name,
                 remedy="build the model with mimic=False" if mimics else "give the robot as a URDF",
             )
         axis = np.eye(3)["XYZ".index(aligned[2])] if aligned else np.array([1.0, 0.0, 0.0])
-        if shown.endswith("Unaligned"):
-            # Not every kind has `axis` in Python (4.1); the joint's motion subspace has it for each.
+        if class_name.endswith("Unaligned"):
+            # Some joint classes have no `axis` in Python (4.1). The motion subspace S contains it.
             linear, angular = np.split(np.ravel(joint.createData().S), 2)
             axis = linear + angular
         if not kind.has_axis:

@@ -1,7 +1,7 @@
-"""XML as urdfdom's parser takes it: names as they are written, prefixes that nobody declared included.
+"""Parse XML like urdfdom: names as written, with undeclared namespace prefixes allowed.
 
-ElementTree's own reader refuses an undeclared prefix, and with it a robot that urdfdom reads. This is a
-second reader beside `urdfkin.lint.rules.document`, for those who check what was read through that one.
+ElementTree's own parser refuses an undeclared prefix, which urdfdom accepts. This second parser is
+independent of `urdfkin.lint.rules.document` and serves to check its results.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ from xml.parsers import expat
 
 
 def plain_xml(text: str) -> Element:
-    """The root element of a text that passed the checks.
+    """Return the root element of a URDF that passed the checks.
 
     Raises:
-        expat.ExpatError: it is not well-formed.
+        expat.ExpatError: the text is not well-formed.
 
     >>> plain_xml("<robot><drake:x/></robot>")[0].tag
     'drake:x'
     """
     builder = TreeBuilder()
-    parser = expat.ParserCreate("utf-8")  # without a separator, namespaces are not processed
+    parser = expat.ParserCreate("utf-8")  # no separator: namespaces are not processed
     parser.buffer_text = True
     parser.StartElementHandler = builder.start
     parser.EndElementHandler = builder.end

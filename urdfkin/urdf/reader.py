@@ -1,8 +1,7 @@
-"""What a URDF says to `KinematicTree`.
+"""Build a `KinematicTree` from the records of a URDF, or from a robot of yourdfpy.
 
-The records were read once and strictly (`urdfkin.lint`). What the URDF specification says beyond them is done
-here: axes are normalised, chains of mimic joints are resolved, joints are put in Pinocchio's order. A robot
-that yourdfpy holds comes the same way.
+`urdfkin.lint` reads the records, once and strictly. This module normalises the axes, resolves chains of mimic
+joints, and sorts the joints in Pinocchio's order.
 """
 
 from __future__ import annotations
@@ -39,16 +38,16 @@ _NOWHERE = Element("", {}, None, 0, 0, 0)
 
 
 def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
-    """The kinematic tree of a URDF.
+    """Return the kinematic tree of a URDF.
 
     Args:
-        urdf: What was read of the text, found free of errors by `urdfkin.lint`.
-        mimic: Whether mimic joints follow their leaders (the URDF's meaning) or move freely.
-        root_joint: `"floating"` or `"planar"` hangs the root link from a moving joint `root_joint`.
+        urdf: The records of the URDF, without errors (see `urdfkin.lint`).
+        mimic: True: mimic joints follow their mimicked joints, as URDF defines. False: they move freely.
+        root_joint: `"floating"` or `"planar"` adds a joint `root_joint` of this kind above the root link.
 
     Raises:
-        InputError: the joints make no tree, a mimic joint cannot follow, or `root_joint` is no such kind.
-        UnknownNameError: a mimic joint names a leader that does not exist.
+        InputError: the joints form no tree, mimic joints form a circle, or `root_joint` has another value.
+        UnknownNameError: the mimicked joint of a mimic joint does not exist.
     """
     name = urdf.element.attributes.get("name", "")
     tree = build_tree(name, _root(name, urdf.links, urdf.joints), _rows(urdf.joints, mimic=mimic))
@@ -56,14 +55,14 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
 
 
 def urdf_of(robot: yourdf.Robot) -> str:
-    """The URDF of a robot that yourdfpy holds; its own writer (0.0.60) leaves mimic rules out.
+    """Return the URDF of a yourdfpy robot. The writer of yourdfpy (0.0.60) omits mimic rules.
 
-    Axes are written as they are, so that the checks see their lengths.
+    The axes are not normalised, so that the checks can report their lengths.
 
     Raises:
-        InputError: the joints make no tree, a mimic joint cannot follow, limits that a URDF needs are
-            missing, or something stands where a name or a number should.
-        UnknownNameError: a mimic joint names a leader that does not exist.
+        InputError: the joints form no tree, mimic joints form a circle, required limits are missing, or a
+            name or number has a wrong type.
+        UnknownNameError: the mimicked joint of a mimic joint does not exist.
     """
     try:
         records = [_record(joint) for joint in robot.joints]
@@ -81,7 +80,7 @@ def urdf_of(robot: yourdf.Robot) -> str:
 
 
 def _record(joint: yourdf.Joint) -> JointRecord:
-    """A joint of yourdfpy's, as if it had been read."""
+    """Convert a joint of yourdfpy to a record."""
     T = np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=np.float64)
     axis = (1.0, 0.0, 0.0) if joint.axis is None else tuple(map(float, joint.axis))
     limit, rule = joint.limit, joint.mimic
@@ -102,13 +101,15 @@ def _rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Jo
 def _root(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
-        raise InputError("a robot has one root link", where=name, found=", ".join(sorted(roots)) or "none")
+        raise InputError(
+            "a robot must have one root link", where=name, found=", ".join(sorted(roots)) or "none"
+        )
     return roots.pop()
 
 
 def _root_kind(word: str) -> JointKind:
     if word not in ("floating", "planar"):
-        raise InputError("root_joint is 'floating', 'planar' or None", found=repr(word))
+        raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(word))
     return JointKind(word)
 
 
@@ -128,13 +129,13 @@ def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
 
 
 def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:
-    """Roll, pitch and yaw of a quaternion (x, y, z, w) of any length, as URDF 1.1 writes it."""
+    """Return roll, pitch and yaw (rad) of a quaternion (x, y, z, w) of any length, as in URDF 1.1."""
     scaled = np.asarray(quaternion) / np.abs(quaternion).max()
     return rpy_of(rotation_of(scaled / np.linalg.norm(scaled)))
 
 
 def _unit(axis: FloatArray, joint: str) -> FloatArray:
-    """The axis divided by its length, as Pinocchio does; an axis that is a unit vector stays as it is."""
+    """Divide an axis by its length, as Pinocchio does; return a unit vector unchanged."""
     length = math.hypot(*axis)
     if not 0.0 < length < math.inf:
         raise InputError("a joint's axis has no direction", where=f"joint {joint}", found=str(axis.tolist()))
@@ -145,7 +146,7 @@ def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     if limit is None or kind.nv == 0:
         return None
     bounded = kind in (JointKind.REVOLUTE, JointKind.PRISMATIC)
-    # A bound that is not written is zero, as in urdfdom; the specification ignores a continuous joint's.
+    # A missing bound is zero, as in urdfdom. The specification ignores the bounds of a continuous joint.
     return Limit(
         lower=(limit.lower or 0.0) if bounded else -math.inf,
         upper=(limit.upper or 0.0) if bounded else math.inf,
@@ -155,31 +156,31 @@ def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
 
 
 def _rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
-    """Whom each follower follows in the end: along a chain multipliers multiply and offsets add up.
+    """Return the mimic rule of each mimic joint, in terms of a joint that is not a mimic joint.
 
-    A chain is resolved from the joint that moves outwards: so each joint is looked at once, and the doubles
-    are those that the oracle has, which resolves them for itself.
+    A chain of rules is composed into one: y = m2 (m1 x + b1) + b2. The composition begins at the joint that
+    is not a mimic joint. So each joint is visited once, and the rounding is the same as in the oracle.
     """
     named = {joint.name: joint for joint in joints}
     resolved: dict[str, Mimic] = {}
     for start in joints:
-        joint, waiting = start, dict[str, MimicRecord]()
+        joint, pending = start, dict[str, MimicRecord]()
         while (rule := _rule(joint)) is not None and joint.name not in resolved:
-            waiting[joint.name] = rule
+            pending[joint.name] = rule
             if rule.leader not in named:
                 raise UnknownNameError(
-                    "mimic leader",
+                    "mimicked joint",
                     str(rule.leader),
                     named,
                     where=f"joint {joint.name} (mimic=False, --no-mimic, lets it move freely)",
                 )
-            if rule.leader in waiting:
+            if rule.leader in pending:
                 raise InputError("mimic joints follow each other in a circle", where=f"joint {start.name}")
             joint = named[rule.leader]
         end = resolved.get(joint.name, Mimic(joint.name, 1.0, 0.0))
-        for follower, rule in reversed(waiting.items()):
+        for name, rule in reversed(pending.items()):
             offset = rule.multiplier * end.offset + rule.offset
-            end = resolved[follower] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
+            end = resolved[name] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
     return resolved
 
 

@@ -1,7 +1,7 @@
-"""What a URDF says of its links and joints, as plain data: `lint.rules.joints` reads it, once and strictly.
+"""Links and joints of a URDF as plain data. `lint.rules.joints` fills these records, once and strictly.
 
-A value that is None could not be read, and that has been reported; a value that was not written has the
-specification's default.
+None marks a value that could not be read; a finding reports it. A value that the file does not write has the
+default of the specification.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from urdfkin.urdf.element import Element
 
 Vector = tuple[float, ...]
 
-#: Limits that count from version 1.2 on.
+#: Limits that URDF defines from version 1.2 on.
 FURTHER_LIMITS = ("acceleration", "deceleration", "jerk")
 
-#: Types whose motion has an axis.
+#: Joint types with an axis.
 AXIAL = ("revolute", "continuous", "prismatic")
 
 
 @dataclass(slots=True)
 class LimitRecord:
-    """A `<limit>`: what is written, None for what is not."""
+    """A `<limit>`; None marks an attribute that is not written."""
 
     element: Element
     lower: float | None
@@ -64,7 +64,7 @@ class JointRecord:
 
 @dataclass(slots=True)
 class RobotRecord:
-    """A `<robot>`: its links and joints in the order of the file."""
+    """A `<robot>`: its links and joints, in file order."""
 
     element: Element
     version: tuple[int, int]
@@ -73,7 +73,7 @@ class RobotRecord:
 
     @property
     def by_name(self) -> dict[str, JointRecord]:
-        """Joints by name; the first of two that share one."""
+        """The joints by name; of two joints with the same name, the first."""
         found: dict[str, JointRecord] = {}
         for joint in self.joints:
             found.setdefault(joint.name, joint)

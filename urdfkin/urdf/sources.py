@@ -1,6 +1,7 @@
-"""Where a robot comes from and how it was asked for, in words that ask for it again.
+"""Read a robot from any source, and record how to load it again.
 
-Where a robot comes from: a path, `package://...`, a catalogue name, text, bytes, an open file, or `-`.
+A source is a path, a `package://` address, a catalogue name, text, bytes, an open file, or `-` (standard
+input).
 """
 
 from __future__ import annotations
@@ -21,20 +22,20 @@ from urdfkin.urdf.packages import find_package, split_uri
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """What was given to `load`.
+    """The arguments of `load`.
 
     Attributes:
-        source: A path, a catalogue name, `-`; text, bytes and streams without a name are `<text>`, `<bytes>`.
-        mimic: As it was given.
-        root_joint: As it was given.
-        xacro_args: Names and values.
-        oracle: Who checks besides Pinocchio or in its place, if anybody.
-        table: Whether it is a table, whose frames between base and tip are its convention's, not links that
-            somebody placed.
-        sha256: The digest of the MJCF that the URDF was made of; empty where the URDF itself was given.
+        source: A path, a catalogue name, `-`; or `<text>`, `<bytes>` for text, bytes and unnamed streams.
+        mimic: The argument `mimic`.
+        root_joint: The argument `root_joint`.
+        xacro_args: Names and values of the xacro arguments.
+        oracle: The argument `oracle`: a further or another oracle, or None.
+        table: Whether the robot comes from a Denavit-Hartenberg table. Then the table's convention places
+            the frames between base and tip.
+        sha256: The digest of the MJCF file behind the URDF; empty if the source is a URDF.
 
     Raises:
-        InputError: `mimic` is neither True, False nor None, or `root_joint` is no name.
+        InputError: `mimic` is neither True, False nor None, or `root_joint` is not a string.
     """
 
     source: str
@@ -53,12 +54,12 @@ class Origin:
 
     @property
     def again(self) -> str:
-        """What to pass to `load` to read it again; a text has to come from standard input."""
+        """The source for a second call of `load`; `-` (standard input) for text."""
         return "-" if self.source.startswith("<") else self.source
 
     @property
     def options(self) -> str:
-        """What a command line says besides.
+        """The options on a command line.
 
         >>> Origin("arm.xacro", mimic=False, xacro_args=(("arm", "left one"),)).options
         "--xacro-arg 'arm:=left one' --no-mimic"
@@ -74,7 +75,7 @@ class Origin:
 
     @property
     def words(self) -> str:
-        """The robot on a command line.
+        """The source and the options on a command line.
 
         >>> Origin("my arm.urdf", root_joint="floating").words
         "'my arm.urdf' --root-joint floating"
@@ -85,36 +86,36 @@ class Origin:
 
     @property
     def python(self) -> str:
-        """The robot in Python.
+        """The call of `load` in Python.
 
         >>> Origin("panda", mimic=False).python
         "urdfkin.load('panda', mimic=False)"
         """
-        given = {
+        values = {
             "mimic": self.mimic,
             "root_joint": self.root_joint,
             "xacro_args": dict(self.xacro_args) or None,
             "oracle": self.oracle,
         }
-        arguments = [f"{name}={value!r}" for name, value in given.items() if value is not None]
+        arguments = [f"{name}={value!r}" for name, value in values.items() if value is not None]
         return f"urdfkin.load({', '.join([repr(self.again), *arguments])})"
 
 
-#: What `load` and `check` take.
+#: Types of sources for `load` and `check`.
 Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
 
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A URDF that was read.
+    """The content of a URDF, with its source.
 
     Attributes:
-        data: Its bytes.
-        label: What to call it in messages: the path, `<text>`, `<stdin>`.
-        source: What to give again to get it again; `<text>`, `<bytes>` or `<file>` where that has no name.
-        entry: The catalogue's entry, if that is where it came from.
-        xacro_args: Names and values that it was expanded with.
-        sha256: The digest of the MJCF that it was made of; empty for a URDF.
+        data: The bytes.
+        label: The name in messages: the path, `<text>`, `<stdin>`.
+        source: The source for a second reading; `<text>`, `<bytes>` or `<file>` if it has no name.
+        entry: The catalogue entry, or None.
+        xacro_args: Names and values of the xacro arguments.
+        sha256: The digest of the MJCF file behind the URDF; empty for a URDF.
     """
 
     data: bytes
@@ -126,28 +127,29 @@ class Text:
 
 
 def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, object] | None = None) -> Text:
-    """The bytes of a URDF, wherever it is.
+    """Read a URDF from any source.
 
-    A catalogue name comes before a file of the same name without a folder; write `./panda` for the file.
+    A catalogue name has priority over a file of the same name in the current folder. Write `./panda` for the
+    file.
 
     Args:
-        source: Any of the above.
-        most: Bytes (characters, for text files) after which reading ends, with one more, so that the checks
-            see that there are too many: a device may never end.
+        source: One of the sources in the module docstring.
+        most: Size limit in bytes (in characters, for text files). One more is read, so that the checks detect
+            a longer source. A device may have no end.
         xacro_args: Arguments for a .xacro file, which is expanded.
 
     Raises:
         SourceError: the file cannot be read.
-        UnknownNameError: neither a file nor a name of the catalogue, or an argument that the xacro file does
-            not take; the nearest names are offered.
-        InputError: something else than a source.
+        UnknownNameError: the source is neither a file nor a catalogue name, or the xacro file does not
+            declare an argument. The message lists the nearest names.
+        InputError: the type of the source is wrong.
     """
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
-        raise InputError("xacro_args are a mapping from names to values", found=safe_repr(xacro_args))
+        raise InputError("xacro_args must be a mapping from names to values", found=safe_repr(xacro_args))
     if isinstance(source, str) and (address := split_uri(source)) is not None:
         source = _in_package(*address)
     if is_xacro(source):
-        return _expanded(at_home(source), xacro_args or {})
+        return _expand_xacro(at_home(source), xacro_args or {})
     if xacro_args:
         raise InputError(
             "xacro_args go with the path of a .xacro file", found=", ".join(map(str, xacro_args))
@@ -157,18 +159,18 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     if isinstance(source, os.PathLike):
         return _read_file(Path(source), most)
     if isinstance(source, str):
-        return _read_word(source, most)
+        return _read_string(source, most)
     if hasattr(source, "read"):
         label = str(getattr(source, "name", "<file>"))
-        return _encoded(source.read(most + 1), label, label)
+        return _encode(source.read(most + 1), label, label)
     raise InputError(
-        "a robot comes from a path, a catalogue name, URDF text, bytes or an open file",
+        "the source must be a path, a catalogue name, URDF text, bytes or an open file",
         found=type(source).__name__,
     )
 
 
 def is_xacro(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Whether a source is the path of a xacro file, by its name.
+    """Return whether a source is the path of a xacro file, by its suffix.
 
     >>> is_xacro("arm.urdf.xacro"), is_xacro("arm.urdf"), is_xacro("<robot/>")
     (True, False, False)
@@ -178,22 +180,24 @@ def is_xacro(source: object) -> TypeGuard[str | os.PathLike[str]]:
     return isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == ".xacro"
 
 
-def _expanded(path: Path, arguments: Mapping[str, object]) -> Text:
-    from urdfkin.urdf.xacro import expand  # noqa: PLC0415  only for those who pass xacro
+def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> Text:
+    from urdfkin.urdf.xacro import expand  # noqa: PLC0415  only .xacro files need it
 
     words = {name: str(value) for name, value in arguments.items()}
     return Text(expand(path, words), f"{path} (expanded)", as_word(path), xacro_args=tuple(words.items()))
 
 
-def _read_word(word: str, most: int) -> Text:
+def _read_string(word: str, most: int) -> Text:
     if not word.strip():
         raise InputError(
-            "no robot is named", found=repr(word), remedy="a path, a name that 'urdfkin robots' lists, or '-'"
+            "the robot's name is empty",
+            found=repr(word),
+            remedy="a path, a name that 'urdfkin robots' lists, or '-'",
         )
     if word == "-":
         return Text(read_start_of_standard_input(most + 1), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):
-        return _encoded(word, "<text>", "<text>")
+        return _encode(word, "<text>", "<text>")
     if (entry := catalogue().get(word)) is not None:
         read = _read_file(entry.path, most)
         return Text(read.data, read.label, word, entry)
@@ -204,7 +208,7 @@ def _read_word(word: str, most: int) -> Text:
 
 
 def _in_package(name: str, path: str) -> Path:
-    """The file of a `package://` address, which the current folder is searched for, too."""
+    """Return the file of a `package://` address. The current folder is searched, too."""
     folder = find_package(name, Path(path).absolute())
     if folder is None:
         raise SourceError(
@@ -216,8 +220,8 @@ def _in_package(name: str, path: str) -> Path:
     return folder / path
 
 
-def _encoded(content: str | bytes, label: str, source: str) -> Text:
-    # A lone surrogate cannot be encoded; it reaches the checks as the bytes they refuse.
+def _encode(content: str | bytes, label: str, source: str) -> Text:
+    # UTF-8 has no lone surrogate; "surrogatepass" encodes one as bytes that the checks reject.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return Text(data, label, source)
 
@@ -230,13 +234,13 @@ def _read_file(path: Path, most: int) -> Text:
             raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
         if isinstance(error.__cause__, IsADirectoryError):
             raise SourceError(
-                "a folder, not a file", where=str(path), remedy="name the .urdf inside"
+                "this is a folder, not a file", where=str(path), remedy="name the .urdf file in it"
             ) from None
         raise
 
 
 def as_word(path: Path) -> str:
-    """A path that cannot be taken for a name of the catalogue, an option, standard input or text."""
+    """Return a path as a word that is no catalogue name, option, `-` or text: add `./` if necessary."""
     word = str(path)
     return f"./{word}" if word in catalogue() or word.startswith(("-", "<")) else word
 
@@ -245,6 +249,6 @@ def _nearest_file(path: Path) -> str:
     try:
         names = [entry.name for entry in path.parent.iterdir()]
     except OSError:
-        return f"there is no folder {path.parent}"
+        return f"the folder {path.parent} does not exist"
     close = nearest(path.name, names)
     return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists names that need no file"

@@ -1,6 +1,6 @@
-"""URDF text from what other libraries hold: an ElementTree, of Python's or of lxml's, or yourdfpy's robot.
+"""Convert objects of other libraries to URDF text: ElementTree, lxml and yourdfpy.
 
-Told apart by what they have and not by their classes, so that no library is imported for another one's sake.
+The library is recognized by the object's attributes and module name, so that no library is imported.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ class XmlElement(Protocol):
 
     @property
     def tag(self) -> Any:
-        """Its name."""
+        """The name of the element."""
 
     @property
     def attrib(self) -> Any:
-        """Names and values."""
+        """The names and values of the attributes."""
 
 
 class XmlTree(Protocol):
-    """A tree of such elements."""
+    """A tree of `XmlElement`."""
 
     def getroot(self) -> Any:
-        """Its first element."""
+        """Return the root element."""
 
 
 def text_of(source: Any) -> tuple[str, str] | None:
-    """The text, and what to call it in messages; None for any other source.
+    """Return the URDF text of an object and its name in messages; None for any other source.
 
     Raises:
-        InputError: an element holds what XML cannot, or a yourdfpy robot is no tree.
+        InputError: an element cannot be written as XML, or a yourdfpy robot is not a tree.
     """
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
-        from urdfkin.urdf.reader import urdf_of  # noqa: PLC0415  the door of yourdfpy
+        from urdfkin.urdf.reader import urdf_of  # noqa: PLC0415  only for yourdfpy
 
         return urdf_of(getattr(source, "robot", source)), "<yourdfpy>"
     root = source.getroot() if hasattr(source, "getroot") else source
@@ -50,10 +50,10 @@ def text_of(source: Any) -> tuple[str, str] | None:
 
 
 def without_rotation(source: Any) -> list[str]:
-    """Joints of a yourdfpy robot whose origin has no rotation; none for any other source.
+    """Return the joints of a yourdfpy robot whose origin has no rotation; none for any other source.
 
-    yourdfpy (0.0.60) drops the attribute quat_xyzw and keeps no text: whether the file wrote a rotation so
-    cannot be seen any more.
+    yourdfpy (0.0.60) ignores the attribute quat_xyzw and does not store the text. A rotation that the file
+    writes as quat_xyzw is therefore lost without a trace.
     """
     robot = getattr(source, "robot", source)
     if not type(robot).__module__.startswith("yourdfpy"):
@@ -66,18 +66,18 @@ def without_rotation(source: Any) -> list[str]:
 
 
 def _text(root: Any) -> str:
-    """Elements, attributes and text; comments, whose tag is no name, are left out."""
+    """Write elements, attributes and text; skip comments, whose tag is not a string."""
     if not isinstance(root.tag, str):
-        raise InputError("an ElementTree whose root is no element", found=safe_repr(root.tag))
+        raise InputError("the root of this ElementTree is not an element", found=safe_repr(root.tag))
     try:
         copy = ElementTree.Element(root.tag, dict(root.attrib))
         open_ = [(root, copy)]
         while open_:
-            element, made = open_.pop()
-            made.text = element.text
+            element, duplicate = open_.pop()
+            duplicate.text = element.text
             for child in element:
                 if isinstance(child.tag, str):
-                    open_.append((child, ElementTree.SubElement(made, child.tag, dict(child.attrib))))
+                    open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
         return ElementTree.tostring(copy, encoding="unicode")
     except (TypeError, AttributeError, RecursionError) as error:
-        raise InputError("an ElementTree that cannot be written as XML", found=str(error)) from None
+        raise InputError("this ElementTree cannot be written as XML", found=str(error)) from None

@@ -1,13 +1,10 @@
-"""`KinematicTree` to URDF text that reads back as the same tree.
+"""Write a `KinematicTree` as URDF text, and insert attributes and elements into an existing text.
 
-Numbers are written so that they read back bit for bit; a joint's rotation becomes roll, pitch and yaw, which
-give it back to rounding.
+Numbers read back bit for bit. A joint's rotation is written as roll, pitch and yaw, which reproduce it up to
+rounding.
 
-
-Attributes and elements put into a URDF where they belong, as edits of its text.
-
-An element's place is the one that the parser gave it (`Element.offset`), in the bytes that follow a byte
-order mark. What is new stands as the text around it does: between its quotes, with its line ends and blanks.
+An insertion is an `Edit` of the bytes after a byte order mark. Its position comes from `Element.offset`, and
+it uses the indentation and line ends of the surrounding text.
 """
 
 from __future__ import annotations
@@ -22,21 +19,22 @@ from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit
 from urdfkin.system.files import Edit
 from urdfkin.urdf.element import ATTRIBUTE, START_TAG, Element
 
-#: Kinds whose position limits a URDF must give.
+#: Joint kinds that need position limits in a URDF.
 _BOUNDED = (JointKind.REVOLUTE, JointKind.PRISMATIC)
 
 
 def to_urdf(tree: KinematicTree) -> str:
-    """A URDF of the tree's links and joints; they have no shapes and no masses.
+    """Write the links and joints of a tree as URDF, without shapes and masses.
 
-    A limit of effort or velocity that is infinite cannot be written in URDF 1.0; the file then says version
-    1.2, where it is left out.
+    URDF 1.0 has no notation for an infinite effort or velocity limit. A file with such a limit declares
+    version 1.2, which allows the attribute to be missing.
 
     Args:
         tree: The robot.
 
     Raises:
-        InputError: a revolute or prismatic joint without finite limits, or a name that XML cannot hold.
+        InputError: a revolute or prismatic joint has no finite limits, or XML does not allow a character of a
+            name.
 
     >>> from urdfkin.model.tree import build_tree
     >>> print(to_urdf(build_tree("stone", "only", [])))
@@ -60,7 +58,7 @@ def _needs_newer(joint: Joint) -> bool:
     if limit is None:
         return False
     infinite = [math.isinf(limit.effort), math.isinf(limit.velocity)]
-    # A joint that needs no <limit> goes without when there is nothing finite to say.
+    # A joint without position limits needs no <limit> if all other limits are infinite.
     return any(infinite) and (joint.kind in _BOUNDED or not all(infinite))
 
 
@@ -88,7 +86,7 @@ def _limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
             "a URDF needs finite position limits for a revolute or prismatic joint",
             where=f"joint {joint.name}",
             found="none" if limit is None else f"{limit.lower} to {limit.upper}",
-            remedy="give it limits; a joint that turns freely is continuous",
+            remedy="give it limits, or make a joint that rotates without limits continuous",
         )
     if limit is None:
         return
@@ -101,7 +99,7 @@ def _limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Numbers that read back bit for bit, with a space between them.
+    """Format numbers so that they read back bit for bit, separated by spaces.
 
     >>> numbers([0.1, -0.0, 1e-17])
     '0.1 -0.0 1e-17'
@@ -113,19 +111,19 @@ _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;",
 
 
 def attribute(text: str) -> str:
-    """A text as an attribute's value.
+    """Escape a text as the value of an attribute.
 
     Raises:
-        InputError: it holds a character that XML cannot.
+        InputError: XML does not allow a character of the text.
     """
     bad = next((c for c in text if not _is_xml(c)), None)
     if bad is not None:
-        raise InputError("XML cannot hold this character", where=repr(text), found=f"U+{ord(bad):04X}")
+        raise InputError("XML does not allow this character", where=repr(text), found=f"U+{ord(bad):04X}")
     return "".join(_ESCAPES.get(character, character) for character in text)
 
 
 def _is_xml(character: str) -> bool:
-    """Whether XML 1.0 allows a character (production Char)."""
+    """Return whether XML 1.0 allows a character (production Char)."""
     code = ord(character)
     return code in (9, 10, 13) or 0x20 <= code <= 0xD7FF or 0xE000 <= code <= 0xFFFD or code >= 0x10000
 
@@ -134,7 +132,7 @@ _INDENTATION = re.compile(rb"((?:\r\n|\r|\n)?[ \t]*+)\Z")
 
 
 def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iterator[Edit]:
-    """Edits that give an element's attributes these values; those that it has not come behind the others."""
+    """Yield the edits that set attributes of an element; new attributes are added after the existing ones."""
     name_end = at.offset + 1 + len(at.tag.encode())
     tag = START_TAG.match(data, at.offset)
     end = tag.end() if tag else name_end
@@ -152,6 +150,6 @@ def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iter
 
 
 def before(data: bytes, at: Element, element: str) -> Edit:
-    """The edit that puts an element, as text, before another, on a line of its own if that has one."""
+    """Return the edit that inserts a new element before another one, on its own line if the other has one."""
     indentation = _INDENTATION.search(data[max(0, at.offset - 1000) : at.offset])
     return Edit(at.offset, at.offset, element + (indentation[1].decode() if indentation else ""))

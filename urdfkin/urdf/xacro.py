@@ -1,15 +1,12 @@
-"""Which arguments a xacro file takes, so that one that it does not take can be refused: xacro ignores it.
+"""Expand a .xacro file to URDF text, in a separate process with restricted rights.
 
-The file and what it includes are read, not expanded, in the confined process that expands them. An include
-whose name is computed, that is not found, or that may not be read, may declare anything: then nothing is
-known, and nothing is refused.
+A xacro file is a program, and may come from an untrusted source. `expanding` is the code of the separate
+process. docs/xacro.md lists the operations that a file may do. Packages are found by `urdfkin.urdf.packages`,
+without ROS.
 
-
-A .xacro file to URDF text, in a process of its own that is trusted with nothing.
-
-xacro files are programs, and they come with robots from anywhere. The process finds packages as
-`urdfkin.urdf.packages` does, nothing else of ROS is needed; `expanding` is its side, and docs/xacro.md says
-what a file may do.
+xacro ignores an argument that the file does not declare; urdfkin raises an error. To find the declared
+arguments, the separate process reads the file and its includes. Some includes cannot be read: their name is
+computed, the file is not found, or the file is not allowed. Then no argument is refused.
 """
 
 from __future__ import annotations
@@ -32,10 +29,10 @@ from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.expressions import RefusedError
 from urdfkin.urdf.packages import VARIABLES
 
-#: Bytes of a file, and files, beyond which nothing is known either.
+#: Limits of the search for declared arguments: bytes of a file, and number of files.
 MOST_ARGUMENTS, MOST_FILES = 10_000_000, 200
 
-#: What finds the folder of a package, or raises LookupError.
+#: A function that returns the folder of a package, or raises LookupError.
 Find = Callable[[str], str]
 
 _USED = re.compile(r"\$\(arg\s+([^\s()]+)\s*\)")
@@ -49,21 +46,24 @@ def check_arguments(path: Path, given: Iterable[str], known: Collection[str] | N
     Args:
         path: The file.
         given: Names of arguments.
-        known: The names that `arguments_of` has found; None: nothing is refused.
+        known: The names from `arguments_of`; None: no argument is refused.
 
     Raises:
-        UnknownNameError: with those that it takes.
+        UnknownNameError: an argument is not among the known names, which the message lists.
     """
     if known is not None and (unknown := [name for name in given if name not in known]):
         raise UnknownNameError("xacro argument", unknown[0], known, where=str(path))
 
 
 def arguments_of(path: Path, find: Find) -> set[str] | None:
-    """Names in `<xacro:arg>` and `$(arg)` of a file and its includes; None where not all can be read.
+    """Return the names in `<xacro:arg>` and `$(arg)` of a file and its includes.
 
     Args:
         path: The file.
-        find: What finds packages.
+        find: A function that returns the folder of a package.
+
+    Returns:
+        The names, or None if an include cannot be read.
     """
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     while files:
@@ -82,7 +82,7 @@ def arguments_of(path: Path, find: Find) -> set[str] | None:
             if "xacro" in namespace and tag == "arg":
                 names.add(element.get("name", ""))
             if "xacro" in namespace and tag == "include":
-                included = _included(element.get("filename", ""), file, find)
+                included = _included_file(element.get("filename", ""), file, find)
                 if included is None:
                     return None
                 files.append(included)
@@ -96,8 +96,8 @@ def _read(file: Path) -> Xml.Element | None:
         return None
 
 
-def _included(name: str, beside: Path, find: Find) -> Path | None:
-    """The file that an include names, or None where that is computed or not found."""
+def _included_file(name: str, beside: Path, find: Find) -> Path | None:
+    """Return the path of an included file, or None if the name is computed or the package is not found."""
     folder = beside.parent
     if match := _FIND.match(name):
         try:
@@ -108,30 +108,30 @@ def _included(name: str, beside: Path, find: Find) -> Path | None:
     return None if _COMPUTED.search(name) or not name else folder / name
 
 
-#: Seconds after which an expansion is given up: a macro may call itself.
+#: Time limit of an expansion in seconds: a macro may call itself without end.
 PATIENCE = 60.0
 
-#: Bytes of an answer after which it is not read on.
+#: Size limit of the answer in bytes.
 MOST = 100_000_000
 
 
 class XacroError(UrdfkinError):
-    """A xacro file that cannot be expanded."""
+    """A xacro file cannot be expanded."""
 
 
 def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIENCE) -> bytes:
-    """The URDF a xacro file stands for, as UTF-8.
+    """Return the URDF of a xacro file, as UTF-8.
 
     Args:
         path: The file.
         arguments: Values for its `<xacro:arg>`.
-        patience: Seconds to wait.
+        patience: Time limit in seconds.
 
     Raises:
-        SourceError: there is no such file.
-        UnknownNameError: an argument that the file does not take.
-        XacroError: xacrodoc is not installed, xacro cannot expand the file, or the file asks for what it may
-            not have: other files, programs, too much memory or time.
+        SourceError: the file does not exist.
+        UnknownNameError: the file does not declare an argument.
+        XacroError: xacrodoc is not installed; xacro cannot expand the file; or the file needs something that
+            is not allowed (other files, programs, too much memory or time).
     """
     if not path.is_file():
         raise SourceError("no such file", where=str(path))
@@ -145,9 +145,9 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
     command = own_python("from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8"))
     output, status = ask_python(command, _request(path.absolute(), arguments, patience), patience, MOST)
     if status is None:
-        raise XacroError("xacro does not come to an end", where=str(path), found=f"{patience:g} s")
+        raise XacroError("xacro did not finish", where=str(path), found=f"{patience:g} s")
     if len(output) > MOST:
-        raise XacroError("xacro makes too long a URDF", where=str(path), found=f"more than {MOST} bytes")
+        raise XacroError("the expanded URDF is too long", where=str(path), found=f"more than {MOST} bytes")
     answer = _answer(output)
     if "urdf" in answer:
         takes = answer.get("takes")
@@ -159,8 +159,8 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         where=str(path),
         found=str(reason).strip() or None,
         remedy="give arguments with --xacro-arg NAME:=VALUE; packages are found by ROS_PACKAGE_PATH,"
-        " AMENT_PREFIX_PATH and, if they hold a package.xml, beside the folders above the file; docs/xacro.md"
-        " says what a file may do",
+        " AMENT_PREFIX_PATH and, if they contain a package.xml, beside the folders above the file;"
+        " docs/xacro.md lists the operations that a file may do",
         question=Question.XACRO,
     )
 
@@ -179,12 +179,12 @@ def _request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes
 
 
 def _absolute(entries: str) -> str:
-    """A search path whose entries do not depend on the working directory."""
+    """Make the entries of a search path absolute."""
     return os.pathsep.join(str(Path(entry).absolute()) for entry in entries.split(os.pathsep) if entry)
 
 
 def _answer(output: bytes) -> dict[str, Any]:
-    """The last line of the process's output, if it is an answer."""
+    """Return the JSON object in the last line of the output, or an empty dict."""
     try:
         answer = json.loads(output.splitlines()[-1])
     except (IndexError, ValueError):

@@ -46,27 +46,27 @@ CASES = [
     Mjcf(
         "a-weld",
         _held('<weld name="glue" body1="one" body2="two"/>'),
-        (("MJCF101", "equality glue: a constraint (weld of one and two) that a tree cannot hold"),),
+        (("MJCF101", "equality glue: a constraint (weld of one and two) that a tree cannot represent"),),
     ),
     Mjcf(
         "a-connection",
         _held('<connect name="pin" body1="one" body2="two" anchor="0 0 0"/>'),
-        (("MJCF101", "equality pin: a constraint (connect of one and two) that a tree cannot hold"),),
+        (("MJCF101", "equality pin: a constraint (connect of one and two) that a tree cannot represent"),),
     ),
     Mjcf(
         "a-curve-between-two-joints",
         _held('<joint name="bent" joint1="b" joint2="a" polycoef="0 0 1 0 0"/>'),
-        (("MJCF101", "equality bent: a constraint (b and a) that is no line between two joints"),),
+        (("MJCF101", "equality bent: a constraint (b and a) that is not linear in one other joint"),),
     ),
     Mjcf(
         "a-joint-held-twice",
         _held('<joint name="x" joint1="b" joint2="a"/>', '<joint name="y" joint1="b" joint2="a"/>'),
-        (("MJCF101", "equality y: joint b is held twice, or in a circle"),),
+        (("MJCF101", "equality y: joint b has two rules, or its rules form a circle"),),
     ),
     Mjcf(
         "two-joints-that-hold-each-other",
         _held('<joint name="x" joint1="b" joint2="a"/>', '<joint name="y" joint1="a" joint2="b"/>'),
-        (("MJCF101", "equality y: joint a is held twice, or in a circle"),),
+        (("MJCF101", "equality y: joint a has two rules, or its rules form a circle"),),
     ),
     Mjcf(
         "a-constraint-that-is-off",
@@ -76,17 +76,17 @@ CASES = [
     Mjcf(
         "a-tendon",
         _two(inside='<site name="s"/>', world='<site name="r"/>', more=_SPATIAL),
-        (("MJCF101", "tendons: tendons move nothing here"), ("MJCF102", f"{_USELESS}1 tendons")),
+        (("MJCF101", "tendons: tendons have no effect here"), ("MJCF102", f"{_USELESS}1 tendons")),
     ),
     Mjcf(
         "a-mocap-body",
         _two(world='<body name="hand" mocap="true"/>'),
-        (("MJCF101", "body hand: a mocap body stands where the file puts it"),),
+        (("MJCF101", "body hand: a mocap body is fixed at its pose in the file"),),
     ),
     Mjcf(
         "a-slide-without-limits",
         _two(joint='type="slide"'),
-        (("MJCF102", "joint b: a slide without limits: a URDF must have some, 1000 m either way"),),
+        (("MJCF102", "joint b: a slide without limits: the URDF, which requires some, has +-1000 m"),),
     ),
     Mjcf(
         "a-free-body-that-stands-elsewhere",
@@ -94,7 +94,7 @@ CASES = [
         (
             (
                 "MJCF102",
-                "joint b: qpos0 places it at (0, 0, 1); the neutral configuration has it at the origin",
+                "joint b: qpos0 places it at (0, 0, 1); in the neutral configuration it is at the origin",
             ),
         ),
     ),

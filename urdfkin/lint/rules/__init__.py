@@ -1,1 +1,1 @@
-"""The rules, one topic a file: what is looked for, and beside it the page that explains each code."""
+"""The rules, one module for each topic. A TOML file beside the module has the page of each code."""

@@ -1,4 +1,4 @@
-"""Axes of joints: those without a direction, of another length than one, and those that are not used."""
+"""Check the axes of joints: without a direction, not a unit vector, not used, or changed by Pinocchio."""
 
 from __future__ import annotations
 
@@ -17,28 +17,27 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: Lengths whose square neither under- nor overflows.
+#: Range of lengths whose square neither underflows nor overflows.
 SHORTEST, LONGEST = 1e-150, 1e150
 
-#: A length that differs from one by less is rounding of the last digits and worth a note at most.
+#: A smaller difference of the length from one is rounding of the last digits: a note.
 ROUNDING = 2e-4
 
-#: A length that is one as far as normalised doubles tell, as `kinematics.inputs` has it.
+#: Tolerance of a unit vector's length, the same as in `kinematics.inputs`.
 _ONE = 1e-12
 
-#: How far a planar joint's axis may lean from z, as a share of it, and be meant as z.
+#: Relative tolerance within which the axis of a planar joint is z.
 _LEAN = 1e-9
 
-#: What Pinocchio takes for a coordinate axis: Eigen's isApprox compares squares with the square of this.
+#: Tolerance within which Pinocchio replaces an axis by a coordinate axis; Eigen's isApprox compares squares.
 _SNAPPED = 1e-12
 
-#: A tilt that turns vectors by no more than the two roundings that `verify.bounds` grants Pinocchio for
-#: an axis, which it does not use for a coordinate axis.
+#: A smaller tilt (rad) is within the rounding that `verify.bounds` allows for an axis of Pinocchio.
 _TILT = 2.0**-52
 
 
 def check_axes(report: Reporter, robot: RobotRecord) -> None:
-    """Axes that have no direction, are no unit vectors or are not used."""
+    """Report axes without a direction, axes that are not unit vectors, and axes that are not used."""
     for joint in robot.joints:
         if joint.kind in AXIAL:
             _check_axis(report, joint)
@@ -76,7 +75,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
             attribute="xyz",
             found=_written(joint),
             remedy=f'write xyz="{written}"',
-            fix=lambda: None if _snapped(unit) else report.rewritten(element, "xyz", written),
+            fix=lambda: None if _snap(unit) else report.rewritten(element, "xyz", written),
             severity=Severity.NOTE if abs(length - 1.0) < ROUNDING else None,
             weight=abs(length - 1.0),
         )
@@ -84,7 +83,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
 
 
 def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
-    """A vector divided by its length, each number rounded once: it tilts by 2**-53 rad at most.
+    """Divide a vector by its length, with one rounding per number (at most 2**-53 rad of direction).
 
     >>> unit_vector((0.0, -3.0, 4.0))
     (0.0, -0.6, 0.8)
@@ -96,28 +95,28 @@ def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
 
 
 def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
-    if snapped := _snapped(axis):
+    if snapped := _snap(axis):
         unit, tilt = snapped
         written = " ".join(f"{x:g}" for x in unit)
         report.add(
             NEARLY_COORDINATE_AXIS,
-            f"the axis is {tilt:.2g} rad off {written}, and Pinocchio takes {written}",
+            f"the axis differs from {written} by {tilt:.2g} rad, and Pinocchio uses {written}",
             element,
             attribute="xyz",
             found=_written(joint),
-            remedy=f'write xyz="{written}"; if the tilt is meant, write the vector twice as long',
+            remedy=f'write xyz="{written}"; if you mean the tilt, write the vector twice as long',
             weight=tilt,
         )
 
 
 def tilts(robot: RobotRecord) -> dict[str, float]:
-    """By how much (rad) Pinocchio's axis is off the file's, for the joints where that is a finding."""
-    snapped = ((joint.name, _snapped(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
-    return {name: taken[1] for name, taken in snapped if taken is not None}
+    """Return the angle (rad) between the axis in Pinocchio and in the file, for joints with URDF514."""
+    snapped = ((joint.name, _snap(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
+    return {name: result[1] for name, result in snapped if result is not None}
 
 
-def _snapped(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
-    """The coordinate axis that Pinocchio takes for another one, and how far off it is; mostly None."""
+def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
+    """Return the coordinate axis that Pinocchio uses instead of an axis, and their angle (rad), or None."""
     if axis is None:
         return None
     for i in range(3):
@@ -129,7 +128,7 @@ def _snapped(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | 
 
 
 def _is_approx(axis: Sequence[float], unit: Sequence[float]) -> bool:
-    """Eigen's `axis.isApprox(unit)`, square by square in its order."""
+    """Compute Eigen's `axis.isApprox(unit)`, with the same order of operations."""
     difference = sum((x - e) * (x - e) for x, e in zip(axis, unit, strict=True))
     return difference <= _SNAPPED * _SNAPPED * min(sum(x * x for x in axis), 1.0)
 
@@ -145,5 +144,5 @@ def _check_planar(report: Reporter, joint: JointRecord) -> None:
         at,
         attribute="xyz",
         found=_written(joint),
-        remedy='turn the origin so that the normal is z, and write <axis xyz="0 0 1"/>',
+        remedy='rotate the origin so that the normal is z, and write <axis xyz="0 0 1"/>',
     )

@@ -1,4 +1,4 @@
-"""Comments that are meant for urdfkin: what they silence, and those that say or do nothing."""
+"""Read the comments for urdfkin that silence findings, and report invalid and unused ones."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _BETWEEN = re.compile(r"[,\s]+")
 
 
 def read_comments(report: Reporter, codes: Mapping[str, str]) -> None:
-    """Obey the comments of a document that was read, and report those that cannot be understood.
+    """Apply the comments of a document, and report invalid ones.
 
     Args:
-        report: The file.
-        codes: What a code may be called, in lower case -> the code.
+        report: The reporter of the file.
+        codes: Names of codes in lower case -> code.
     """
     silences = Silences()
     for comment in report.comments:
@@ -40,13 +40,13 @@ def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silen
     if words and unknown is None and reason:
         return Silence(comment, tuple(dict.fromkeys(codes[word.lower()] for word in words)), reason)
     if not words:
-        what, remedy = "no code in brackets", "write <!-- urdfkin: ignore[URDF503] why that is meant -->"
+        what, remedy = "no code in brackets", "write <!-- urdfkin: ignore[URDF503] the reason -->"
     elif unknown is not None:
         close = report.nearest(unknown.lower(), codes)
         what = f"unknown code {quoted(unknown)}"
         remedy = f"did you mean {', '.join(dict.fromkeys(codes[word] for word in close))}?" if close else None
     else:
-        what, remedy = "no reason is given", "say behind the bracket why that is meant"
+        what, remedy = "no reason is given", "write the reason after the bracket"
     report.add(
         BAD_COMMENT,
         f"{what}, so the comment silences nothing",
@@ -58,13 +58,13 @@ def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silen
 
 
 def check_unused(report: Reporter) -> None:
-    """Report codes of comments that silenced no finding, once all rules were applied."""
+    """Report the codes of comments that silence no finding, after all rules."""
     for silence in report.silences.all:
         for code in silence.codes:
             if code not in silence.used:
                 report.add(
                     UNUSED_COMMENT,
-                    f"{code} is silenced where there is no warning and no note of it",
+                    f"{code} is silenced, but there is no such warning or note here",
                     found=quoted(f"<!--{silence.comment.text}-->"),
                     remedy="remove it; an error cannot be silenced",
                     position=(silence.comment.line, silence.comment.column),

@@ -1,4 +1,4 @@
-"""Whether the document is a URDF: its root element, its version, and no xacro left in it."""
+"""Check that a document is a URDF: root element, version, and no unexpanded xacro."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NAMESPACE = Rule("URDF213", "default-namespace", WARNING)
 
 _T = TypeVar("_T")
 
-#: What another root element is the sign of.
+#: Root element of another format -> remedy.
 _FORMATS = {
     "sdf": "this is an SDF file; convert it to a URDF first",
     "mujoco": "this is MJCF, which `load` and all other commands read; a file of it ends in .xml or .mjcf",
@@ -45,12 +45,12 @@ _XACRO_NAMESPACE = re.compile(r"https?://(www\.)?(ros|wiki\.ros)\.org/(wiki/)?xa
 _COMMAND = re.compile(r"\$\((find|arg|env|optenv|eval|anon|dirname)\b")
 _XINCLUDE = "http://www.w3.org/2001/XInclude"
 
-#: Newest version urdfdom 6 knows.
+#: Newest URDF version that urdfdom 6 supports.
 NEWEST = (1, 2)
 
 
 def check_dialect(report: Reporter, root: Element) -> tuple[int, int] | None:
-    """The version of a URDF, or None when the document is none."""
+    """Return the version of a URDF, or None if the document is not a URDF."""
     if root.tag != "robot":
         _other_format(report, root)
         return None
@@ -59,7 +59,9 @@ def check_dialect(report: Reporter, root: Element) -> tuple[int, int] | None:
     _check_name(report, root)
     if not root.all("link"):
         srdf = any(child.tag in _SRDF for child in root.children)
-        remedy = "this is an SRDF; pass the URDF it goes with" if srdf else "a robot is at least one <link>"
+        remedy = (
+            "this is an SRDF; pass the URDF of the same robot" if srdf else "a robot has at least one <link>"
+        )
         report.add(NO_LINKS, "the robot has no link", root, remedy=remedy)
     return _version(report, root)
 
@@ -76,7 +78,7 @@ def _other_format(report: Reporter, root: Element) -> None:
 
 
 def _prefixes(root: Element) -> dict[str, str]:
-    """Prefix -> namespace, as declared anywhere in the document."""
+    """Return all namespace declarations in the document: prefix -> namespace."""
     return {
         key.removeprefix("xmlns:"): value
         for element in root.walk()
@@ -86,11 +88,11 @@ def _prefixes(root: Element) -> dict[str, str]:
 
 
 def _check_namespaces(report: Reporter, root: Element, prefixes: dict[str, str]) -> None:
-    """Nothing that should have been expanded or included before."""
+    """Report a default namespace, unexpanded xacro and includes."""
     if "xmlns" in root.attributes:
         report.add(
             NAMESPACE,
-            "the elements are put into a namespace, where most readers do not find them",
+            "xmlns puts the elements into a namespace, where most readers do not find them",
             root,
             attribute="xmlns",
             found=quoted(root.attributes["xmlns"]),
@@ -105,10 +107,10 @@ def _check_namespaces(report: Reporter, root: Element, prefixes: dict[str, str])
         elif (local == "include" and prefixes.get(prefix) == _XINCLUDE) or element.tag == "xi:include":
             report.add(
                 INCLUDE,
-                "another file is to be included",
+                "the file includes another file",
                 element,
                 found=quoted(element.attributes.get("href", f"<{element.tag}>")),
-                remedy="write its content here; nothing was opened",
+                remedy="insert its content here; the other file was not opened",
             )
     if not _check_macros(report, root, macros):
         _check_expressions(report, root)
@@ -119,13 +121,13 @@ _HARMLESS = "; kinematics does not use it"
 
 
 def _check_macros(report: Reporter, root: Element, macros: list[Element]) -> bool:
-    """Report macros; whether one is missing where it may have held a part of the motion."""
-    missed, harmless = _parted(macros, lambda m: m.parent in (None, root) or m.holder.tag == "joint")
+    """Report unexpanded macros; return whether one may contain links or joints."""
+    missed, harmless = _partition(macros, lambda m: m.parent in (None, root) or m.holder.tag == "joint")
     for group, severity in ((missed, None), (harmless, Severity.WARNING)):
         if group:
             report.add(
                 XACRO,
-                f"xacro that was not expanded{_HARMLESS if severity else ''}",
+                f"unexpanded xacro{_HARMLESS if severity else ''}",
                 group[0],
                 found=f"<{shortened(group[0].tag)}>{_more(group)}",
                 remedy=_EXPAND,
@@ -135,20 +137,20 @@ def _check_macros(report: Reporter, root: Element, macros: list[Element]) -> boo
 
 
 def _check_expressions(report: Reporter, root: Element) -> None:
-    """Expressions in the place of names and numbers: an error where motion depends on them."""
+    """Report xacro expressions in attributes: an error where kinematics uses the attribute."""
     written = [
         (element, key)
         for element in outside_extensions(root)
         for key, value in element.attributes.items()
         if "$" in value and is_expression(value) and not key.startswith("xmlns")
     ]
-    used, harmless = _parted(written, lambda place: _moves(place[0]))
+    used, harmless = _partition(written, lambda place: _moves(place[0]))
     for group, severity in ((used, None), (harmless, Severity.WARNING)):
         if group:
             element, key = group[0]
             report.add(
                 XACRO,
-                f"a xacro expression that was not expanded{_HARMLESS if severity else ''}",
+                f"unexpanded xacro expression{_HARMLESS if severity else ''}",
                 element,
                 attribute=key,
                 found=f"{shortened(key)}={quoted(element.attributes[key])}{_more(group)}",
@@ -158,16 +160,16 @@ def _check_expressions(report: Reporter, root: Element) -> None:
 
 
 def _moves(element: Element) -> bool:
-    """Whether motion depends on an element's attributes: those of a link's own tag, and all of a joint's."""
+    """Return whether kinematics uses an element: `<link>` itself, and everything in a `<joint>`."""
     holder = element.holder
     return holder.tag == "joint" or (holder is element and element.tag == "link")
 
 
-def _parted(these: Iterable[_T], chosen: Callable[[_T], bool]) -> tuple[list[_T], list[_T]]:
-    """Those that are chosen and the others, each in their order."""
+def _partition(items: Iterable[_T], predicate: Callable[[_T], bool]) -> tuple[list[_T], list[_T]]:
+    """Return the items for which the predicate is true, and the others, both in their order."""
     parts: tuple[list[_T], list[_T]] = ([], [])
-    for one in these:
-        parts[not chosen(one)].append(one)
+    for one in items:
+        parts[not predicate(one)].append(one)
     return parts
 
 
@@ -176,7 +178,7 @@ def _more(group: Sequence[object]) -> str:
 
 
 def is_expression(value: str) -> bool:
-    """Whether a value holds something that xacro would have replaced.
+    """Return whether a value contains a xacro expression.
 
     >>> is_expression("${h} 0 0"), is_expression("$(arg side)/hand.stl"), is_expression("5 $")
     (True, True, False)
@@ -201,18 +203,18 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
         return (1, 0)
     match = _VERSION.fullmatch(written)
     version = (int(match[1]), int(match[2])) if match and len(written) < 20 else None
-    rule, remedy = VERSION, 'write version="1.0" if the file follows it, or leave it out'
+    rule, remedy = VERSION, 'write version="1.0" if the file follows it, or remove the attribute'
     if version is None:
-        message = "a URDF version is two numbers and a point"
+        message = "a URDF version has the form 1.0"
     elif version > NEWEST:
         message = "the URDF version is later than 1.2, the last that urdfdom and Pinocchio read"
-        remedy = "write the version whose rules the file keeps, 1.0 to 1.2"
+        remedy = "write the version that the file follows, 1.0 to 1.2"
     elif version < (1, 0):
-        message = "there is no such URDF version"
+        message = "this URDF version does not exist"
     elif version == (1, 0):
         return version
     else:
-        rule, message = NEWER_VERSION, "most readers know only URDF 1.0"
-        remedy = "leave it out unless the file uses what is new in it"
+        rule, message = NEWER_VERSION, "most readers support only URDF 1.0"
+        remedy = "remove the attribute unless the file uses features of the version"
     report.add(rule, message, root, attribute="version", found=quoted(written), remedy=remedy)
     return version if version is not None and rule is NEWER_VERSION else (1, 0)

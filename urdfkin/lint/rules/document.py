@@ -1,8 +1,8 @@
-"""XML to a light tree of elements with their places, without ever expanding or opening anything.
+"""Parse XML to a tree of elements with positions, without expanding entities or opening files.
 
-The parser is expat: it keeps names as the file writes them (`xacro:macro`), gives the exact place of every
-start tag, needs no stack for deep nesting and cannot open anything by itself. A document type definition
-with content stops it before the first entity could be expanded.
+The parser is expat. It does not change names (`xacro:macro`), reports the position of every start tag, needs
+no stack for deep nesting, and opens no file. A document type definition with content stops the parser before
+it expands an entity.
 """
 
 from __future__ import annotations
@@ -31,33 +31,33 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: libxml2 refused deeper nesting for many years, and with it everything built on it.
+#: Older versions of libxml2, and the readers built on it, refuse deeper nesting.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
-#: Bytes that the parser is given at once.
+#: Bytes per call of the parser.
 _PIECE = 1_000_000
 
-#: Characters of an element's text that are kept: more than a message shows.
-_KEPT = 2 * QUOTED
+#: Characters of an element's text that are stored: more than a message quotes.
+_STORED = 2 * QUOTED
 
-#: Attributes that name links and joints.
+#: Attributes with names of links and joints.
 _NAMES = frozenset({"name", "link", "joint"})
 
 
-class _Stop(Exception):  # noqa: N818 - not an error: the parser has been told enough
-    """Ends the parse after a finding that makes the rest meaningless."""
+class _Stop(Exception):  # noqa: N818 - control flow, not an error
+    """Stop the parser after a finding that makes the rest of the file meaningless."""
 
 
 def read_document(report: Reporter) -> Element | None:
-    """The root element of the reporter's file, or None after the finding that says why there is none."""
+    """Return the root element of the reporter's file, or None after a finding with the reason."""
     data, most = report.data, report.limits.bytes
     if len(data) > most:
         report.add(
             TOO_LARGE,
             "the file is too large",
             found=f"{len(data)} bytes, more than {most}",
-            remedy="raise the limit with --max-bytes if the file is right",
+            remedy="if the file is correct, raise the limit with --max-bytes",
         )
         return None
     text = utf8_bytes(report, data)
@@ -89,7 +89,7 @@ def _parse(report: Reporter) -> Element | None:
 
 
 class _Builder:
-    """Handlers that grow the tree and watch the limits."""
+    """The handlers of the parser, which build the tree and check the limits."""
 
     def __init__(self, report: Reporter) -> None:
         self.report, self.limits = report, report.limits
@@ -111,7 +111,7 @@ class _Builder:
         parser.SkippedEntityHandler = self.skipped
 
     def read(self, data: bytes) -> None:
-        """Feed the parser piece by piece; what is not complete it reads again with the next piece."""
+        """Feed the parser in pieces. expat reads incomplete markup again with the next piece."""
         whole, size = memoryview(data), min(_PIECE, self.limits.markup)
         for start in range(0, len(whole), size):
             fed = min(start + size, len(whole))
@@ -122,7 +122,7 @@ class _Builder:
         self.parser.Parse(b"", True)
 
     def here(self) -> tuple[int, int]:
-        """Line and column of what expat is reading."""
+        """Return the line and the column of the parser's position."""
         return self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
@@ -143,9 +143,9 @@ class _Builder:
         self.count += 1
         if len(self.open) > self.deepest:
             self.deepest, self.deepest_element = len(self.open), element
-        self.keep_limits(tag, attributes)
+        self.check_limits(tag, attributes)
 
-    def keep_limits(self, tag: str, attributes: dict[str, str]) -> None:
+    def check_limits(self, tag: str, attributes: dict[str, str]) -> None:
         most = self.limits
         if self.deepest > most.depth:
             self.refuse(TOO_DEEP, "depth", "elements are nested too deep", f"more than {most.depth} levels")
@@ -167,7 +167,7 @@ class _Builder:
         self.refuse(NAME_TOO_LONG, "name", f"the name of {owner} is too long", found)
 
     def refuse(self, code: Rule, limit: str, message: str, found: str) -> None:
-        remedy = f"raise the limit with --max-{limit} if the file is right"
+        remedy = f"if the file is correct, raise the limit with --max-{limit}"
         self.report.add(code, message, found=found, remedy=remedy, position=self.here())
         raise _Stop
 
@@ -179,8 +179,8 @@ class _Builder:
 
     def characters(self, text: str) -> None:
         element = self.open[-1]
-        if len(element.text) < _KEPT and not text.isspace():
-            element.text += (text if element.text else text.lstrip())[:_KEPT]
+        if len(element.text) < _STORED and not text.isspace():
+            element.text += (text if element.text else text.lstrip())[:_STORED]
 
     def comment(self, text: str) -> None:
         self.begun = True
@@ -190,25 +190,25 @@ class _Builder:
             self.waiting.append(comment)
 
     def _is_behind_something(self) -> bool:
-        """Whether there is more than blanks before what expat is reading, on its line."""
+        """Return whether the line has other text before the parser's position."""
         data, start = self.report.data, self.parser.CurrentByteIndex
         while start > 0 and data[start - 1] in b" \t":
             start -= 1
         return start > 0 and data[start - 1] not in b"\r\n"
 
     def instruction(self, target: str, text: str) -> None:
-        """Judge a processing instruction: urdfdom's parser allows them at the very beginning alone."""
+        """Report a processing instruction that is not at the beginning, where urdfdom allows it."""
         if self.begun:
             self.report.add(
                 INSTRUCTION,
-                "a processing instruction stands after the beginning, where urdfdom refuses the file",
+                "a processing instruction is not at the beginning of the file; urdfdom refuses the file",
                 found=quoted(f"<?{target} {text}".strip() + "?>"),
-                remedy="remove it, or put it before everything but other instructions",
+                remedy="remove it, or move it to the beginning; only other instructions may precede it",
                 position=self.here(),
             )
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        """Judge a document type declaration before anything in it can act."""
+        """Report a document type declaration, and stop before its content has an effect."""
         self.begun = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
@@ -221,13 +221,13 @@ class _Builder:
                 position=position,
             )
             return
-        what = "has content of its own" if has_subset else "refers to an external definition"
+        what = "contains definitions" if has_subset else "refers to an external definition"
         found = quoted(f"<!DOCTYPE {name} [...") if system is None else quoted(system)
         self.report.add(
             ENTITY,
             f"the document type declaration {what}",
             found=found,
-            remedy="remove it and write values out; nothing was expanded or opened",
+            remedy="remove it and write the values directly; nothing was expanded or opened",
             position=position,
         )
         raise _Stop
@@ -239,14 +239,14 @@ class _Builder:
     def undefined_entity(self, name: str | None) -> None:
         self.report.add(
             ENTITY,
-            "an entity is used that XML does not define",
+            "the file uses an entity that XML does not define",
             found=quoted(f"&{name};") if name else None,
             remedy="write the character itself, or one of &lt; &gt; &amp; &quot; &apos;",
             position=self.here(),
         )
 
     def syntax_error(self, error: expat.ExpatError) -> None:
-        """Say what expat found in the words of the file."""
+        """Report a syntax error with its position and the text there."""
         reason = expat.errors.messages[error.code]
         if reason == expat.errors.XML_ERROR_UNDEFINED_ENTITY:
             self.undefined_entity(self._entity_name())
@@ -258,7 +258,7 @@ class _Builder:
             if reason == expat.errors.XML_ERROR_TAG_MISMATCH:
                 remedy = f"close {opened} first"
             elif reason in (expat.errors.XML_ERROR_NO_ELEMENTS, expat.errors.XML_ERROR_UNCLOSED_TOKEN):
-                message, remedy = "the file ends too early", f"{opened} is never closed"
+                message, remedy = "the file ends too early", f"close {opened}"
         ended = reason == expat.errors.XML_ERROR_NO_ELEMENTS
         self.report.add(
             SYNTAX,
@@ -269,12 +269,12 @@ class _Builder:
         )
 
     def _entity_name(self) -> str | None:
-        """The first entity after the place of an error that XML itself does not define."""
+        """Return the first entity after the position of an error that XML itself does not define."""
         found = _ENTITY.finditer(self.report.data, self.parser.ErrorByteIndex)
         return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
 
     def _around(self) -> str | None:
-        """The text at the place of an error, up to the end of its line."""
+        """Return the text at the position of an error, up to the end of its line."""
         start = self.parser.ErrorByteIndex
         line = (self.report.data[start : start + 120].splitlines() or [b""])[0]
         text = line.decode("utf-8", "replace")[:30]
@@ -284,20 +284,20 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: expat's reasons that deserve better words, and what to do about them.
+#: expat's message -> a clearer message and a remedy.
 _REASONS: dict[str, tuple[str, str | None]] = {
-    expat.errors.XML_ERROR_SYNTAX: ("text where an element should begin", "a URDF begins with <robot ...>"),
+    expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
     expat.errors.XML_ERROR_BAD_CHAR_REF: ("a character that XML does not allow", None),
-    expat.errors.XML_ERROR_TAG_MISMATCH: ("a closing tag does not match the element that is open", None),
-    expat.errors.XML_ERROR_NO_ELEMENTS: ("there is no element in the file", "a URDF begins with <robot ...>"),
+    expat.errors.XML_ERROR_TAG_MISMATCH: ("a closing tag does not match the open element", None),
+    expat.errors.XML_ERROR_NO_ELEMENTS: ("the file has no element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_DUPLICATE_ATTRIBUTE: ("an attribute is given twice", "remove one of the two"),
     expat.errors.XML_ERROR_MISPLACED_XML_PI: (
         "the XML declaration is not at the very beginning of the file",
-        "remove what stands before <?xml",
+        "remove the text before <?xml",
     ),
     expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT: (
-        "something follows the closing tag of the root element",
-        "a file holds one robot",
+        "there is content after the closing tag of the root element",
+        "a file contains one robot",
     ),
 }

@@ -1,4 +1,4 @@
-"""Inertials that are incomplete or impossible: kinematics needs none, so nothing here is an error."""
+"""Check inertials: incomplete or impossible ones. Kinematics does not use them, so no finding is an error."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: Heaviest mass in kg and longest lever in m that are taken for real.
+#: Larger masses (kg) and distances of the centre of mass (m) are reported as mistakes.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
-#: Lighter bodies, in kg, are placeholders, whose moments mean nothing.
+#: Bodies below this mass (kg) are placeholders; their moments are not checked.
 NEGLIGIBLE = 1e-3
 
-#: Moments of inertia for each kg, in m^2, that are nothing but rounding: a body of 0.03 mm.
+#: Moments of inertia per kg (m^2) that are rounding errors: those of a body of 0.03 mm.
 ROUNDING = 1e-9
 
-#: Digits that exporters write: moments off by this share of the largest are not impossible but rounded.
+#: Relative rounding error of moments, from the number of digits that exporters write.
 _WRITTEN = 1e-6
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def check_inertials(report: Reporter, robot: RobotRecord) -> None:
-    """The inertial of each link that has one."""
+    """Check the inertial of each link."""
     numbers = NumberReader(report, shapes.UNREADABLE, shapes.UNREADABLE)
     for link in robot.links.values():
         inertial = link.first("inertial")
@@ -85,7 +85,7 @@ def _check_mass(
         what = f"mass {mass:g} kg" if heavy else f"centre of mass {max(abs(x) for x in lever or ()):g} m away"
         report.add(
             INERTIAL_SCALE,
-            "the inertial is out of all proportion",
+            "the inertial is far too large",
             inertial,
             found=what,
             remedy="write kilograms and metres",
@@ -97,7 +97,7 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
     if mass == 0.0 and any(moments):
         report.add(
             INERTIAL_IMPOSSIBLE,
-            "the body has moments of inertia and no mass",
+            "the body has moments of inertia, but no mass",
             tensor,
             remedy="write kilograms, or no moments",
         )
@@ -118,12 +118,12 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
         f"no body has this inertia: {what}",
         tensor,
         found=found,
-        remedy="check units and signs; kinematics is untouched",
+        remedy="check units and signs; kinematics does not use them",
     )
 
 
 def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
-    """Eigenvalues of an inertia tensor, smallest first, by the trigonometric solution of the cubic.
+    """Return the eigenvalues of an inertia tensor, smallest first, by the trigonometric cubic formula.
 
     Args:
         moments: ixx, ixy, ixz, iyy, iyz, izz.

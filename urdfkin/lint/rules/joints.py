@@ -1,4 +1,4 @@
-"""What links and joints say, read once and strictly: the other rules and the reader use the records."""
+"""Read links and joints into records, once and strictly. The other rules and the reader use the records."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ IGNORED = Rule("URDF510", "ignored-value", WARNING)
 QUATERNION_IGNORED = Rule("URDF511", "quat-xyzw-ignored", WARNING)
 QUATERNION = Rule("URDF512", "quat-xyzw", WARNING)
 BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
-#: Names that one finding lists at most.
+#: Largest number of names in one finding.
 _NAMED = 5
 
 
 def read_robot(report: Reporter, root: Element, version: tuple[int, int]) -> RobotRecord:
-    """Links and joints of a document, with findings about everything that cannot be read."""
+    """Read the links and joints of a document; add findings for everything that cannot be read."""
     robot = RobotRecord(root, version)
     for element in root.all("link"):
         name = named(report, element)
@@ -48,32 +48,37 @@ def read_robot(report: Reporter, root: Element, version: tuple[int, int]) -> Rob
 
 
 def lost_quaternions(joints: Sequence[str], file: str) -> tuple[Finding, ...]:
-    """What is said of a yourdfpy robot whose joints may have had a rotation that yourdfpy does not read.
+    """Return a finding for a yourdfpy robot whose rotations may be lost: yourdfpy ignores quat_xyzw.
 
     Args:
-        joints: Those whose origin has no rotation.
-        file: What to call the robot.
+        joints: The joints whose origin has no rotation.
+        file: The name of the robot in messages.
     """
     if not joints:
         return ()
     more = f" and {len(joints) - _NAMED} more" if len(joints) > _NAMED else ""
     message = (
-        f"yourdfpy drops quat_xyzw and keeps no text: had the file one at {', '.join(joints[:_NAMED])}{more},"
-        " its rotation would be missing here"
+        f"yourdfpy ignores quat_xyzw: if the file has one at {', '.join(joints[:_NAMED])}{more}, its rotation"
+        " is missing here"
     )
-    remedy = "load the file itself if it is written so"
+    remedy = "load the file itself if it contains quat_xyzw"
     return (Finding(QUATERNION.id, Severity.NOTE, message, remedy=remedy, file=file),)
 
 
 class JointReader:
-    """Reads `<joint>` elements of a file of one version."""
+    """Reader of the `<joint>` elements of a file.
+
+    Args:
+        report: The reporter of the file.
+        version: The URDF version of the file.
+    """
 
     def __init__(self, report: Reporter, version: tuple[int, int]) -> None:
         self.report, self.version = report, version
         self.numbers = NumberReader(report)
 
     def read(self, element: Element) -> JointRecord:
-        """One joint; what cannot be read is reported and keeps its default."""
+        """Read one joint; a value that cannot be read is reported and has its default in the record."""
         joint = JointRecord(element, named(self.report, element))
         joint.kind = self._kind(element)
         joint.parent, joint.child = self._end(element, "parent"), self._end(element, "child")
@@ -85,7 +90,14 @@ class JointReader:
         return joint
 
     def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
-        """An attribute that must be there and hold something; what is wrong with a number comes later."""
+        """Return a required attribute, or None after a finding that it is missing or empty.
+
+        Args:
+            element: The element.
+            attribute: The name of the attribute.
+            example: An example for the remedy.
+            number: Whether the attribute is a number. `NumberReader` reports an empty number.
+        """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
             self.report.add(
@@ -114,7 +126,7 @@ class JointReader:
         return None
 
     def _end(self, element: Element, tag: str) -> str | None:
-        """The link a joint's `<parent>` or `<child>` names."""
+        """Return the link that a joint's `<parent>` or `<child>` names."""
         end = element.first(tag)
         if end is None:
             self.report.add(
@@ -135,32 +147,32 @@ class JointReader:
     def _quaternion(self, joint: JointRecord, origin: Element) -> None:
         found = f"quat_xyzw={quoted(origin.attributes['quat_xyzw'])}"
 
-        def say(rule: Rule, message: str, remedy: str) -> None:
+        def add(rule: Rule, message: str, remedy: str) -> None:
             self.report.add(rule, message, origin, attribute="quat_xyzw", found=found, remedy=remedy)
 
         if self.version < (1, 1):
             message = 'quat_xyzw needs version="1.1" and is ignored'
-            say(QUATERNION_IGNORED, message, "write the rotation as rpy")
+            add(QUATERNION_IGNORED, message, "write the rotation as rpy")
             return
         quaternion = self.numbers.vector(origin, "quat_xyzw", 4)
         if quaternion is None:
             return
         both, zero = "rpy" in origin.attributes, not SHORTEST < sum(map(abs, quaternion)) < LONGEST
         if both:
-            say(BAD_QUATERNION, "rpy and quat_xyzw are both given", "keep one of the two")
+            add(BAD_QUATERNION, "rpy and quat_xyzw are both given", "remove one of the two")
         elif zero:
-            say(BAD_QUATERNION, "the quaternion has no direction", 'no rotation is "0 0 0 1"')
+            add(BAD_QUATERNION, "the quaternion has no direction", 'the identity is "0 0 0 1"')
         else:
             joint.quaternion = quaternion
-            message = "quat_xyzw is obeyed, but most readers ignore it"
-            say(QUATERNION, message, "write the rotation as rpy for them")
+            message = "quat_xyzw is used, but most readers ignore it"
+            add(QUATERNION, message, "write the rotation as rpy for these readers")
 
     def _axis(self, joint: JointRecord) -> None:
         axis = joint.axis_element = joint.element.first("axis")
         if axis is None:
             return
         if joint.kind in ("fixed", "floating"):
-            # Nobody reads it: a number that is none is worth a note at most.
+            # No reader uses this axis, so a bad number in it is only URDF510.
             numbers = NumberReader(self.report, IGNORED, IGNORED)
             numbers.vector(axis, "xyz")
             return
@@ -173,8 +185,8 @@ class JointReader:
             EMPTY_AXIS,
             "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",
             axis,
-            remedy='write <axis xyz="1 0 0"/>, or whichever is meant',
-            # A planar joint's axis changes nothing: it moves in the XY plane (URDF505).
+            remedy='write the axis, for example <axis xyz="1 0 0"/>',
+            # A planar joint moves in the XY plane, whatever its axis (URDF505).
             severity=Severity.WARNING if joint.kind == "planar" else None,
         )
 
@@ -189,7 +201,7 @@ class JointReader:
                     joint.element,
                     remedy=f"write {_EXAMPLE_LIMIT}"
                     if joint.kind == "prismatic"
-                    else f'write {_EXAMPLE_LIMIT}, or type="continuous" if it turns freely',
+                    else f'write {_EXAMPLE_LIMIT}, or type="continuous" if it rotates without limits',
                 )
             return
         required = ("effort", "velocity") if self.version < (1, 2) else ("lower", "upper") if bounded else ()
@@ -210,7 +222,7 @@ class JointReader:
             joint.mimic = MimicRecord(mimic, leader, multiplier, offset)
 
     def _others(self, joint: JointRecord) -> None:
-        """Elements that kinematics does not need and urdfdom refuses the file for."""
+        """Check the elements that kinematics does not use, but for which urdfdom refuses a file."""
         dynamics = joint.element.first("dynamics")
         if dynamics is not None:
             if not {"damping", "friction"} & dynamics.attributes.keys():

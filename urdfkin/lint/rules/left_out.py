@@ -1,4 +1,4 @@
-"""What an MJCF file says that the tree made of it does not hold: said by `load`, never dropped in silence."""
+"""Findings of `load` for the parts of an MJCF file that a kinematic tree cannot represent."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LEFT_OUT = Rule("MJCF102", "left-out", NOTE)
 
 
 def left_out(one: Listed, file: str) -> Finding:
-    """One thing that the tree does not hold, as a finding: a warning where motion depends on it."""
+    """Return a finding for a part that the tree does not represent: a warning if it affects the motion."""
     rule = LEFT_OUT_MOTION if one.moves else LEFT_OUT
     message = one.what if one.where is None else f"{one.where}: {one.what}"
     return Finding(rule.id, rule.severity, message, file=file)

@@ -1,4 +1,4 @@
-"""Materials that are used and defined nowhere, or defined twice."""
+"""Check materials: those without a definition, and those with two."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MATERIAL_TWICE = Rule("URDF709", "material-twice", ERROR)
 
 
 def check_materials(report: Reporter, robot: RobotRecord) -> None:
-    """The materials of the robot, and those of each visual."""
+    """Check the materials of the robot and of each visual."""
     defined = _materials(report, robot)
     for link in robot.links.values():
         for visual in link.all("visual"):
@@ -21,7 +21,7 @@ def check_materials(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _materials(report: Reporter, robot: RobotRecord) -> set[str]:
-    """Names of materials that are defined: at the top, or where they are first used."""
+    """Return the names of the defined materials, and report names with two definitions."""
     defined: dict[str, Element] = {}
     for material in robot.element.all("material"):
         name = material.attributes.get("name", "")
@@ -54,7 +54,7 @@ def _check_material(report: Reporter, visual: Element, defined: set[str]) -> Non
     if name is None or (name not in defined and not anonymous):
         report.add(
             MATERIAL_UNKNOWN,
-            "the material has no name" if name is None else "the material is defined nowhere",
+            "the material has no name" if name is None else "the material is not defined",
             material,
             attribute="name",
             found=None if name is None else quoted(name),

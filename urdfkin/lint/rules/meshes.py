@@ -1,4 +1,4 @@
-"""Whether the packages and files that meshes are said to lie in exist; no mesh is ever opened."""
+"""Check that the packages and files of meshes exist. No mesh is opened."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
-    """Report packages that are not found, each once, and files that are missing.
+    """Report each package that is not found once, and each missing file.
 
     Args:
-        report: Where findings go.
-        root: The document's root element.
-        beside: The file the URDF was read from; None when it came as text, and then only packages are
-            looked for, in the environment.
+        report: The reporter, which receives the findings.
+        root: The root element of the document.
+        beside: The file of the URDF; None if the URDF is text. Then only packages are searched, on the
+            search paths of the environment.
     """
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
@@ -43,23 +43,23 @@ def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
     for package, meshes in missing.items():
         report.add(
             MESH_MISSING,
-            f"package {quoted(package)} is not found, where {_count(len(meshes))} should be"
+            f"package {quoted(package)} of {_count(len(meshes))} is not found"
             if package
-            else f"an address names no package, for {_count(len(meshes))}",
+            else f"the address of {_count(len(meshes))} names no package",
             meshes[0],
             attribute="filename",
             found=quoted(meshes[0].attributes["filename"]),
-            remedy="kinematics needs no mesh; add the package's folder to ROS_PACKAGE_PATH to find it",
+            remedy="add the package's folder to ROS_PACKAGE_PATH; kinematics needs no mesh",
         )
 
 
 def check_address(report: Reporter, mesh: Element) -> None:
-    """Whether an address leads into the network."""
+    """Report a mesh with an address on the network."""
     filename = mesh.attributes["filename"]
     if filename.lower().startswith(("http:", "https:", "ftp:")):
         report.add(
             MESH_REMOTE,
-            "the mesh lies on the network; nothing was fetched",
+            "the mesh is on the network; it was not downloaded",
             mesh,
             attribute="filename",
             found=quoted(filename),
@@ -76,7 +76,7 @@ def _meshes(root: Element) -> Iterator[Element]:
 
 
 def _is_missing_file(filename: str, beside: Path | None) -> bool:
-    """Whether a mesh given as a path, relative to the URDF, does not exist."""
+    """Return whether the address is a path (relative to the URDF) that does not exist."""
     local = filename and ("://" not in filename or filename.startswith("file://"))
     if beside is None or not local:
         return False

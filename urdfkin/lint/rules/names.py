@@ -1,4 +1,4 @@
-"""Names of links and joints: those Pinocchio keeps for itself, and those other programs stumble over."""
+"""Check the names of links and joints: missing, duplicate, reserved, and troublesome for other programs."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: Longer names break tables, and paths made of them.
+#: Longer names break tables and file paths.
 LONGEST = 200
 
 
 def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) -> None:
-    """Odd, reserved and confusable names.
+    """Report names that are reserved, easily confused, or troublesome for other programs.
 
     Args:
-        report: Where findings go.
-        robot: What was read.
-        root_joint: Set when the robot will hang from a joint `root_joint` in a link `universe`.
+        report: The reporter, which receives the findings.
+        robot: The records of the robot.
+        root_joint: Set if the robot gets a joint `root_joint` below a link `universe`.
     """
     links = list(robot.links.items())
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
@@ -41,7 +41,7 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
 
 
 def named(report: Reporter, element: Element) -> str:
-    """The name of a link or joint; an empty one after the finding that it has none."""
+    """Return the name of a link or joint; an empty string after a finding that it has none."""
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"
@@ -56,7 +56,7 @@ def named(report: Reporter, element: Element) -> str:
 
 
 def report_duplicate(report: Reporter, element: Element, first: Element) -> None:
-    """Another link, or joint, of the same name."""
+    """Report a second link or joint with the same name."""
     report.add(
         DUPLICATE_NAME,
         f"another {element.tag} has this name",
@@ -69,17 +69,17 @@ def report_duplicate(report: Reporter, element: Element, first: Element) -> None
 def _check_odd(report: Reporter, name: str, element: Element) -> None:
     reason = None
     if not name.isprintable():
-        reason = "the name holds characters that cannot be printed"
+        reason = "the name contains characters that cannot be printed"
     elif name != name.strip():
-        reason = "the name begins or ends with a blank"
+        reason = "the name begins or ends with a space"
     elif "/" in name or "\\" in name:
-        reason = "the name holds a slash, as a path does"
+        reason = "the name contains a slash, like a path"
     elif name[0] in "=+-@":
         reason = "the name begins like a spreadsheet formula"
     elif len(name) > LONGEST:
         reason = f"the name has {len(name)} characters"
     elif any(c in "\"'<>&|;`$" for c in name):
-        reason = "the name holds a character that shells or XML treat specially"
+        reason = "the name contains a special character of shells or XML"
     if reason:
         report.add(
             ODD_NAME,
@@ -96,7 +96,7 @@ def _check_blanks(report: Reporter, element: Element) -> None:
     if raw is not None and any(c in raw for c in "\t\r\n"):
         report.add(
             NAME_BLANKS,
-            "a tab or line end stands inside the name",
+            "the name contains a tab or a line end",
             element,
             attribute="name",
             found=quoted(raw),
@@ -108,7 +108,7 @@ def _check_reserved(report: Reporter, name: str, element: Element, root_joint: s
     if name == "universe" and element.tag == "joint":
         report.add(
             UNIVERSE,
-            "Pinocchio calls the world by this name and does not find the joint",
+            "Pinocchio uses this name for the world and does not find the joint",
             element,
             attribute="name",
             remedy="rename it",
@@ -117,7 +117,7 @@ def _check_reserved(report: Reporter, name: str, element: Element, root_joint: s
         what = "the world" if name == "universe" else "the joint of a free or planar base"
         report.add(
             RESERVED_NAME,
-            f"{what} is called by this name",
+            f"the name is reserved for {what}",
             element,
             attribute="name",
             remedy="rename it" if root_joint else "rename it, or load without root_joint",
@@ -129,13 +129,13 @@ def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> Non
     seen: dict[str, str] = {}
     for name, element in named:
         if name.isascii() or len(name) > LONGEST:
-            continue  # a longer one is odd anyway, and sorting its marks takes the square of their number
+            continue  # a longer name is reported anyway; normalising its marks takes quadratic time
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:
             report.add(
                 LOOKALIKE,
-                "another name looks the same and is written with other characters",
+                "another name looks the same, but has different characters",
                 element,
                 attribute="name",
                 found=ascii(name) + " and " + ascii(first),

@@ -1,7 +1,7 @@
-"""Numbers as URDF writes them: ASCII, finite, and exactly as many as the vector has.
+"""Read numbers and vectors from attributes: ASCII, finite, and the right count.
 
-The grammar is that of `xs:double` without its special values, which is what urdfdom accepts. Python's own
-`float` is far more generous (`1_0`, Arabic digits, `nan`) and is only asked once the grammar has agreed.
+The grammar is `xs:double` without its special values, as in urdfdom. Python's `float` accepts more (`1_0`,
+Arabic digits, `nan`), so it converts only text that matches the grammar.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ WHITESPACE = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
 UNDERFLOW = Rule("URDF304", "underflow", WARNING)
 NUMBER_TOO_LONG = Rule("URDF305", "number-too-long", ERROR)
 
-#: No text can be split in two ways by this: one that is no number takes linear time too.
+#: White space; the pattern is unambiguous, so splitting takes linear time.
 _BLANKS = re.compile(r"[ \t\r\n]+")
 
 
 @dataclass(slots=True)
 class NumberReader:
-    """Reads numbers out of attributes and reports what is wrong with them.
+    """Reader of numbers in attributes, which reports invalid ones.
 
     Attributes:
-        report: Where findings go.
-        bad_number: Rule for what is no number; another one where nothing depends on it.
-        bad_vector: Rule for the wrong count.
+        report: The reporter, which receives the findings.
+        bad_number: The rule for invalid numbers; another one where kinematics does not use the number.
+        bad_vector: The rule for a wrong count.
     """
 
     report: Reporter
@@ -42,7 +42,7 @@ class NumberReader:
     bad_vector: Rule = BAD_VECTOR
 
     def scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
-        """One number; `default` when the attribute is missing, None when it cannot be read."""
+        """Return one number; `default` if the attribute is missing, None if it cannot be read."""
         written = element.attributes.get(attribute)
         if written is None:
             return default
@@ -50,13 +50,13 @@ class NumberReader:
             return None
         value = self._number(element, attribute, _BLANKS.sub(" ", written).strip(" "))
         if value is not None and written != written.rstrip():
-            self._refused(element, attribute, "a blank after the number")
+            self._report_refused(element, attribute, "a space after the number")
         elif value is not None and self.report.has_raw_blanks:
             self._check_raw(element, attribute, 1)
         return value
 
     def vector(self, element: Element, attribute: str, count: int = 3) -> tuple[float, ...] | None:
-        """`count` numbers, or None when the attribute is missing or cannot be read."""
+        """Return `count` numbers, or None if the attribute is missing or cannot be read."""
         written = element.attributes.get(attribute)
         if written is None:
             return None
@@ -75,11 +75,11 @@ class NumberReader:
         if len(values) != count:
             self.report.add(
                 self.bad_vector,
-                f"{attribute} needs {count} numbers and has {len(values)}",
+                f"{attribute} needs {count} numbers, but has {len(values)}",
                 element,
                 attribute=attribute,
                 found=f"{attribute}={quoted(written)}",
-                remedy=f"write {count} numbers with a space between them",
+                remedy=f"write {count} numbers separated by spaces",
             )
             return None
         if self.report.has_raw_blanks:
@@ -92,7 +92,7 @@ class NumberReader:
             if value == 0.0 and any(digit in _NOT_ZERO for digit in re.split("[eE]", piece)[0]):
                 self.report.add(
                     UNDERFLOW,
-                    f"{attribute} holds a number too small for a double; it is zero",
+                    f"{attribute} contains a number too small for a double; it is read as zero",
                     element,
                     attribute=attribute,
                     found=quoted(piece),
@@ -115,34 +115,34 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Whether a text is longer than numbers are; what converts them takes time quadratic in theirs."""
+        """Return whether a text is too long for numbers; their conversion takes quadratic time."""
         if len(written) <= most:
             return False
         self.report.add(
             NUMBER_TOO_LONG,
-            f"{attribute} has more characters than numbers need",
+            f"{attribute} is too long for a number",
             element,
             attribute=attribute,
             found=f"{quoted(written, 30)} of {len(written)} characters, more than {most}",
-            remedy="write 17 digits, which tell every double; or raise the limit with --max-number",
+            remedy="write 17 digits, enough for every double, or raise the limit with --max-number",
             severity=self.bad_number.severity,
         )
         return True
 
     def _check_raw(self, element: Element, attribute: str, count: int) -> None:
-        """Whether urdfdom, which sees tabs and line ends that XML turns into spaces, reads the value."""
+        """Report a value whose tabs or line ends urdfdom refuses. XML parsers replace them by spaces."""
         raw = self.report.raw(element, attribute)
         if raw is None or self._is_too_long(element, attribute, raw, count * self.report.limits.number):
             return
         seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw))
         pieces = [seen] if count == 1 else [piece for piece in seen.split(" ") if piece]
         if not all(DECIMAL.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
-            self._refused(element, attribute, "a tab or line end between or after the numbers")
+            self._report_refused(element, attribute, "a tab or line end between or after the numbers")
 
-    def _refused(self, element: Element, attribute: str, what: str) -> None:
+    def _report_refused(self, element: Element, attribute: str, what: str) -> None:
         needed = self.bad_number is BAD_NUMBER
         self.report.add(
-            # Where no robot depends on the number, urdfdom drops what it cannot read and reads the file.
+            # If kinematics does not use the number, urdfdom ignores it and accepts the file.
             WHITESPACE if needed else self.bad_number,
             f"{attribute} has {what}, which urdfdom {'refuses' if needed else 'does not read'}",
             element,
@@ -157,29 +157,29 @@ class NumberReader:
 
 _NOT_ZERO = "123456789"
 
-#: Elements whose attributes need no further words.
+#: Elements whose tag is not named in messages.
 _PLAIN = ("origin", "axis", "limit")
 
-#: Zeros that begin the number of a reference; Python's conversion refuses thousands of them.
+#: Leading zeros of a character reference; Python's conversion refuses thousands of them.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
-#: What a piece of text looks like -> what to do about it; the first that matches.
+#: Pattern for an invalid number -> remedy; the first match counts.
 _REMEDIES = (
-    (r"[+-]?(nan|inf|infinity)", "only finite numbers have a meaning here"),
+    (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*\$[({].*", "expand the xacro first"),
-    (r".*,.*", "separate numbers by spaces and write decimals with a point"),
-    (r"[+-]?0x.*", "write it in decimal digits"),
+    (r".*,.*", "separate numbers by spaces, and write decimals with a point"),
+    (r"[+-]?0x.*", "write decimal digits"),
     (r"[+-]?[0-9.]+d[+-]?[0-9]+", "write the exponent with e"),
     (r".*[^\x00-\x7f].*", "write ASCII digits"),
     (r".*_.*", "write the digits without underscores"),
     (r"[\[({].*|.*[\])}]", "write the numbers without brackets"),
     (r"[+-]?[0-9.]+e[+-]?", "write digits after the e"),
     (r"[+-]?[0-9.]+[a-z]+", "write the number without a unit"),
-    (r"", "it is empty; write a number, or leave the attribute out"),
+    (r"", "it is empty; write a number, or remove the attribute"),
 )
 
 
 def _remedy(piece: str) -> str:
-    """What to do about a piece of text that is not a number."""
+    """Return the remedy for a text that is not a number."""
     found = (text for pattern, text in _REMEDIES if re.fullmatch(pattern, piece, re.IGNORECASE | re.DOTALL))
     return next(found, "write a number such as -1.5 or 2e-3")

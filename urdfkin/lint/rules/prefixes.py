@@ -1,4 +1,4 @@
-"""Prefixes of names that no `xmlns:` around them declares: urdfdom does not mind, most XML readers do."""
+"""Check that namespace prefixes are declared (`xmlns:`). urdfdom does not require it, but most readers do."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from urdfkin.urdf.element import Element
 
 UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 
-#: What XML declares itself.
+#: Prefixes that XML declares itself.
 _PREDECLARED = ("xml", "xmlns")
 
-#: Told already, as something that is missing from the robot (URDF202, URDF112).
-_TOLD = ("xacro:", "xi:include")
+#: Prefixes with findings of their own (URDF202, URDF112).
+_REPORTED = ("xacro:", "xi:include")
 
 
 @dataclass(slots=True)
 class _Use:
-    """Where a prefix is used first, and how often in all."""
+    """The first use of a prefix, and the number of uses."""
 
     element: Element
     attribute: str | None
@@ -31,7 +31,7 @@ class _Use:
 
 def check_prefixes(report: Reporter, root: Element) -> None:
     """Report each undeclared prefix once."""
-    for prefix, use in _undeclared(root).items():
+    for prefix, use in _undeclared_prefixes(root).items():
         more = f" and {use.times - 1} more" if use.times > 1 else ""
         report.add(
             UNDECLARED_PREFIX,
@@ -39,12 +39,12 @@ def check_prefixes(report: Reporter, root: Element) -> None:
             use.element,
             attribute=use.attribute,
             found=quoted(use.attribute or f"<{use.element.tag}>") + more,
-            remedy=f'write xmlns:{shortened(prefix)}="..." in <robot>, or remove what has the prefix',
+            remedy=f'write xmlns:{shortened(prefix)}="..." in <robot>, or remove the names with this prefix',
         )
 
 
-def _undeclared(root: Element) -> dict[str, _Use]:
-    """Prefix -> its uses outside every element that declares it."""
+def _undeclared_prefixes(root: Element) -> dict[str, _Use]:
+    """Return the undeclared prefixes with their uses."""
     found: dict[str, _Use] = {}
     declared = Counter(_PREDECLARED)
     stack = [(root, False)]
@@ -58,15 +58,15 @@ def _undeclared(root: Element) -> dict[str, _Use]:
         if own:
             stack.append((element, True))
         stack += [(child, False) for child in reversed(element.children)]
-        for prefix, attribute in _prefixed(element):
+        for prefix, attribute in _prefixes_of(element):
             if declared[prefix] < 1:
                 found.setdefault(prefix, _Use(element, attribute)).times += 1
     return found
 
 
-def _prefixed(element: Element) -> Iterator[tuple[str, str | None]]:
-    """The prefixes of an element's tag (attribute None) and attributes."""
-    if ":" in element.tag and not element.tag.startswith(_TOLD):
+def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
+    """Yield the prefixes of an element's tag (attribute None) and of its attributes."""
+    if ":" in element.tag and not element.tag.startswith(_REPORTED):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:
         if ":" in key:

@@ -1,4 +1,4 @@
-"""Limits of joints: those that contradict themselves, and those that the joint's type does not use."""
+"""Check the limits of joints: contradictory ones, and those that the joint type does not use."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ NEGATIVE_LIMIT = Rule("URDF509", "negative-limit", WARNING, REFUSES)
 
 
 def check_ranges(report: Reporter, robot: RobotRecord) -> None:
-    """What is wrong with `<limit>`, of each joint that has one."""
+    """Check the `<limit>` of each joint."""
     for joint in robot.joints:
         if joint.limit is not None:
             _check_limit(report, joint, joint.limit, robot.version)
 
 
 def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # from then on urdfdom asks the same of every joint, whatever its type
+    strict = version >= (1, 2)  # from 1.2 on urdfdom has the same rules for all joint types
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
@@ -50,7 +50,7 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
             "the lower limit is above the upper limit",
             limit.element,
             attribute="lower",
-            found=found if len(written) == 2 else f"{found} (what is not written is 0)",
+            found=found if len(written) == 2 else f"{found} (a missing bound is 0)",
             remedy="swap the two" if len(written) == 2 else "write both limits",
         )
     elif lower == upper and bounded:

@@ -1,4 +1,4 @@
-"""Shapes: kinematics needs none of them, so nothing here is an error."""
+"""Check shapes: invalid or incomplete ones. Kinematics does not use them, so no finding is an error."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from urdfkin.urdf.records import RobotRecord
 UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: Shape -> its numbers: (attribute, how many, required).
+#: Shape -> its numbers: (attribute, count, required).
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),
@@ -23,7 +23,7 @@ _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
 
 
 def check_shapes(report: Reporter, robot: RobotRecord) -> None:
-    """Shapes that are none, or incomplete."""
+    """Report invalid and incomplete shapes."""
     numbers = NumberReader(report, UNREADABLE, UNREADABLE)
     for link in robot.links.values():
         for shape in link.children:
@@ -42,10 +42,10 @@ def _check_geometry(report: Reporter, owner: Element, numbers: NumberReader) -> 
         lacks = "no <geometry>" if geometry is None else "an empty <geometry>"
         report.add(
             GEOMETRY,
-            f"the {owner.tag} has no shape that URDF knows",
+            f"the {owner.tag} has no shape of URDF",
             geometry or owner,
             found=lacks if shape is None else f"<{shape.tag}>",
-            remedy="shapes are box, cylinder, sphere and mesh",
+            remedy="the shapes are box, cylinder, sphere and mesh",
         )
         return
     for attribute, count, required in _SHAPES[shape.tag]:
@@ -63,7 +63,7 @@ def _check_geometry(report: Reporter, owner: Element, numbers: NumberReader) -> 
 
 
 def _check_capsule(report: Reporter, owner: Element, version: tuple[int, int]) -> None:
-    """A capsule is a shape from version 1.1 on; before, readers skip it."""
+    """Report a capsule in a file of version 1.0, where readers skip it."""
     geometry = owner.first("geometry")
     capsule = None if geometry is None else geometry.first("capsule")
     if capsule is not None and version < (1, 1):

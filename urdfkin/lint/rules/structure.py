@@ -1,6 +1,6 @@
-"""How joints connect links: one tree, one root, every link once.
+"""Check that the joints connect the links to one tree: one root, and one parent for every other link.
 
-Everything here is iterative: a chain of 50,000 links must not meet a stack.
+All functions are iterative, because a chain of 50,000 links would exceed the recursion limit.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ CYCLE = Rule("URDF412", "cycle", ERROR)
 
 
 def check_structure(report: Reporter, robot: RobotRecord) -> bool:
-    """Report what keeps the joints from being a tree; whether they are one."""
+    """Report the reasons why the joints form no tree; return whether they form one."""
     edges = [joint for joint in robot.joints if _ends_exist(report, robot, joint)]
     sound = len(edges) == len(robot.joints) and _no_loops_or_diamonds(report, robot, edges)
     return _one_root(report, robot) and sound and bool(robot.links)
 
 
 def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
-    """Whether a joint has two links that exist and differ."""
+    """Return whether a joint has two different links that exist; report them otherwise."""
     for tag, link in (("parent", joint.parent), ("child", joint.child)):
         if link is not None and link not in robot.links:
             nearest = report.nearest(link, robot.links)
@@ -53,7 +53,11 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 
 
 def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
-    """Walk depth first: a joint back to a link above closes a loop, one to another link met, a diamond."""
+    """Search depth first for links with several parents.
+
+    A joint to a link on the current path closes a loop. A joint to another visited link gives this link a
+    second parent.
+    """
     below: dict[str, list[JointRecord]] = {}
     children = set()
     for joint in edges:
@@ -61,25 +65,25 @@ def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[Join
         children.add(joint.child)
     first: dict[str, JointRecord] = {}
     repeated: list[tuple[JointRecord, bool]] = []
-    done: set[str] = set()
+    visited: set[str] = set()
     for start in [link for link in robot.links if link not in children] + list(robot.links):
-        if start in done:
+        if start in visited:
             continue
         path: set[str] = {start}
         stack: list[tuple[str, list[JointRecord]]] = [(start, list(reversed(below.get(start, []))))]
-        done.add(start)
+        visited.add(start)
         while stack:
-            link, waiting = stack[-1]
-            if not waiting:
+            link, pending = stack[-1]
+            if not pending:
                 stack.pop()
                 path.discard(link)
                 continue
-            joint = waiting.pop()
+            joint = pending.pop()
             child = joint.child or ""
-            if child in done:
+            if child in visited:
                 repeated.append((joint, child in path))
                 continue
-            done.add(child)
+            visited.add(child)
             first[child] = joint
             path.add(child)
             stack.append((child, list(reversed(below.get(child, [])))))
@@ -91,27 +95,32 @@ def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[Join
 def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | None, *, loop: bool) -> None:
     if loop:
         rule, remedy = CYCLE, "remove a joint of the loop; a URDF is a tree"
-        message = f"the joint closes a loop: its child stands above its parent {quoted(joint.parent or '')}"
+        message = (
+            f"the joint closes a loop: its child is an ancestor of its parent {quoted(joint.parent or '')}"
+        )
     else:
         other = f"joint {quoted(first.name)} on line {first.element.line}" if first else "another joint"
         rule, remedy = SEVERAL_PARENTS, "a link has one parent; remove one of the joints"
-        message = f"the child link already is the child of {other}"
+        message = f"the child link is already the child of {other}"
     at, found = joint.element.first("child"), quoted(joint.child or "")
     report.add(rule, message, at, attribute="link", found=found, remedy=remedy)
 
 
 def _one_root(report: Reporter, robot: RobotRecord) -> bool:
-    """Exactly one link is nobody's child; a link that a broken joint names is not blamed again."""
+    """Return whether exactly one link has no parent; report the others.
+
+    A link is not reported if a joint with an error may be its parent joint.
+    """
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
     if not roots and robot.links and not report.failed:
-        report.add(CYCLE, "no link is a root: every one is the child of a joint", robot.element)
+        report.add(CYCLE, "no link is a root: every link is the child of a joint", robot.element)
     if len(roots) < 2:
         return len(roots) == 1
     if not children <= robot.links.keys():
-        return False  # a joint that names no child, or a wrong one, has lost one of these: reported already
+        return False  # already reported: a joint with a missing or wrong child
     parents = {joint.parent for joint in robot.joints}
-    # The first root that carries something is the robot; the others are what fell off.
+    # The first root with children is the robot; the others are disconnected.
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
         if root != main:
@@ -120,6 +129,6 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
                 f"the link has no parent, and neither has {quoted(main)}",
                 robot.links[root],
                 attribute="name",
-                remedy="connect it with a joint or remove it",
+                remedy="connect it with a joint, or remove it",
             )
     return False

@@ -1,4 +1,4 @@
-"""Legal, and probably not what was meant: rounded pi, degrees, millimetres, joints in the same place."""
+"""Check for legal values that are probably mistakes: rounded pi, degrees, millimetres, equal joints."""
 
 from __future__ import annotations
 
@@ -19,35 +19,35 @@ SAME_PLACE = Rule("URDF605", "same-place", NOTE)
 OVERFLOW = Rule("URDF606", "overflow", ERROR)
 NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
 
-#: A joint further than this from its parent, in m, is probably given in millimetres.
+#: A joint origin longer than this (m) is probably in millimetres.
 FAR = 100.0
 
-#: A robot whose lengths together are less than this, in m, was probably scaled twice.
+#: A robot whose lengths have a smaller sum (m) was probably scaled twice.
 TINY = 1e-4
 
-#: A limit of this many radians and more, in whole degrees, is probably meant in degrees; from `ENDLESS` on
-#: it is the way some exporters write "none".
+#: A whole number of radians from `MANY` on is probably an angle in degrees. From `ENDLESS` on it means
+#: "no limit" in some exporters.
 MANY, ENDLESS = 30.0, 1000.0
 
-#: By how much a tip may be off, in m, before a rounded pi is a warning.
+#: A rounded pi is a warning if it moves a tip by more than this (m).
 NOTICEABLE = 1e-3
 
-#: An angle, in rad, that is off by less was written with all the digits one could want.
+#: A smaller difference (rad) from a multiple of pi is not reported.
 ROUNDING = 1e-10
 
-#: Multiples of pi that people write, and with how many decimals at least they are recognised.
+#: Multiples of pi, each with the smallest number of decimals from which it is recognized.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
 
 
 def check_suspicious(report: Reporter, robot: RobotRecord, *, sound: bool) -> None:
-    """Everything that is legal and odd.
+    """Report legal values that are probably mistakes.
 
     Args:
-        report: Where findings go.
-        robot: What was read.
-        sound: Whether the joints make a tree, so that lengths along chains mean something.
+        report: The reporter, which receives the findings.
+        robot: The records of the robot.
+        sound: Whether the joints form a tree, so that lengths along chains are defined.
     """
     reach = _reach(robot) if sound else {}
     for joint in robot.joints:
@@ -92,7 +92,7 @@ def _degrees(report: Reporter, joint: JointRecord, what: str, found: str) -> Non
 
 
 def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], reach: float) -> None:
-    """The angle of an origin that is furthest off a multiple of pi it was probably meant to be."""
+    """Report the angle of an origin with the largest difference from a multiple of pi."""
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     whole = list(written)
     for k, (word, angle) in enumerate(zip(written, joint.rpy, strict=True)):
@@ -105,30 +105,30 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
     if not off or joint.origin_element is None:
         return
     origin = joint.origin_element
-    moves = f", which moves what it carries by up to {_metres(off * reach)}" if reach > 0.0 else ""
+    moves = f", which moves the links below it by up to {_metres(off * reach)}" if reach > 0.0 else ""
     report.add(
         ROUNDED_PI,
-        f"rpy holds a rounded {_as_pi(multiple)}, off by {off:.1e} rad{moves}",
+        f"rpy contains a rounded {_as_pi(multiple)}, off by {off:.1e} rad{moves}",
         origin,
         attribute="rpy",
         found=quoted(text),
-        remedy=f"write {meant!r} if {_as_pi(multiple)} is meant; it is used as written",
+        remedy=f"write {meant!r} if you mean {_as_pi(multiple)}; the written value is used",
         severity=Severity.WARNING if off * reach > NOTICEABLE else None,
         weight=off * reach,
-        fix=lambda: report.rewritten(origin, "rpy", _exchanged(report.raw(origin, "rpy"), whole), turns),
+        fix=lambda: report.rewritten(origin, "rpy", _replace_words(report.raw(origin, "rpy"), whole), turns),
     )
 
 
-def _exchanged(raw: str | None, words: list[str]) -> str:
-    """A value as the file has it, with other words between the same blanks."""
+def _replace_words(raw: str | None, words: list[str]) -> str:
+    """Replace the words of a raw value, without changes of the white space between them."""
     blanks = re.split(r"[^ \t\r\n]+", raw or "")
-    if len(blanks) != len(words) + 1:  # blanks that are written as references
+    if len(blanks) != len(words) + 1:  # white space is written as character references
         return " ".join(words)
     return "".join(blank + word for blank, word in zip(blanks, [*words, ""], strict=True))
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """The multiple of pi a decimal was probably rounded or cut from, and its value; None for none.
+    """Return the multiple of pi that a decimal is probably rounded from, and its value; otherwise None.
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
@@ -154,7 +154,7 @@ def _as_pi(multiple: Fraction) -> str:
 def _metres(length: float) -> str:
     units = ((1.0, "m"), (1e3, "mm"), (1e6, "um"))
     factor, unit = next((pair for pair in units if length * pair[0] >= 1.0), (1e9, "nm"))
-    # Two digits, and never an exponent.
+    # Two digits, without an exponent.
     return f"{float(f'{length * factor:.1e}'):g} {unit}"
 
 
@@ -162,7 +162,7 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
     if joint.origin_element is not None and max(abs(x) for x in joint.xyz) >= FAR:
         report.add(
             MILLIMETRES,
-            "the joint sits very far from its parent link",
+            "the joint is very far from its parent link",
             joint.origin_element,
             attribute="xyz",
             found=f"xyz={quoted(joint.origin_element.attributes.get('xyz', ''))}",
@@ -185,7 +185,7 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_neutral(report: Reporter, joint: JointRecord) -> None:
-    """A joint that cannot be at zero, the neutral configuration; a mimic joint is where its rule puts it."""
+    """Report a joint whose limits exclude zero, the neutral configuration. Mimic joints are not checked."""
     limit = joint.limit
     if limit is None or joint.kind not in ("revolute", "prismatic") or joint.mimic is not None:
         return
@@ -203,7 +203,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_places(report: Reporter, robot: RobotRecord) -> None:
-    """Joints of one parent that turn about, or slide along, one and the same axis."""
+    """Report joints with the same parent, kind, origin and axis."""
     places: dict[tuple[object, ...], JointRecord] = {}
     for joint in robot.joints:
         if joint.kind not in AXIAL:
@@ -215,12 +215,12 @@ def _check_places(report: Reporter, robot: RobotRecord) -> None:
                 SAME_PLACE,
                 f"the joint has the same origin and axis as joint {quoted(first.name)}",
                 joint.element,
-                remedy="fine if that is meant",
+                remedy="ignore this if it is intended",
             )
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """For each link, a bound on how far anything it carries is from it: lengths summed along chains."""
+    """Return a bound (m) on the distance from each link to all links below it: the sum of lengths."""
     below: dict[str, list[JointRecord]] = {}
     for joint in robot.joints:
         below.setdefault(joint.parent or "", []).append(joint)
@@ -243,7 +243,7 @@ def _check_sums(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -
         far = max(robot.joints, key=lambda joint: max(abs(x) for x in joint.xyz))
         report.add(
             OVERFLOW,
-            "lengths along the chain add up to more than a double can hold",
+            "the sum of the lengths along the chain is too large for a double",
             far.origin_element or far.element,
             attribute="xyz",
             found=quoted((far.origin_element or far.element).attributes.get("xyz", "")),
@@ -252,7 +252,7 @@ def _check_sums(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -
     elif 0.0 < whole < TINY:
         report.add(
             TINY_ROBOT,
-            f"all lengths of the robot together are {_metres(whole)}",
+            f"the sum of all lengths of the robot is {_metres(whole)}",
             robot.element,
             found=None,
             remedy="write metres",

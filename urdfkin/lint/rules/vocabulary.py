@@ -1,4 +1,4 @@
-"""The elements and attributes of URDF, and findings about those it does not have."""
+"""Check elements and attributes: unknown, misplaced and repeated ones, and text between tags."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ UNKNOWN_ATTRIBUTE = Rule("URDF208", "unknown-attribute", WARNING)
 DUPLICATE_ELEMENT = Rule("URDF209", "duplicate-element", WARNING)
 STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 
-#: Extensions that may hold anything, `<joint>` and `<link>` included.
+#: Extension elements with any content, even `<joint>` and `<link>`.
 OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
 
-#: Elements and attributes that simulators and vendors add, seen in robots that many people use.
+#: Elements and attributes that simulators and vendors add in widely used robots.
 _ADDED = (
     "contact collision_checking self_filter surface gravity kinematic drake group dont_collapse D K"
     " mu_coulomb mu_viscous current command_effort gear_velocity"
 )
 EXTENSIONS = frozenset(_ADDED.split())
 
-#: Element: its attributes, where they are looked at > the elements that it may hold. One that has no line is
-#: not looked into.
+#: Element: attributes > child elements. Without a colon, the attributes are not checked. An element without
+#: a line is not checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -55,27 +55,27 @@ ATTRIBUTES = {
     if colon
 }
 
-#: Elements and attributes of other formats that say where something is, and are skipped here.
+#: Elements and attributes of other formats for poses, which URDF readers skip.
 _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
-#: Attributes that mean something elsewhere, or to others: whether they may go takes a person.
+#: Attributes with a meaning elsewhere: `--fix` does not remove them.
 _MEANT = frozenset().union(*ATTRIBUTES.values()) | _FOREIGN | EXTENSIONS
 
-#: Children that may stand once only.
+#: Children that may occur only once.
 _ONCE = {
     **{tag: CHILDREN[tag] for tag in ("joint", "inertial", "visual", "collision", "geometry")},
     "link": frozenset({"inertial"}),
 }
 
-#: Elements whose value would be lost if it stood between the tags.
+#: Elements whose value belongs into attributes; text between their tags is lost.
 _VALUES = {"origin", "axis", "limit", "mimic", "parent", "child"}
 
-#: Elements whose text can only be their value, put in the wrong place.
+#: Elements whose text can only be a misplaced value.
 _VECTORS = ("origin", "axis")
 
 
 def check_vocabulary(report: Reporter, root: Element) -> None:
-    """Unknown, misplaced and repeated elements, unknown attributes, and text where URDF has none."""
+    """Report unknown, misplaced and repeated elements, unknown attributes, and text between tags."""
     stack = [root]
     while stack:
         element = stack.pop()
@@ -99,7 +99,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
         what = f"a {meant} inside <{inside}>" if part.tag == meant else f"<{part.tag}>"
         report.add(
             MISPLACED,
-            f"{what} is not read, so it is missing from the robot",
+            f"{what} is skipped, so it is missing from the robot",
             part,
             remedy=f"write <{meant}> as a child of <robot>",
             owner=part.tag,
@@ -124,7 +124,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
     )
     report.add(
         UNKNOWN_ELEMENT,
-        f"<{element.tag}> means nothing in <{parent.tag if parent else ''}> and is skipped",
+        f"URDF has no <{element.tag}> in <{parent.tag if parent else ''}>; it is skipped",
         element,
         remedy=remedy,
         severity=Severity.NOTE if element.tag in EXTENSIONS else None,
@@ -132,7 +132,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
 
 
 def outside_extensions(element: Element) -> Iterator[Element]:
-    """An element and what is below it, but for extensions, which may hold anything."""
+    """Yield an element and all elements below it, except those in extensions."""
     stack = [element]
     while stack:
         element = stack.pop()
@@ -141,7 +141,7 @@ def outside_extensions(element: Element) -> Iterator[Element]:
 
 
 def _is_part(element: Element) -> bool:
-    """Whether an element is a link or joint of a robot, by more than its name."""
+    """Return whether an element is a link or joint, by its tag and its content."""
     tag = nearest(element.tag, _PARTS) if len(element.tag) < _LONGEST_PART else None
     if tag == "link":
         return "name" in element.attributes
@@ -152,7 +152,7 @@ def _is_part(element: Element) -> bool:
 
 _PARTS = frozenset({"link", "joint"})
 
-#: Longer words are like neither: difflib calls five of eight letters, and fewer, no match.
+#: Longer tags are similar to neither: difflib's ratio with five common letters of eight is no match.
 _LONGEST_PART = 8
 
 #: The joint types of the specification.
@@ -173,7 +173,7 @@ def _check_attributes(report: Reporter, element: Element) -> None:
             element,
             attribute=attribute,
             found=f"{attribute}={quoted(element.attributes[attribute])}",
-            remedy=f"did you mean {close}?" if close else f"known are {', '.join(sorted(known))}",
+            remedy=f"did you mean {close}?" if close else f"its attributes are {', '.join(sorted(known))}",
             severity=Severity.NOTE if attribute in EXTENSIONS else None,
             fix=None if close or attribute in _MEANT else partial(report.without, element, attribute),
         )
@@ -183,7 +183,7 @@ def _check_text(report: Reporter, element: Element) -> None:
     if not element.text or element.tag not in _VALUES | {"robot", "joint", "link"}:
         return
     if element.tag in ("parent", "child") and "link" not in element.attributes:
-        return  # reported as a missing attribute, with this text
+        return  # the finding about the missing attribute quotes this text
     lost = element.tag in _VECTORS and not element.attributes
     example = _EXAMPLES.get(element.tag)
     report.add(
@@ -215,7 +215,7 @@ def _check_repeats(report: Reporter, element: Element) -> None:
         if child.tag in seen and child.tag in once:
             report.add(
                 DUPLICATE_ELEMENT,
-                f"a second <{child.tag}> is skipped: the first, on line {seen[child.tag].line}, counts",
+                f"a second <{child.tag}> is skipped; the first, on line {seen[child.tag].line}, is used",
                 child,
                 remedy="remove one of the two",
             )
@@ -223,11 +223,11 @@ def _check_repeats(report: Reporter, element: Element) -> None:
 
 
 def nearest(word: str, known: frozenset[str]) -> str | None:
-    """The known word that `word` was probably meant to be; none for what is much longer than each."""
+    """Return the known word most similar to `word`, or None."""
     return _nearest(word, known) if len(word) <= _LONGEST else None
 
 
-#: Longer words are like none of URDF's.
+#: Longer words are not similar to any word of URDF.
 _LONGEST = 32
 
 
