@@ -44,9 +44,9 @@ def of_rows(rows: str, **keys: str) -> str:
 @pytest.mark.parametrize(
     ("rows", "keys", "message"),
     [
-        ("[[0.1, 90, 0, 0]]", {}, "row 1, alpha: alpha is more than a turn.*found 90; write angles = 'deg"),
+        ("[[0.1, 90, 0, 0]]", {}, "row 1, alpha: alpha is more than one turn in radians.*found 90; write angles = 'deg"),
         ("[[0, 0, 0, 0], [0, 0, 0, -180.0]]", {}, r"row 2, theta: .*found -180.0; write angles = 'degrees'"),
-        ('[{beta = 45, a = 1}]', {}, "row 1, beta: beta is more than a turn"),
+        ('[{beta = 45, a = 1}]', {}, "row 1, beta: beta is more than one turn in radians"),
         (
             "[[0, 0.089, 0, 1.5708], [0, 0.1, 0.4, 0], [0, 0.3, 0, -1.5708]]", {},
             "rows 1 to 3: the columns look like theta, d, a, alpha.*found second column 0.089",
@@ -65,9 +65,9 @@ def of_rows(rows: str, **keys: str) -> str:
         ),
         (
             "[{joint='a', mimic={leader='c'}}, {joint='b', mimic={leader='a'}}, {joint='c'}]", {},
-            "row 2, leader: a joint cannot follow one that follows: found 'a'",
+            "row 2, leader: a joint cannot mimic a mimic joint: found 'a'",
         ),
-        ("[{joint = 'a', mimic = {leader = 'a'}}]", {}, "row 1, leader: a joint cannot follow one"),
+        ("[{joint = 'a', mimic = {leader = 'a'}}]", {}, "row 1, leader: a joint cannot mimic a mimic joint"),
         ("[{mimic = {leader = 'b', factor = 2}}]", {}, "row 1: unknown key in mimic: found 'factor'"),
         ("[{joint = 'a', limit = {min = 2}}]", {}, "row 1: unknown key in limit: found 'min'"),
         ("[{limit = {lower = 2, upper = 1}}]", {}, "row 1, limit: lower is above upper: found 2 and 1"),
@@ -114,10 +114,10 @@ def test_a_robot_that_is_null_is_an_error(tmp_path: Path) -> None:
         ),
         ("a,d,theta\n0.1,0,0\n", "header: no column 'alpha': found a, d, theta"),
         ("0.1,0,0,0\n", "header: no column 'a'"),
-        ("a,a,alpha,d,theta\n1,1,0,0,0\n", "header: the column 'a' stands twice"),
+        ("a,a,alpha,d,theta\n1,1,0,0,0\n", "header: the column 'a' is there twice"),
         ("a,alpha,d,theta\n0.1,,0,0\n", "row 1, alpha: not a number: found ''"),
         ("a,alpha,d,theta,mass\n0.1,0,0,0,1\n", "row 1: unknown key in a row: found 'mass'"),
-        ("a,alpha,d,theta,twist\n0.1,0,0,0,1\n", "header: the column 'alpha' stands twice"),
+        ("a,alpha,d,theta,twist\n0.1,0,0,0,1\n", "header: the column 'alpha' is there twice"),
         ("", "header: no column 'a': found nothing"),
         ("a,alpha,d,theta\n", "rows: a table without rows"),
     ],

@@ -51,7 +51,7 @@ def test_a_file_is_read_by_its_ending(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        ({"rows": ROWS}, "does not say its convention"),
+        ({"rows": ROWS}, "does not name its convention"),
         ({"convention": "dh", "rows": ROWS}, "unknown convention: found 'dh'"),
         (
             {"convention": "standard", "rows": ROWS, "anlges": "degrees"},

@@ -155,7 +155,7 @@ def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
     ("screws", "home", "message"),
     [
         ([[0, 0, 2, 0, 0, 0]], M, "screw 1: an axis has length 1: found 2"),
-        ([[0, 0, 1, 0, 0, 0.1]], M, "turns or slides, and does not both: found a pitch of 0.1"),
+        ([[0, 0, 1, 0, 0, 0.1]], M, "is revolute or prismatic, not both: found a pitch of 0.1"),
         ([[0, 0, 1]], M, r"screws are \(n, 6\)"),
         ([[0, 0, 1, 0, 0, 0]], np.ones((4, 4)), "M must be a rotation"),
         ([[0, 0, 1, 0, 0, np.nan]], M, "finite"),

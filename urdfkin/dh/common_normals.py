@@ -272,7 +272,7 @@ class PairLike:
         return replace(step, delta=step.delta + d) if d else step
 
     def passed_back(self, carry: float) -> float:
-        """Return the offset (metres) that a row with d = 0 must receive to pass `carry` on to the next row."""
+        """Return the offset (metres) that a row with d = 0 needs before it, to pass `carry` on."""
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 

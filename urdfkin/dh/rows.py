@@ -424,7 +424,7 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
     if "convention" not in data:
         raise InputError(
             "the table does not name its convention",
-            remedy="write convention = 'standard' or 'modified' (in CSV or text a line `convention: standard`)",
+            remedy="write convention = 'standard' or 'modified' (in text: a line `convention: standard`)",
             question=Question.WHICH_DH_CONVENTION,
         )
     for key in data:

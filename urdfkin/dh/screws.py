@@ -83,7 +83,7 @@ class ProductOfExponentials:
 
     @property
     def points(self) -> FloatArray:
-        """(n, 3) the point of each revolute axis nearest to the base; a prismatic joint has the previous point."""
+        """(n, 3) point of each revolute axis nearest to the base; a prismatic joint repeats the last point."""
         here, found = np.zeros(3), []
         for joint, screw in zip(self.joints, self.space, strict=True):
             here = np.cross(screw[:3], screw[3:]) if joint.kind.turns else here
@@ -133,7 +133,8 @@ class ProductOfExponentials:
     def to_tree(self) -> KinematicTree:
         """Return the robot as a tree.
 
-        In the zero configuration each link frame is parallel to the base frame, with its origin on its joint's axis.
+        In the zero configuration each link frame is parallel to the base frame. Its origin is on its joint's
+        axis.
         """
         links = [self.base_frame, *(f"{joint.name}_link" for joint in self.joints)]
         joints, here = list[tuple[Joint, str, str]](), np.zeros(3)

@@ -378,7 +378,7 @@ class DHTable(Displayable):
         return lengths + math.hypot(*self.tool[:3, 3])
 
     def rounding(self, q: Given) -> FloatArray:
-        """Return the (...,) bound of the rounding error of `placement(q)` in metres; divided by `span`, in radians.
+        """Return the (...,) bound of the rounding of `placement(q)` in metres; divided by `span`, in radians.
 
         It is the rounding of the rows (`urdfkin.kinematics.roundings`) and of their angles, times the lever.
         """

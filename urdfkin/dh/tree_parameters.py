@@ -243,7 +243,7 @@ def _links(tree: KinematicTree) -> list[_Link]:
 
 
 def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[int, tuple[float, float]]]:
-    """Return the step to each axis, and each link's rotation and offset from its axis frame to its row's frame.
+    """Return the step to each axis, and the rotation and offset from each axis frame to its row's frame.
 
     The first moving child of a link defines its x. A link without a moving child has the x with theta = 0.
     """

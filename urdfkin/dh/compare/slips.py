@@ -144,7 +144,7 @@ def convention_that_fits(
         f"the table does not name its convention, and {'both conventions fit' if best else 'neither fits'}",
         where=where,
         found=f"tip errors {' and '.join(f'{how.metres * 1e3:.3g} mm as {one}' for one, how in found)}",
-        remedy="write convention = 'standard' or 'modified' (in CSV or text a line `convention: standard`)",
+        remedy="write convention = 'standard' or 'modified' (in text: a line `convention: standard`)",
         question=Question.WHICH_DH_CONVENTION,
     )
 
