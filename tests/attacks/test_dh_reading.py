@@ -44,7 +44,7 @@ def of_rows(rows: str, **keys: str) -> str:
 @pytest.mark.parametrize(
     ("rows", "keys", "message"),
     [
-        ("[[0.1, 90, 0, 0]]", {}, "row 1, alpha: alpha is more than one turn in radians.*found 90; write angles = 'deg"),
+        ("[[0.1, 90, 0, 0]]", {}, "row 1, alpha: alpha is more than one turn.*found 90; write angles = 'deg"),
         ("[[0, 0, 0, 0], [0, 0, 0, -180.0]]", {}, r"row 2, theta: .*found -180.0; write angles = 'degrees'"),
         ('[{beta = 45, a = 1}]', {}, "row 1, beta: beta is more than one turn in radians"),
         (
@@ -72,7 +72,7 @@ def of_rows(rows: str, **keys: str) -> str:
         ("[{joint = 'a', limit = {min = 2}}]", {}, "row 1: unknown key in limit: found 'min'"),
         ("[{limit = {lower = 2, upper = 1}}]", {}, "row 1, limit: lower is above upper: found 2 and 1"),
         ("[{joint = 'a', limit = {lower = nan}}]", {}, "row 1, lower: not a finite number: found nan"),
-        ("[]", {}, r"rows: a table without rows, base and tool says nothing: found \[\]"),
+        ("[]", {}, r"rows: a table needs a row, a base or a tool: found \[\]"),
         ("[{joint = 5}]", {}, "row 1, joint: a name is text: found 5"),
         ("[{a = true}]", {}, "row 1, a: not a number: found True"),
         ("[{a = '1_0'}]", {}, "row 1, a: not a number: found '1_0'"),
@@ -107,10 +107,10 @@ def test_a_robot_that_is_null_is_an_error(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("a,alpha,d,theta\n0.1,0,0,0,7\n", "row 1: a row has a cell for each of the 4 columns: found 5"),
+        ("a,alpha,d,theta\n0.1,0,0,0,7\n", "row 1: a row needs a cell for each of the 4 columns: found 5"),
         (
             "a,alpha,d,theta\n0.1,0,0,0\n0.1,0,0\n",
-            "row 2: a row has a cell for each of the 4 columns: found 3",
+            "row 2: a row needs a cell for each of the 4 columns: found 3",
         ),
         ("a,d,theta\n0.1,0,0\n", "header: no column 'alpha': found a, d, theta"),
         ("0.1,0,0,0\n", "header: no column 'a'"),
@@ -119,7 +119,7 @@ def test_a_robot_that_is_null_is_an_error(tmp_path: Path) -> None:
         ("a,alpha,d,theta,mass\n0.1,0,0,0,1\n", "row 1: unknown key in a row: found 'mass'"),
         ("a,alpha,d,theta,twist\n0.1,0,0,0,1\n", "header: the column 'alpha' is there twice"),
         ("", "header: no column 'a': found nothing"),
-        ("a,alpha,d,theta\n", "rows: a table without rows"),
+        ("a,alpha,d,theta\n", "rows: a table needs a row"),
     ],
 )
 def test_a_wrong_csv_says_where_and_what(text: str, message: str, tmp_path: Path) -> None:

@@ -108,7 +108,11 @@ def test_unverified_tables_exit_3() -> None:
         (("ur5", "--all", "--tree"), InputError, "do not go together"),
         (("ur5", "--all", "--format", "c"), InputError, "--all does not support the format 'c'"),
         (("ur5", "--tree", "--format", "c"), InputError, "--tree does not support the format 'c'"),
-        (("ur5", "--compare", "ur5", "--format", "c"), InputError, "--compare does not support the format 'c'"),
+        (
+            ("ur5", "--compare", "ur5", "--format", "c"),
+            InputError,
+            "--compare does not support the format 'c'",
+        ),
         (("ur5", "--compare", "ur6"), UnknownNameError, "unknown reference table 'ur6'"),
         (("panda", "--compare", "ur5"), InputError, "choose base and tip"),
         (("ur5", "--snap", "1"), InputError, "snap is an angle"),

@@ -89,7 +89,7 @@ def test_a_broken_or_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match="cannot be read"):
         read_table(tmp_path / "missing.toml")
     (tmp_path / "arm.xls").write_text("")
-    with pytest.raises(InputError, match=r"ends in .toml, .json, .csv, .tsv"):
+    with pytest.raises(InputError, match=r"has the suffix .toml, .json, .csv, .tsv"):
         read_table(tmp_path / "arm.xls")
     (tmp_path / "bad.toml").write_text('convention = "standard"\nrows = [["x", 0, 0, 0]]')
     with pytest.raises(InputError, match=r"bad.toml, row 1, a: not a number"):

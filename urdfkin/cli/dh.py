@@ -45,9 +45,9 @@ from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
 #: Formats that can contain several tables.
-_SEVERAL = ("terminal", "markdown", "latex", "json")
+_FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
 #: Formats with the check's result below the table; for the others it goes to stderr.
-_READ = ("terminal", "markdown")
+_PRINTED = ("terminal", "markdown")
 #: Formats that round numbers, with their digits of base and tool (None: the option --digits).
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
@@ -111,10 +111,10 @@ def run(work: Work) -> int:
 
 def _tables(work: Work) -> int:
     tips = _tips(work)
-    if len(tips) > 1 and work.format_ not in _SEVERAL:
+    if len(tips) > 1 and work.format_ not in _FORMATS_OF_SEVERAL:
         raise InputError(
             f"--all does not support the format {work.format_!r}",
-            remedy=f"use --format {', '.join(_SEVERAL)}",
+            remedy=f"use --format {', '.join(_FORMATS_OF_SEVERAL)}",
         )
     made = [_table(work, tip) for tip in tips]
     if work.format_ == "json" and work.all_:
@@ -122,9 +122,9 @@ def _tables(work: Work) -> int:
     elif work.format_ == "json":
         text = json.dumps(_document(*made[0]), indent=2) + "\n"
     else:
-        text = "\n".join(_written(work, table, check) for table, check in made)
-    _put(work, text)
-    if work.format_ not in (*_READ, "json"):
+        text = "\n".join(_format_table(work, table, check) for table, check in made)
+    _write_output(work, text)
+    if work.format_ not in (*_PRINTED, "json"):
         for table, check in made:
             for line in _notes(work, table, check).split("\n"):
                 say(line, err=True)
@@ -137,11 +137,11 @@ def _tips(work: Work) -> list[str | None]:
 
 
 def _table(work: Work, tip: str | None) -> tuple[DHTable, TableCheck | None]:
-    robot, table = work.robot, _made(work, tip, work.snap)
+    robot, table = work.robot, _make_table(work, tip, work.snap)
     return table, robot.verifier.table(table) if robot.verifier.policy else None
 
 
-def _made(work: Work, tip: str | None, snap: float) -> DHTable:
+def _make_table(work: Work, tip: str | None, snap: float) -> DHTable:
     robot, base = work.robot, work.base
     if work.written is not None:
         table = read_table_or_screws(at_home(work.written))
@@ -150,7 +150,10 @@ def _made(work: Work, tip: str | None, snap: float) -> DHTable:
     like = None
     if work.like is not None:
         like = read_table(reference_path(work.like))
-        tip, base = tip or _known(work, like.tip_frame), base or _known(work, like.base_frame)
+        tip, base = (
+            tip or _frame_of_robot(work, like.tip_frame),
+            base or _frame_of_robot(work, like.base_frame),
+        )
     if base is None and work.all_:
         base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
     return robot.dh(
@@ -164,7 +167,7 @@ def _made(work: Work, tip: str | None, snap: float) -> DHTable:
     )
 
 
-def _written(work: Work, table: DHTable, check: TableCheck | None) -> str:
+def _format_table(work: Work, table: DHTable, check: TableCheck | None) -> str:
     if work.format_ == "urdf":
         return to_urdf(table)
     if work.format_ == "svg":
@@ -172,7 +175,7 @@ def _written(work: Work, table: DHTable, check: TableCheck | None) -> str:
 
         return drawing(table)
     text = export(table, work.format_, work.units)
-    return f"{text}\n{_notes(work, table, check)}\n" if work.format_ in _READ else text
+    return f"{text}\n{_notes(work, table, check)}\n" if work.format_ in _PRINTED else text
 
 
 def _notes(work: Work, table: DHTable, check: TableCheck | None) -> str:
@@ -180,9 +183,11 @@ def _notes(work: Work, table: DHTable, check: TableCheck | None) -> str:
     lines = [check_line(check)]
     if work.format_ in _ROUNDED:
         lines.append(str(printed(table, work.units, _ROUNDED[work.format_])))
-    if work.written is None and (hint := snap_hint(table, lambda snap: _made(work, table.tip_frame, snap))):
+    if work.written is None and (
+        hint := snap_hint(table, lambda snap: _make_table(work, table.tip_frame, snap))
+    ):
         lines.append(f"hint: {hint}")
-    if work.like is None and work.format_ in _READ:
+    if work.like is None and work.format_ in _PRINTED:
         lines += [f"hint: {line}" for line in published(work.robot.origin.source)]
     return "\n".join(lines)
 
@@ -213,13 +218,13 @@ def _tree(work: Work) -> int:
             remedy="use terminal, markdown, csv or json",
         )
     check = work.robot.verifier.tree_parameters(parameters) if work.robot.verifier.policy else None
-    if work.format_ in _READ:
+    if work.format_ in _PRINTED:
         text += f"\n{check or check_line(None)}\n"
         q = draw(work.robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
         text += f"{printed_tree(parameters, work.units, q)}\n"
     else:
         say(str(check or check_line(None)), err=True)
-    _put(work, text)
+    _write_output(work, text)
     return 0 if check is not None else 3
 
 
@@ -233,8 +238,8 @@ def _compare(work: Work, name: str) -> int:
         )
     path = reference_path(name)
     data = read_mapping(path)
-    tip = work.tip or _known(work, data.get("tip_frame"))
-    base = work.base or _known(work, data.get("base_frame"))
+    tip = work.tip or _frame_of_robot(work, data.get("tip_frame"))
+    base = work.base or _frame_of_robot(work, data.get("base_frame"))
     chain, tolerance = work.robot.chain(tip, base), work.tolerance / 1e3
     note = ""
     if "convention" not in data:
@@ -253,11 +258,11 @@ def _compare(work: Work, name: str) -> int:
         text = json.dumps(_comparison(found, reference, slip), indent=2, allow_nan=False) + "\n"
     else:
         text = note + comparison_text(found, work.units) + (f"\nhint: {slip}\n" if slip else "")
-    _put(work, text)
+    _write_output(work, text)
     return 0 if found.passes else 1
 
 
-def _known(work: Work, name: object) -> str | None:
+def _frame_of_robot(work: Work, name: object) -> str | None:
     """Return the name of a table's base or tip frame if the robot has a frame of that name."""
     return name if isinstance(name, str) and name in work.robot.frame_names else None
 
@@ -312,10 +317,10 @@ def _mistake(one: Mistake) -> dict[str, Any]:
     }
 
 
-def _put(work: Work, text: str) -> None:
+def _write_output(work: Work, text: str) -> None:
     if work.output is not None:
         write_file(work.output, text.encode())
-    elif work.format_ in _READ:
+    elif work.format_ in _PRINTED:
         click.echo(text, nl=False)
     else:
         say_file(text)

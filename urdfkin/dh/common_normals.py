@@ -130,7 +130,7 @@ def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
     delta_next = cleaned_length(-across / sine, reach, noise.metres)
     delta = cleaned_length(A[2, 3] - delta_next * A[2, 2], reach, noise.metres)
     a, alpha = cleaned_length(along, reach, noise.metres), cleaned_angle(math.atan2(sine, A[2, 2]))
-    step = Step(phi, delta, a, alpha, 0.0, _rest(A, phi, alpha, 0.0), delta_next)
+    step = Step(phi, delta, a, alpha, 0.0, _remaining_rotation(A, phi, alpha, 0.0), delta_next)
     return step.turned() if a < 0.0 else step
 
 
@@ -142,7 +142,7 @@ def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_
     delta, delta_next = (offset, 0.0) if delta_each else (0.0, sign * offset)
     a = cleaned_length(math.hypot(A[0, 3], A[1, 3]), reach, noise.metres)
     phi = math.atan2(A[1, 3], A[0, 3]) if a else phi_free
-    return Step(phi, delta, a, alpha, 0.0, _rest(A, phi, alpha, 0.0), delta_next, free=not a)
+    return Step(phi, delta, a, alpha, 0.0, _remaining_rotation(A, phi, alpha, 0.0), delta_next, free=not a)
 
 
 def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> Step:
@@ -159,10 +159,10 @@ def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> S
     y = math.cos(phi) * z[1] - math.sin(phi) * z[0]
     alpha = cleaned_angle(math.atan2(-y, z[2]))
     beta = cleaned_angle(math.atan2(x, math.hypot(y, z[2])))
-    return Step(phi, 0.0, a, alpha, beta, _rest(A, phi, alpha, beta), delta_next, free=not a)
+    return Step(phi, 0.0, a, alpha, beta, _remaining_rotation(A, phi, alpha, beta), delta_next, free=not a)
 
 
-def _rest(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
+def _remaining_rotation(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
     """Return phi_next, the remaining rotation about the next axis; well conditioned for every tilt."""
     turn_phi = np.array([[math.cos(phi), -math.sin(phi), 0], [math.sin(phi), math.cos(phi), 0], [0, 0, 1.0]])
     M = (turn_phi @ between_axes(0.0, alpha, beta)[:3, :3]).T @ A[:3, :3]
@@ -222,10 +222,10 @@ class PairLike:
     @property
     def passes_on(self) -> bool:
         """Whether the row has no foot of its own, so that the rest of its offset goes to the next row."""
-        return tilt_of(self.A) <= self.noise.radians or self._is_cut
+        return tilt_of(self.A) <= self.noise.radians or self._gets_hayati_row
 
     @property
-    def _is_cut(self) -> bool:
+    def _gets_hayati_row(self) -> bool:
         """Whether the pair gets a Hayati row; where both forms are possible, the other table decides."""
         sine = tilt_of(self.A)
         leans_there = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
@@ -291,23 +291,23 @@ def steps_like(
     Returns:
         The steps, and theta of each row.
     """
-    steps, taken = list[Step](), list[tuple[float, float]]()
+    steps, inputs = list[Step](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
-        taken.append((carry, _height(pairs, i, carry, tip)))
-        steps.append(pair.step(*taken[-1]))
+        inputs.append((carry, _offset_without_foot(pairs, i, carry, tip)))
+        steps.append(pair.step(*inputs[-1]))
         carry = steps[-1].delta_next
     thetas = []
     for i, pair in enumerate(pairs):
         if steps[i].free:
-            steps[i] = pair.step(*taken[i], _turn(pairs, steps, i, phi_in))
+            steps[i] = pair.step(*inputs[i], _phi_of_coinciding(pairs, steps, i, phi_in))
         else:
-            steps[i] = _facing(steps[i], pair, phi_in)
+            steps[i] = _closer_direction(steps[i], pair, phi_in)
         thetas.append(near(phi_in + steps[i].phi, pair.row.theta))
         phi_in = steps[i].phi_next
     return steps, thetas
 
 
-def _height(pairs: Sequence[PairLike], i: int, carry: float, tip: float | None) -> float:
+def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: float | None) -> float:
     """Return d of a row without a foot: the other table's d, or the d that gives later rows theirs."""
     pair = pairs[i]
     if not pair.passes_on or not (pair.slides or (i == 0 and pair.row.d)):
@@ -315,23 +315,23 @@ def _height(pairs: Sequence[PairLike], i: int, carry: float, tip: float | None) 
     end = i + 1
     while end < len(pairs) and pairs[end].passes_on and not pairs[end].slides:
         end += 1
-    wanted = tip
+    target = tip
     if end < len(pairs):
-        wanted = None if pairs[end].slides else pairs[end].row.d - pairs[end].foot
-    if wanted is None:  # a later prismatic joint or the tool takes the rest; a plane in between may define d
+        target = None if pairs[end].slides else pairs[end].row.d - pairs[end].foot
+    if target is None:  # a later prismatic joint or the tool takes the rest; a plane in between may define d
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         cut = pairs[end].cut
         if cut is None:
             return pair.row.d
         if end == i:
             return cleaned_length(carry + cut, pair.reach, pair.noise.metres)
-        wanted = pairs[end].row.d - cut
+        target = pairs[end].row.d - cut
     for one in reversed(pairs[i + 1 : end]):
-        wanted = one.row.d + one.passed_back(wanted)
-    return cleaned_length(carry - pair.passed_back(wanted), pair.reach, pair.noise.metres)
+        target = one.row.d + one.passed_back(target)
+    return cleaned_length(carry - pair.passed_back(target), pair.reach, pair.noise.metres)
 
 
-def _turn(pairs: Sequence[PairLike], steps: Sequence[Step], i: int, phi_in: float) -> float:
+def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int, phi_in: float) -> float:
     """Return phi of coinciding axes: it gives this row, or the prismatic rows after it, the other's theta."""
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].slides:
@@ -341,14 +341,14 @@ def _turn(pairs: Sequence[PairLike], steps: Sequence[Step], i: int, phi_in: floa
         end += 1
     if end == len(pairs) or not pairs[end].slides:
         return own
-    phi = _facing(steps[end], pairs[end]).phi
+    phi = _closer_direction(steps[end], pairs[end]).phi
     for k in range(end - 1, i - 1, -1):
         into = pairs[k + 1].row.theta - phi
         phi = math.copysign(1.0, math.cos(steps[k].alpha)) * (steps[k].phi_next - into)
     return phi
 
 
-def _facing(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
+def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
     """Return the step or its reverse: the one closer to the other table's cells, then to its theta."""
     row = pair.row
 

@@ -44,14 +44,14 @@ RIGHT_ANGLE_SLACK = 1e-3
 
 
 class Last(StrEnum):
-    """What reaches the tip: the last row where that is exact, or the tool."""
+    """Part of the table that reaches the tip: the last row where that is exact, or the tool."""
 
     TIP = "tip"
     FLANGE = "flange"
 
 
 class First(StrEnum):
-    """What contains the transform from the base to the first joint: d_1 and theta_1, or the base."""
+    """Part of the table with the transform from base to first joint: d_1 and theta_1, or the base."""
 
     BASE = "base"
     JOINT = "joint"
@@ -157,7 +157,7 @@ def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> 
             PairLike(A, row, reach, noise, choices.near_parallel)
             for A, row, noise in zip(constants[1:-1], like.rows[:-1], between, strict=True)
         ]
-        tip = _passed_to_last(like, constants[-1], choices, end)
+        tip = _offset_for_last_row(like, constants[-1], choices, end)
         steps, thetas = steps_like(pairs, phi_in, carry, tip)
     if steps:
         phi_in, carry = steps[-1].phi_next, steps[-1].delta_next
@@ -336,7 +336,7 @@ def _steps(
     for A, rounding in zip(constants, noise, strict=True):
         step = step_between(lifted(A, carry), reach, choices.near_parallel, -phi_in, each, rounding)
         theta = cleaned_angle(phi_in + step.phi)
-        if _points_back(step, theta, choices.sign):
+        if _needs_reversal(step, theta, choices.sign):
             step = step.turned()
             theta = cleaned_angle(phi_in + step.phi)
         steps.append(step)
@@ -345,7 +345,7 @@ def _steps(
     return steps, thetas
 
 
-def _passed_to_last(like: DHTable, A: FloatArray, choices: Choices, noise: Noise) -> float | None:
+def _offset_for_last_row(like: DHTable, A: FloatArray, choices: Choices, noise: Noise) -> float | None:
     """Return the offset that gives the last row the other table's d; None if d is free or there is a tool."""
     row = like.rows[-1]
     if not row.kind.turns or not _has_no_tool(like) or not _representable(A, choices, noise):
@@ -387,7 +387,7 @@ def _last_like(
     return row.theta, height, Step(0.0, 0.0, row.a, row.alpha, 0.0, 0.0, 0.0), tool
 
 
-def _points_back(step: Step, theta: float, sign: Sign) -> bool:
+def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
     """Whether x must be reversed. Where a = 0, alpha decides; where alpha is 0 or pi, a decides."""
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
     if sign is Sign.THETA or (not step.a and not by_alpha):

@@ -57,8 +57,8 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
     for senses in dict.fromkeys(patterns):
         reversed_ = tuple(name for name, sense in zip(names, senses, strict=True) if sense < 0)
         found = derive(chain, replace(choices, convention=Convention.STANDARD, flip=reversed_), there)
-        if (unlike := _unlike(found, there, chain.reach or 1.0)) < best:
-            best, flip = unlike, reversed_
+        if (key := _difference_key(found, there, chain.reach or 1.0)) < best:
+            best, flip = key, reversed_
     if best[0] > _ANOTHER:
         raise InputError(
             "the table for `like` describes another robot",
@@ -70,7 +70,7 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
     return flip
 
 
-def _unlike(found: DHTable, there: DHTable, reach: float) -> tuple[float, int, int, float, int]:
+def _difference_key(found: DHTable, there: DHTable, reach: float) -> tuple[float, int, int, float, int]:
     """Return a key that ranks tables by their difference; the smallest is the best.
 
     The key compares, in this order: the cells, their power of ten, zeros and signs of d, base and tool,

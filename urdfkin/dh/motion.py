@@ -63,7 +63,7 @@ def velocity(
     Raises:
         InputError: an array has the wrong length.
     """
-    shape, (values, rates) = _flat(table, table.coupling.values(q), _rates(table, v, "v"))
+    shape, (values, rates) = _flat(table, table.coupling.values(q), _joint_derivatives(table, v, "v"))
     return velocities(plan_of(table), values, rates, Reference.of(reference)).reshape(*shape, 6)
 
 
@@ -82,13 +82,13 @@ def acceleration(
     Raises:
         InputError: an array has the wrong length.
     """
-    arrays = (table.coupling.values(q), _rates(table, v, "v"), _rates(table, a, "a"))
+    arrays = (table.coupling.values(q), _joint_derivatives(table, v, "v"), _joint_derivatives(table, a, "a"))
     shape, (values, velocities_, accelerations_) = _flat(table, *arrays)
     found = accelerations(plan_of(table), values, velocities_, accelerations_, Reference.of(reference))
     return found.reshape(*shape, 6)
 
 
-def _rates(table: DHTable, rates: Given, what: str) -> FloatArray:
+def _joint_derivatives(table: DHTable, rates: Given, what: str) -> FloatArray:
     """Return (..., rows) velocities or accelerations of all joints from those of the coordinates."""
     return table.coupling.checked(rates, what) @ table.coupling.matrix.T
 

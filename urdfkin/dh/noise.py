@@ -36,7 +36,7 @@ def demand_squares(joints: Iterable[Joint]) -> None:
         RangeError: an offset is longer than `LONGEST`.
     """
     for joint in joints:
-        _demand(f"joint {joint.name}", float(np.abs(joint.T_parent_joint[:3, 3]).max()))
+        _check_length(f"joint {joint.name}", float(np.abs(joint.T_parent_joint[:3, 3]).max()))
 
 
 def demand_squares_of(chain: FrameChain, table: DHTable) -> None:
@@ -47,14 +47,14 @@ def demand_squares_of(chain: FrameChain, table: DHTable) -> None:
     """
     for i, row in enumerate(table.rows):
         for name, length in (("a", row.a), ("d", row.d)):
-            _demand(f"the table, row {i + 1}, {name}", abs(length))
+            _check_length(f"the table, row {i + 1}, {name}", abs(length))
     for name, T in (("base", table.base), ("tool", table.tool)):
-        _demand(f"the table, {name}", float(np.abs(T[:3, 3]).max()))
+        _check_length(f"the table, {name}", float(np.abs(T[:3, 3]).max()))
     for A in chain.constants:
-        _demand(f"{chain.robot}, {chain.base} to {chain.tip}", float(np.abs(A[:3, 3]).max()))
+        _check_length(f"{chain.robot}, {chain.base} to {chain.tip}", float(np.abs(A[:3, 3]).max()))
 
 
-def _demand(where: str, length: float) -> None:
+def _check_length(where: str, length: float) -> None:
     if length > LONGEST:
         raise RangeError(
             "the square of this length is outside the range of double precision",

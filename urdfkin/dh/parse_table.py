@@ -38,7 +38,7 @@ _PRINTED = 1e-5
 #: Number of lines after its heading that contain the three rows of a pose, with fences and blank lines.
 _POSE_LINES = 6
 #: A setting in a line of its own, such as `convention: modified`, with or without a comment mark.
-_SAID = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
+_SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
 #: In a CSV file each `# key: value` is a setting; `table_from_mapping` rejects an unknown key.
 _KEY = re.compile(r"^#?\s*(\w+)\s*:\s*([^,;\t].*)$")
 #: Names of columns that urdfkin writes; they have no synonyms.
@@ -81,7 +81,7 @@ def from_sheet(text: str) -> dict[str, Any]:
     around = [spelled(line) for line in grid.around]
     # A title begins with the robot's name. This name may be "robot", which looks like a setting.
     plain = [line for line in grid.around if not _TITLE.search(line)]
-    data = _said(plain, _KEY if form is _separated else _SAID)
+    data = _settings(plain, _KEY if form is _separated else _SETTING)
     if "convention" not in data and (convention := _convention(around, grid.columns)):
         data["convention"] = convention
     for line in grid.around:
@@ -94,7 +94,7 @@ def from_sheet(text: str) -> dict[str, Any]:
     # Each cell carries the unit of its column's heading, so the rows need no common unit.
     named = _named_coordinates(grid.around)
     data["rows"] = [_row(grid, cells, i) for i, cells in enumerate(grid.rows)]
-    _follow(data, named)
+    _interpret_variables(data, named)
     return data
 
 
@@ -269,7 +269,7 @@ def _column(heading: str) -> _Column:
 # -- the lines around the table-------------------------------------------------------------------------
 
 
-def _said(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
+def _settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
     data: dict[str, Any] = {}
     for line in lines:
         if found := pattern.match(line.strip()):
@@ -376,7 +376,7 @@ def _nested(row: dict[str, Any]) -> dict[str, Any]:
     return {**row, **({"mimic": leads} if leads else {}), **({"limit": limit} if limit else {})}
 
 
-def _follow(data: dict[str, Any], named: list[str]) -> None:
+def _interpret_variables(data: dict[str, Any], named: list[str]) -> None:
     """Interpret the variables q1, q2, ...: a row with another row's variable is a mimic joint."""
     rows = data["rows"]
     names = named or [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
@@ -436,7 +436,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
     """Read a table, or screws if the file has an M; errors as for `read_table`."""
     data = read_mapping(path)
-    return _placed(screws_of_mapping, data, str(path)) if "M" in data else table_of(data, str(path))
+    return _with_place(screws_of_mapping, data, str(path)) if "M" in data else table_of(data, str(path))
 
 
 def read_mapping(path: str | os.PathLike[str]) -> Mapping[str, Any]:
@@ -451,10 +451,10 @@ def table_from_text(text: str, suffix: str, where: str = "table") -> DHTable:
 
 def table_of(data: Mapping[str, Any], where: str) -> DHTable:
     """Make a table from a file's plain data; errors as for `read_table`."""
-    return _placed(table_from_mapping, data, where)
+    return _with_place(table_from_mapping, data, where)
 
 
-def _placed(make: Callable[[Mapping[str, Any]], _T], data: Mapping[str, Any], where: str) -> _T:
+def _with_place(make: Callable[[Mapping[str, Any]], _T], data: Mapping[str, Any], where: str) -> _T:
     try:
         return make(data)
     except UrdfkinError as error:

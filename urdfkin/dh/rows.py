@@ -121,8 +121,8 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
     row = row.tolist() if isinstance(row, np.ndarray) else row
     where = f"row {index + 1}"
     fields = row if isinstance(row, Mapping) else _of_list(row, where)
-    _known(fields, _KEYS, "a row", where)
-    fields = _without_variable(fields, index, where)
+    _check_keys(fields, _KEYS, "a row", where)
+    fields = _split_variable(fields, index, where)
     cells = {name: _cell(name, fields.get(name, 0.0), units, where) for name in (*ORDER, "beta")}
     return DHRow(
         **cells,
@@ -135,7 +135,7 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
 
 
 def refuse_other_order(rows: Sequence[Any]) -> None:
-    """Reject lists whose columns look like the Robotics Toolbox's order theta, d, a, alpha.
+    """Reject lists with columns that look like the Robotics Toolbox's order theta, d, a, alpha.
 
     Angles of a table are nearly always multiples of 15 degrees; lengths are hardly ever. Lists are rejected
     if all numbers in the first and fourth columns are such multiples and none in the second column is.
@@ -147,7 +147,7 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):
         return
     first, second, _, fourth = ([row[k] for row in lists if not _is_zero(row[k])] for k in range(4))
-    if second and fourth and not any(map(_is_round, second)) and all(map(_is_round, [*first, *fourth])):
+    if second and fourth and not any(map(_looks_round, second)) and all(map(_looks_round, [*first, *fourth])):
         raise InputError(
             "the columns look like theta, d, a, alpha, the Robotics Toolbox's order; a row that is a list has"
             f" {', '.join(ORDER)}",
@@ -172,7 +172,7 @@ def _is_zero(value: Any) -> bool:
     return not isinstance(value, str) and value == 0
 
 
-def _is_round(value: Any) -> bool:
+def _looks_round(value: Any) -> bool:
     """Whether a cell looks like a multiple of 15 degrees, written in radians or in degrees."""
     if isinstance(value, str):
         return "pi" in value
@@ -202,7 +202,7 @@ def _of_list(row: Any, where: str) -> dict[str, Any]:
     return dict(zip((*ORDER, "kind"), row, strict=False))
 
 
-def _known(given: Mapping[str, Any], keys: Sequence[str], what: str, where: str) -> None:
+def _check_keys(given: Mapping[str, Any], keys: Sequence[str], what: str, where: str) -> None:
     for key in given:
         if key not in keys:
             raise InputError(
@@ -210,7 +210,7 @@ def _known(given: Mapping[str, Any], keys: Sequence[str], what: str, where: str)
             )
 
 
-def _without_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
+def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
     """Replace a cell such as "q3 + pi" with its constant, a kind and a sense."""
     written = {name: fields[name] for name in ORDER if isinstance(fields.get(name), str)}
     cells = {name: _read(value, f"{where}, {name}") for name, value in written.items()}
@@ -317,7 +317,7 @@ def _mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> M
         return None
     if not isinstance(value, Mapping) or "leader" not in value:
         raise InputError("mimic is {leader, multiplier, offset}", where=where, found=repr(value))
-    _known(value, ("leader", "multiplier", "offset"), "mimic", where)
+    _check_keys(value, ("leader", "multiplier", "offset"), "mimic", where)
     return Mimic(
         name_of(value["leader"], f"{where}, leader"),
         read_number(value.get("multiplier", 1.0), f"{where}, multiplier"),
@@ -330,7 +330,7 @@ def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> L
         return None
     if not isinstance(value, Mapping):
         raise InputError("limit is {lower, upper, velocity, effort}", where=where, found=repr(value))
-    _known(value, ("lower", "upper", "velocity", "effort"), "limit", where)
+    _check_keys(value, ("lower", "upper", "velocity", "effort"), "limit", where)
     lower, upper, velocity = (
         _own(name, value[name], fields, units, where) if name in value else default
         for name, default in (("lower", -math.inf), ("upper", math.inf), ("velocity", math.inf))

@@ -83,7 +83,7 @@ class ProductOfExponentials:
 
     @property
     def points(self) -> FloatArray:
-        """(n, 3) point of each revolute axis nearest to the base; a prismatic joint repeats the last point."""
+        """(n, 3) point of each revolute axis nearest to the base; a prismatic joint: the previous point."""
         here, found = np.zeros(3), []
         for joint, screw in zip(self.joints, self.space, strict=True):
             here = np.cross(screw[:3], screw[3:]) if joint.kind.turns else here

@@ -74,7 +74,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
         angle = abs(math.remainder(row.theta - theta, 2.0 * math.pi))
         if 0.0 < angle <= tolerance:
             rows[i] = replace(row, theta=theta)
-            # A sliding axis may have been moved up to the joint before it.
+            # The line of a prismatic axis may have been moved to the joint before it.
             pivot = i + 1 if row.kind.turns else i
             what = f"theta of {row.joint}: {row.theta:.9g} to {theta:.9g}"
             changes.append(replace(_change(exact, pivot, what, angle), row=i))
@@ -278,5 +278,5 @@ def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None
     many = f"{len(noisy)} cells look" if len(noisy) > 1 else "a cell looks"
     return (
         f"{many} like angles that the file rounded ({cell} of {joint}: {size:.2g} {unit}):"
-        f" --snap {best:.0e} leaves {left[best] or 'none'} and says what it moves"
+        f" --snap {best:.0e} leaves {left[best] or 'none'} and reports the effect"
     )

@@ -128,9 +128,9 @@ def structure(screws: ProductOfExponentials) -> Structure:
     """
     letters = "".join("R" if joint.kind.turns else "P" for joint in screws.joints)
     pairs = tuple(_pair(screws, i) for i in range(len(letters) - 1))
-    kinds = [*_triples(screws, letters, pairs), *_whole(screws, letters, pairs)]
+    kinds = [*_triples(screws, letters, pairs), *_arm_kinds(screws, letters, pairs)]
     kinds = sorted(kinds, key=lambda kind: (not kind.is_exact, kind.radians + kind.metres))
-    tips, jacobian = _sampled(screws)
+    tips, jacobian = _sample_tips(screws)
     origin = _origin(screws)
     return Structure(
         screws.robot,
@@ -140,7 +140,7 @@ def structure(screws: ProductOfExponentials) -> Structure:
         int(np.linalg.matrix_rank(jacobian, tol=_RANK)) if letters else 0,
         pairs,
         tuple(kinds),
-        _longest(screws, origin),
+        _reach_bound(screws, origin),
         float(np.linalg.norm(tips - origin, axis=-1).max()),
         tuple(_solvers(letters, kinds, pairs)),
     )
@@ -202,7 +202,7 @@ def _triples(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, ...
     return found
 
 
-def _whole(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, ...]) -> list[Kind]:
+def _arm_kinds(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, ...]) -> list[Kind]:
     names = tuple(joint.name for joint in screws.joints)
     tilt = max((pair.angle for pair in pairs), default=0.0)
     if sorted(letters) == ["P", "R", "R", "R"] and tilt <= NEAR_ANGLE:
@@ -265,7 +265,7 @@ def _origin(screws: ProductOfExponentials) -> FloatArray:
     return np.asarray(screws.points[0])
 
 
-def _longest(screws: ProductOfExponentials, origin: FloatArray) -> float:
+def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
     """Return an upper bound of the tip's distance: the path length over the feet of perpendiculars."""
     here, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
@@ -280,7 +280,7 @@ def _longest(screws: ProductOfExponentials, origin: FloatArray) -> float:
     return total + float(np.linalg.norm(screws.M[:3, 3] - here))
 
 
-def _sampled(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
+def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the tip's positions at samples within the limits, and the Jacobian at the first sample."""
     rng, bounds = np.random.default_rng(0), []
     for joint in screws.joints:
@@ -327,7 +327,13 @@ class Opw:
         a1, a2, b, c1, c2, c3, c4 = self.lengths.values()
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1
         z = c2 * np.cos(t[1]) - a2 * np.sin(t[1] + t[2]) + c3 * np.cos(t[1] + t[2]) + c1
-        T = _turn(t[0], 2) @ _turn(t[1] + t[2], 1) @ _turn(t[3], 2) @ _turn(t[4], 1) @ _turn(t[5], 2)
+        T = (
+            _rotation(t[0], 2)
+            @ _rotation(t[1] + t[2], 1)
+            @ _rotation(t[3], 2)
+            @ _rotation(t[4], 1)
+            @ _rotation(t[5], 2)
+        )
         T[..., :3, 3] = np.stack(
             [x * np.cos(t[0]) - b * np.sin(t[0]), x * np.sin(t[0]) + b * np.cos(t[0]), z], -1
         )
@@ -361,12 +367,12 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
         raise InputError("an OPW arm has six revolute joints", where=where, found=str(len(path.joints)))
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (SAMPLES, len(path.joints)))
-    wanted, best, refused = free.placement(q), None, ""
-    for guide in _guides(path):
+    wanted, best, reason = free.placement(q), None, ""
+    for guide in _candidate_tables(path):
         try:
             choices = Choices(flip=reversed_like(path, Choices(), guide))
         except InputError as error:
-            refused = refused or error.found or ""
+            reason = reason or error.found or ""
             continue
         found = _read(derive_like(path, choices, guide))
         off = np.abs(found.placement(q) - wanted)
@@ -377,17 +383,17 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
             best = rank, size, found
     if best is None or best[0][0]:
         if best is not None:
-            refused = f"an error of {best[1][0] * 1e3:.3g} mm and {best[1][1]:.3g} rad at the tip"
+            reason = f"an error of {best[1][0] * 1e3:.3g} mm and {best[1][1]:.3g} rad at the tip"
         raise InputError(
             "the arm is not ortho-parallel with a spherical wrist (OPW)",
             where=where,
-            found=refused,
+            found=reason,
             remedy="run `urdfkin structure` to see its properties, or allow a larger tolerance",
         )
     return best[2]
 
 
-def _guides(path: FrameChain) -> Iterator[DHTable]:
+def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
     """Yield OPW tables of approximately the arm's lengths, for each combination of signs of a1, a2 and b."""
     rows = derive(path, Choices(last=Last.FLANGE)).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
@@ -415,7 +421,7 @@ def _read(table: DHTable) -> Opw:
     return Opw(names, lengths, tuple(offsets), signs, table.base, table.tool)
 
 
-def _turn(angle: FloatArray, axis: int) -> FloatArray:
+def _rotation(angle: FloatArray, axis: int) -> FloatArray:
     """Return the (..., 4, 4) rotation about y (1) or z (2)."""
     T = motion_about_z(np.asarray(angle), turns=True)
     order = [1, 2, 0, 3] if axis == 1 else [0, 1, 2, 3]  # permutation of the axes of a rotation about z

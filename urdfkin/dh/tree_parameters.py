@@ -193,7 +193,7 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
             )
     links = _links(tree)
     steps, own = _steps(tree, links)
-    ways = _ways(tree)
+    ways = _path_lengths(tree)
     rows = tuple(
         _row(tree, j, links[j].antecedent, steps[j], own, way=ways[j]) for j in range(len(tree.joints))
     )
@@ -229,16 +229,16 @@ def _links(tree: KinematicTree) -> list[_Link]:
     links = list[_Link]()
     # For each link: its nearest moving link, its frame in that link's axis frame, and the number of joints
     # between the two links.
-    carried = [(-1, np.eye(4), 0)]
-    for j, (joint, way) in enumerate(zip(tree.joints, _ways(tree), strict=True)):
-        antecedent, T, folded = carried[joint.parent]
+    carriers = [(-1, np.eye(4), 0)]
+    for j, (joint, way) in enumerate(zip(tree.joints, _path_lengths(tree), strict=True)):
+        antecedent, T, folded = carriers[joint.parent]
         align = turned(joint)
         here = T @ joint.T_parent_joint @ align
         noise, tilt = noise_of(folded + 1, 0.0, way), tilt_of(here)
         left_out = links[antecedent].left_out if antecedent >= 0 else 0.0
         left_out += tilt if tilt <= noise.radians else 0.0
         links.append(_Link(antecedent, here, align, noise, left_out))
-        carried.append((j, align.T, 0) if joint.kind.has_axis else (antecedent, here, folded + 1))
+        carriers.append((j, align.T, 0) if joint.kind.has_axis else (antecedent, here, folded + 1))
     return links
 
 
@@ -247,7 +247,7 @@ def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[in
 
     The first moving child of a link defines its x. A link without a moving child has the x with theta = 0.
     """
-    ways = _ways(tree)
+    ways = _path_lengths(tree)
     steps, own = list[Step](), {-1: (0.0, 0.0)}
     for link, joint, way in zip(links, tree.joints, ways, strict=True):
         i = link.antecedent
@@ -294,7 +294,7 @@ def _row(
     )
 
 
-def _ways(tree: KinematicTree) -> list[float]:
+def _path_lengths(tree: KinematicTree) -> list[float]:
     """Return the path length from the root to each joint's origin: the sum of all offsets (metres)."""
     ways = [0.0]
     for joint in tree.joints:
@@ -322,7 +322,7 @@ def write_tree(table: TreeParameters, form: str, units: Units) -> str:
         return _csv(table)
     shown = markdown_code if form == "markdown" else str
     title = f"{shown(table.robot)}: Khalil-Kleinfinger parameters, {shown(table.root)} is frame 0"
-    body = [_heads(table, units), *(_cells(table, j, units, shown) for j in range(len(table.rows)))]
+    body = [_headings(table, units), *(_cells(table, j, units, shown) for j in range(len(table.rows)))]
     if form == "markdown":
         lines = ["| " + " | ".join(row) + " |" for row in body]
         rule = "| " + " | ".join(["---:"] * len(body[0])) + " |"
@@ -340,11 +340,11 @@ def _csv(table: TreeParameters) -> str:
     return csv_text(lines)
 
 
-def _heads(table: TreeParameters, units: Units) -> list[str]:
+def _headings(table: TreeParameters, units: Units) -> list[str]:
     angle, length = units.angle_name, units.length_name
     heads = ["j", "joint", "a(j)", "sigma", f"gamma [{angle}]", f"b [{length}]", f"alpha [{angle}]"]
     heads += [f"d [{length}]", f"theta [{angle}]", f"r [{length}]"]
-    return [*heads, f"beta [{angle}]"] if _bent(table) else heads
+    return [*heads, f"beta [{angle}]"] if _has_beta(table) else heads
 
 
 def _cells(table: TreeParameters, j: int, units: Units, shown: Callable[[str], str]) -> list[str]:
@@ -359,8 +359,8 @@ def _cells(table: TreeParameters, j: int, units: Units, shown: Callable[[str], s
         r = added(own, units.length(row.r + row.offset))
     cells = [str(j + 1), shown(row.joint), str(row.antecedent + 1), str(row.sigma), units.angle(row.gamma)]
     cells += [units.length(row.b), units.angle(row.alpha), units.length(row.d), theta, r]
-    return [*cells, units.angle(row.beta)] if _bent(table) else cells
+    return [*cells, units.angle(row.beta)] if _has_beta(table) else cells
 
 
-def _bent(table: TreeParameters) -> bool:
+def _has_beta(table: TreeParameters) -> bool:
     return any(row.beta for row in table.rows)

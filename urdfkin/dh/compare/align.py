@@ -39,7 +39,7 @@ class Alignment:
 
     Attributes:
         senses: +1 or -1 for each joint: the reference's variable relative to the URDF's coordinate.
-        offsets: Offset of each joint: what q = 0 adds to the reference's theta (d of a prismatic joint).
+        offsets: Offset of each joint at q = 0, to add to the reference's theta (d of a prismatic joint).
         base: (4, 4) pose of the reference's frame 0 in the URDF's base.
         tool: (4, 4) pose of the URDF's tip in the reference's last frame.
         cost: Sum of the cells' differences, with angles times the reach (metres).
@@ -92,20 +92,20 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
             for sense in (1, -1)
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
-        partials = _unlike_each_other(sorted(longer, key=lambda partial: partial.cost))[:beam]
+        partials = _without_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam]
     # If axes nearly coincide, many directions of x are nearly the same. The fit reaches one from another.
     by_senses: dict[tuple[int, ...], _Partial] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
     best = list(by_senses.values())[:count]
-    return [_closed(partial, chain, reference) for partial in best]
+    return [_close_chain(partial, chain, reference) for partial in best]
 
 
 def _first(sense: int) -> _Partial:
     return _Partial(REVERSAL * (sense < 0), (sense,), (), 0.0, 0.0, np.eye(4))
 
 
-def _unlike_each_other(partials: list[_Partial]) -> list[_Partial]:
+def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
     """Keep the first of several equivalent candidates; coinciding axes have many of them."""
     found: dict[tuple[object, ...], _Partial] = {}
     for one in partials:
@@ -132,7 +132,7 @@ def _extend(
     delta = row.d - partial.carry if turns[i] and i > 0 else 0.0
     found = []
     for step in _steps(A, row, delta, reach, row.theta - partial.phi_in, turns[i] and turns[i + 1]):
-        candidate = _absorbed(partial, step, row.theta) if i > 0 and not turns[i] else partial
+        candidate = _absorb(partial, step, row.theta) if i > 0 and not turns[i] else partial
         theta, d = candidate.phi_in + step.phi, candidate.carry + step.delta
         cost = candidate.cost + REVERSAL * (sense < 0)
         cost += reach * (_apart(step.alpha, row.alpha) + abs(step.beta - row.beta))
@@ -169,7 +169,7 @@ def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, 
     return None if partial.absorber is None else (partial.absorber[0], sign * partial.absorber[1])
 
 
-def _absorbed(partial: _Partial, step: Step, theta: float) -> _Partial:
+def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
     """Give a prismatic joint the table's theta, if a free offset before it can absorb the difference."""
     if partial.absorber is None:
         return partial
@@ -211,7 +211,7 @@ def _steps(
         yield replace(step.turned(), free=step.free)
 
 
-def _closed(best: _Partial, chain: FrameChain, reference: DHTable) -> Alignment:
+def _close_chain(best: _Partial, chain: FrameChain, reference: DHTable) -> Alignment:
     """Return the complete alignment, with the base and tool that close the chain."""
     n = len(reference.rows)
     last = reference.rows[-1]

@@ -250,11 +250,11 @@ def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | Non
         cells[i, k] += own * per_cell[k]
     # Base and tool move in the axes of the revolute joints next to them. A rotation that they share with
     # such a joint is then exact, not only to first order.
-    base = _pushed(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
-    tool = np.linalg.inv(model.last) @ _pushed(np.eye(4), free[6:12], scale) @ model.last
+    base = _apply_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
+    tool = np.linalg.inv(model.last) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
 
 
-def _pushed(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
+def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
     """Return T after a small translation and rotation in its own axes."""
     return T @ pose(exp_rotation(twist[3:] / scale), twist[:3])

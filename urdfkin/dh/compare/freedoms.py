@@ -133,7 +133,7 @@ def fit_freedoms(model: Model, wanted: TargetPoses, *, turns: bool, ends: bool =
         model, size = _descend(model, wanted, ends)
         if not turns or size <= _ROUNDING * wanted.scale * math.sqrt(6 * len(wanted.values)):
             break
-        turned = min(_turned(model), key=lambda one: _size(one, wanted), default=model)
+        turned = min(_opposite_rotations(model), key=lambda one: _size(one, wanted), default=model)
         if _size(turned, wanted) >= size:
             break
         model = turned
@@ -166,7 +166,7 @@ def _descend(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, floa
     return model, size
 
 
-def _turned(model: Model) -> list[Model]:
+def _opposite_rotations(model: Model) -> list[Model]:
     """Return models with opposite rotations of two consecutive offsets, for nearly coinciding axes."""
     found = []
     for i in range(len(model.cells) - 1):

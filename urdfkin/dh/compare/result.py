@@ -267,9 +267,9 @@ def _verdict(found: Comparison) -> list[str]:
         ]
     fine = resolution(found.metres / found.reach, found.radians)
     ends = [
-        f"{what} {taken.metres * 1e3:.3g} mm and {taken.radians:.3g} rad"
-        for what, taken in (("the base", found.base), ("the tool", found.tool))
-        if _is_moved(taken, found)
+        f"{what} by {change.metres * 1e3:.3g} mm and {change.radians:.3g} rad"
+        for what, change in (("the base", found.base), ("the tool", found.tool))
+        if _is_moved(change, found)
     ]
     zeros = sum(abs(offset) > fine for offset in found.offsets)
     if zeros:
@@ -277,18 +277,20 @@ def _verdict(found: Comparison) -> list[str]:
     reversed_ = sum(sense < 0 for sense in found.senses)
     if reversed_:
         ends.append(
-            f"the way {reversed_} joint{'s' if reversed_ > 1 else ''} count{'s' * (reversed_ == 1)} (below)"
+            f"the senses of {reversed_} joints (below)" if reversed_ > 1 else "the sense of 1 joint (below)"
         )
-    once = " once base, tool and joint offsets are fitted" if found.agrees and ends else ""
-    fitted = "" if found.agrees else "; base, tool and joint offsets fitted"
+    once = " after a fit of base, tool and joint offsets" if found.agrees and ends else ""
+    fitted = "" if found.agrees else "; after a fit of base, tool and joint offsets"
     lines = [f"The table {verdict}{once}: {path}: {off}", f"({proof}{fitted})."]
-    lines.append(f"As it is written {_off(found.written_metres, found.written_radians)}.")
+    lines.append(f"As it is written: {_off(found.written_metres, found.written_radians)}.")
     if ends:
-        lines.append(f"Fitting gave {', '.join(ends)}; --no-fit keeps to what is written.")
+        lines.append(
+            f"The fit changed {', '.join(ends)}. Use --no-fit to compare the table as it is written."
+        )
         moved = [max(end.metres / found.reach, end.radians) > fine for end in (found.base, found.tool)]
         if found.agrees and not found.mistakes and (all(moved) or zeros or reversed_):
             lines.append(
-                "A wrong sign can hide behind these. Write base, tool and zeros into the table to find it."
+                "These changes can hide a wrong sign. Write base, tool and zeros into the table to find it."
             )
     return lines
 
@@ -306,21 +308,21 @@ def _proven(found: Comparison) -> str:
     return f"{found.most_metres * 1e3:.3g} mm and {found.most_radians:.3g} rad"
 
 
-def _is_moved(taken: AbsorbedOffset, found: Comparison) -> bool:
-    return taken.metres > found.rounding * found.reach or taken.radians > found.rounding
+def _is_moved(change: AbsorbedOffset, found: Comparison) -> bool:
+    return change.metres > found.rounding * found.reach or change.radians > found.rounding
 
 
 def _mistakes(found: Comparison, units: Units) -> list[str]:
     """Return lines with the likely mistakes."""
     first = found.mistakes[0]
-    left = "as written" if not first.fitted.count else f"with these fitted alone: {first.fitted}"
+    left = "as written" if not first.fitted.count else f"after a fit of only {first.fitted}"
     count = "One change makes" if len(found.mistakes) == 1 else "Each of these changes makes"
     lines = ["", f"{count} the table right {left}:"]
     for one in found.mistakes:
         off = _off(one.metres, one.radians)
         lines.append(f"  {_change(one, found.reference, units)}; {off}")
     if found.agrees:
-        lines.append("Correct the table. If base, tool and zeros are meant, write them into it.")
+        lines.append("Correct the table. If its base, tool and zeros are intended, write them into it.")
     return lines
 
 
@@ -348,14 +350,14 @@ def _cells(found: Comparison, units: Units) -> list[str]:
         rounded = sum(one.is_rounding for one in found.differences)
         if rounded:
             all_ = "All" if rounded == len(found.differences) else f"{rounded} of {len(found.differences)}"
-            lines.append(f"{all_} within the last digit that the table gives (*).")
+            lines.append(f"{all_} within the last digit of the table (*).")
     elif found.as_written:
-        lines.append("Every cell is the URDF's.")
+        lines.append("Every cell agrees with the URDF.")
     elif found.exact:
-        lines.append("No cell differs that can be told from what was fitted.")
+        lines.append("No cell differs, except those that the fit can replace.")
     if found.hidden and not found.as_written:
         cells = ", ".join(f"{cell}{row + 1}" for row, cell in found.hidden)
-        lines.append(f"Base, tool and offsets stand in for {cells}: these were not compared.")
+        lines.append(f"Not compared, because base, tool and offsets can replace them: {cells}.")
     if {(one.row, one.cell) for one in found.instead} - {(one.row, one.cell) for one in found.differences}:
         lines += ["", f"Without fitting, these cells would have to change {unit}:"]
         lines += _table(found.instead, units)

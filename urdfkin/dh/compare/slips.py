@@ -122,13 +122,13 @@ def convention_that_fits(
         InputError: both conventions agree equally well, or neither does with any units.
     """
     found = list[tuple[Convention, Comparison]]()
-    refused = list[InputError]()
+    errors = list[InputError]()
     for convention in Convention:
         try:
             table = table_from_mapping({**data, "convention": convention})
             found.append((convention, compare(chain, table, tolerance)))
         except InputError as error:
-            refused.append(error)
+            errors.append(error)
     written = [one for one, how in found if how.agrees and how.written_metres <= tolerance]
     passing = [one for one, how in found if how.passes]
     agreeing = [one for one, how in found if how.agrees]
@@ -138,8 +138,8 @@ def convention_that_fits(
         return best[0]
     if not best and (slip := diagnose(chain, data, tolerance)) and slip.reading.convention:
         return slip.reading.convention
-    if refused and not found:
-        raise refused[0]
+    if errors and not found:
+        raise errors[0]
     raise InputError(
         f"the table does not name its convention, and {'both conventions fit' if best else 'neither fits'}",
         where=where,

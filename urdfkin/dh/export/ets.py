@@ -39,13 +39,17 @@ def joint(row: DHRow) -> list[str]:
 
 def _row(row: DHRow, convention: Convention) -> list[str]:
     moves = ", ".join(joint(row))
-    along = [*_some("Rz", row.theta), *([f"ET.Rz({moves})"] * row.kind.turns), *_some("tz", row.d)]
+    along = [
+        *_unless_zero("Rz", row.theta),
+        *([f"ET.Rz({moves})"] * row.kind.turns),
+        *_unless_zero("tz", row.d),
+    ]
     along += [f"ET.tz({moves})"] * (not row.kind.turns)
-    across = [*_some("tx", row.a), *_some("Rx", row.alpha), *_some("Ry", row.beta)]
+    across = [*_unless_zero("tx", row.a), *_unless_zero("Rx", row.alpha), *_unless_zero("Ry", row.beta)]
     return along + across if convention is Convention.STANDARD else across + along
 
 
-def _some(name: str, value: float) -> list[str]:
+def _unless_zero(name: str, value: float) -> list[str]:
     return [f"ET.{name}({value!r})"] if value else []
 
 
