@@ -55,10 +55,10 @@ def of_rows(rows: str, **keys: str) -> str:
             "[[0, 89.2, 0, 90], [0, 10.1, 0.4, 0]]", {"angles": '"degrees"', "lengths": '"millimetres"'},
             "the columns look like theta, d, a, alpha",
         ),
-        ("[[0, 0.089, 0, 1.5708, 0]]", {}, "row 1: .*entry is 'R' or 'P'.*found 0; .*theta, d, a, alpha"),
+        ("[[0, 0.089, 0, 1.5708, 0]]", {}, "row 1: .* must be 'R' or 'P'.*found 0; .*theta, d, a, alpha"),
         ("[[0, 0, 0.1, 0, 'R', 7]]", {}, r"row 1: .*found 6 entries, \[0, 0, 0.1, 0, 'R', 7\]"),
-        ("[{a = 1, sense = 1.9}]", {}, "row 1, sense: the sense is 1 or -1: found 1.9"),
-        ("[{a = 1, sense = '-1.5'}]", {}, "row 1, sense: the sense is 1 or -1: found '-1.5'"),
+        ("[{a = 1, sense = 1.9}]", {}, "row 1, sense: the sense must be 1 or -1: found 1.9"),
+        ("[{a = 1, sense = '-1.5'}]", {}, "row 1, sense: the sense must be 1 or -1: found '-1.5'"),
         (
             "[{joint = 'left', a = 1}, {joint = 'right', mimic = {leader = 'lefft'}}]", {},
             "row 2, leader: unknown joint 'lefft'; did you mean left.*coordinates",
@@ -73,7 +73,7 @@ def of_rows(rows: str, **keys: str) -> str:
         ("[{limit = {lower = 2, upper = 1}}]", {}, "row 1, limit: lower is above upper: found 2 and 1"),
         ("[{joint = 'a', limit = {lower = nan}}]", {}, "row 1, lower: not a finite number: found nan"),
         ("[]", {}, r"rows: a table needs a row, a base or a tool: found \[\]"),
-        ("[{joint = 5}]", {}, "row 1, joint: a name is text: found 5"),
+        ("[{joint = 5}]", {}, "row 1, joint: a name must be text: found 5"),
         ("[{a = true}]", {}, "row 1, a: not a number: found True"),
         ("[{a = '1_0'}]", {}, "row 1, a: not a number: found '1_0'"),
         ("[{a = '١'}]", {}, "row 1, a: not a number"),
@@ -81,15 +81,15 @@ def of_rows(rows: str, **keys: str) -> str:
         ("[{a = 'pi/0'}]", {}, "row 1, a: not a number: found 'pi/0'"),
         (f"[{{a = 1{'0' * 400}}}]", {}, "row 1, a: not a number"),
         ("[{a = 1979-05-27}]", {}, "row 1, a: not a number"),
-        ("[{a = 1}]", {"robot": "1979-05-27"}, "robot: a name is text"),
+        ("[{a = 1}]", {"robot": "1979-05-27"}, "robot: a name must be text"),
         ("[{a = 1}]", {"angles": "1979-05-27"}, "angles or lengths: unknown unit"),
-        ("[{kind = 3}]", {}, "row 1, kind: a row is revolute, continuous or prismatic: found 3"),
-        ("[{a = 1}]", {"robot": "7"}, "robot: a name is text: found 7"),
-        ("[{a = 1}]", {"base_frame": "''"}, "base_frame: a name is text: found ''"),
+        ("[{kind = 3}]", {}, "row 1, kind: the kind of a row must be revolute, .*: found 3"),
+        ("[{a = 1}]", {"robot": "7"}, "robot: a name must be text: found 7"),
+        ("[{a = 1}]", {"base_frame": "''"}, "base_frame: a name must be text: found ''"),
         ("[{a = 1}]", {"base": "[[1,0,0,'0'], [0,1,0,'x'], [0,0,1,0]]"}, "base, row 2, column 4: not a"),
-        ("[{a = 1}]", {"tool": "[1, 2, 3]"}, "tool: the tool is a matrix of numbers, 4 x 4 or 3 x 4"),
+        ("[{a = 1}]", {"tool": "[1, 2, 3]"}, "tool: the tool must be a matrix of numbers, 4 x 4 or 3 x 4"),
         ("[{a = 1}]", {"angles": "['deg']"}, "unknown unit"),
-        ("[{a = 1}]", {"coordinates": "'q'"}, "coordinates: coordinates are a list of names"),
+        ("[{a = 1}]", {"coordinates": "'q'"}, "coordinates: coordinates must be a list of names"),
         ("'none'", {}, "rows: a table needs a list of rows: found 'none'"),
     ],
 )  # fmt: skip
@@ -101,7 +101,7 @@ def test_a_wrong_table_says_where_and_what(
 
 def test_a_robot_that_is_null_is_an_error(tmp_path: Path) -> None:
     text = json.dumps({"convention": "standard", "robot": None, "rows": [[0.1, 0, 0, 0]]})
-    assert "robot: a name is text: found None" in refused(tmp_path, text, ".json")
+    assert "robot: a name must be text: found None" in refused(tmp_path, text, ".json")
 
 
 @pytest.mark.parametrize(

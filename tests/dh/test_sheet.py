@@ -146,7 +146,7 @@ def test_the_printed_form_of_any_robot_is_read(tree: KinematicTree, convention: 
         ("a;alpha;d;theta\n0;q1;0;0\n", "joint variable belongs in theta of a revolute joint, or in d"),
         ("a;alpha;d;theta\n0;0;0;q7\n", "row 1, theta: no row has the variable of this row"),
         ("a;alpha;d;theta\n0;0;0;90 deg rad\n", "deg and rad in one cell"),
-        ("a;alpha;d;theta\n90 deg;0;0;0\n", "row 1, a: a is a length"),
+        ("a;alpha;d;theta\n90 deg;0;0;0\n", "row 1, a: a must be a length"),
     ],
 )
 def test_what_is_no_table_says_where(text: str, message: str) -> None:
@@ -218,5 +218,5 @@ def test_a_base_with_an_infinite_number_is_refused(number: str) -> None:
     """LAPACK's singular values of such a matrix never returned."""
     rows = f" 1 0 0 0\n {number} 1 0 0\n 0 0 1 0\n"
     sheet = f"standard\na  alpha  d  theta\n0  pi/2  0.3  q1\n\nbase (metres):\n{rows}"
-    with pytest.raises(InputError, match="the base is a matrix of finite numbers"):
+    with pytest.raises(InputError, match="the base must be a matrix of finite numbers"):
         table_from_text(sheet, ".txt")

@@ -98,7 +98,7 @@ def run(work: Work) -> int:
         name for name, on in (("--all", work.all_), ("--tree", work.tree), ("--compare", work.compare)) if on
     ]
     if len(chosen) > 1:
-        raise InputError(f"{' and '.join(chosen)} do not go together", remedy="use one of them at a time")
+        raise InputError(f"{' and '.join(chosen)} cannot be used together", remedy="use one at a time")
     if work.compare is not None:
         return _compare(work, work.compare)
     if work.tree:

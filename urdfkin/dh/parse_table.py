@@ -308,7 +308,7 @@ def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
     """Return a printed pose with the nearest rotation; raise InputError for infinite numbers."""
     pose = np.array(rows)
     if not np.isfinite(pose).all():  # LAPACK may not return for an infinite matrix
-        raise InputError(f"the {end} is a matrix of finite numbers", where=end, found=safe_repr(rows))
+        raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
     off = polar_factor(pose[:3, :3]) - pose[:3, :3]
     if ROUNDED < np.abs(off).max() < _PRINTED:
         pose[:3, :3] += off
@@ -466,7 +466,7 @@ def mapping_from_text(text: str, suffix: str, where: str) -> Mapping[str, Any]:
     """Parse the text of a table file into plain data; errors as for `read_table`."""
     if suffix not in _PARSERS:
         raise InputError(
-            f"a table file has the suffix {', '.join(_PARSERS)}",
+            f"a table file must have the suffix {', '.join(_PARSERS)}",
             where=where,
             found=repr(suffix),
             remedy="rename the file",
@@ -480,7 +480,7 @@ def mapping_from_text(text: str, suffix: str, where: str) -> Mapping[str, Any]:
         raise InputError(f"not valid {suffix[1:].upper()}", where=where, found=str(error)[:200]) from None
     if not isinstance(data, Mapping):
         raise InputError(
-            "a table is a mapping with convention and rows", where=where, found=type(data).__name__
+            "a table must be a mapping with convention and rows", where=where, found=type(data).__name__
         )
     return data
 

@@ -149,7 +149,7 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
     first, second, _, fourth = ([row[k] for row in lists if not _is_zero(row[k])] for k in range(4))
     if second and fourth and not any(map(_looks_round, second)) and all(map(_looks_round, [*first, *fourth])):
         raise InputError(
-            "the columns look like theta, d, a, alpha, the Robotics Toolbox's order; a row that is a list has"
+            "the columns look like theta, d, a, alpha, the Robotics Toolbox's order; a list must have"
             f" {', '.join(ORDER)}",
             where=f"rows 1 to {len(rows)}",
             found=f"second column {second[0]!r}, fourth column {fourth[0]!r}",
@@ -160,7 +160,7 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
 def name_of(value: Any, where: str) -> str:
     """Return a name; raise InputError unless it is a text that is not empty."""
     if not isinstance(value, str) or not value.strip():
-        raise InputError("a name is text", where=where, found=repr(value), remedy="write it in quotes")
+        raise InputError("a name must be text", where=where, found=repr(value), remedy="write it in quotes")
     return value
 
 
@@ -184,17 +184,17 @@ def _looks_round(value: Any) -> bool:
 def _of_list(row: Any, where: str) -> dict[str, Any]:
     wanted = f"[{', '.join(ORDER)}, 'R' or 'P']"
     if not isinstance(row, Sequence) or isinstance(row, (str, bytes)):
-        raise InputError(f"a row is a mapping or {wanted}", where=where, found=repr(row))
+        raise InputError(f"a row must be a mapping or {wanted}", where=where, found=repr(row))
     if not len(ORDER) <= len(row) <= len(ORDER) + 1:
         raise InputError(
-            f"a row is a mapping or {wanted}",
+            f"a row must be a mapping or {wanted}",
             where=where,
             found=f"{len(row)} entries, {list(row)!r}",
             remedy=_BY_NAME,
         )
     if len(row) > len(ORDER) and not isinstance(row[-1], str):
         raise InputError(
-            f"a row's fifth entry is 'R' or 'P': {wanted}",
+            f"a row's fifth entry must be 'R' or 'P': {wanted}",
             where=where,
             found=repr(row[-1]),
             remedy=f"the Robotics Toolbox's order is theta, d, a, alpha, sigma: {_BY_NAME}",
@@ -229,7 +229,7 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
         )
     if cell.times not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
         raise InputError(
-            f"the variable of row {index + 1} is q{index + 1} or -q{index + 1}",
+            f"the variable of row {index + 1} must be q{index + 1} or -q{index + 1}",
             where=at,
             found=repr(written[name]),
             remedy="write mimic = {leader, multiplier, offset} for a mimic joint",
@@ -266,7 +266,7 @@ def _cell(name: str, value: Any, units: Units, where: str) -> float:
         if cell.unit is not None:
             if (cell.unit in ("m", "mm")) != (name in ("a", "d")):
                 kind = "a length" if name in ("a", "d") else "an angle"
-                raise InputError(f"{name} is {kind}", where=f"{where}, {name}", found=repr(value))
+                raise InputError(f"{name} must be {kind}", where=f"{where}, {name}", found=repr(value))
             units = units_in(cell, units)
     else:
         number = read_number(value, f"{where}, {name}")
@@ -286,7 +286,7 @@ def _kind(value: Any, where: str) -> JointKind:
     kind = _KINDS.get(value.strip().lower()) if isinstance(value, str) else None
     if kind is None:
         raise InputError(
-            "a row is revolute, continuous or prismatic",
+            "the kind of a row must be revolute, continuous or prismatic",
             where=f"{where}, kind",
             found=repr(value),
             remedy="write R or P",
@@ -298,7 +298,7 @@ def _sense(value: Any, where: str) -> int:
     number = read_number(value, f"{where}, sense")
     if number not in (1.0, -1.0):
         raise InputError(
-            "the sense is 1 or -1",
+            "the sense must be 1 or -1",
             where=f"{where}, sense",
             found=repr(value),
             remedy="write -1 to reverse the joint; write another factor as the multiplier in mimic",
@@ -316,7 +316,7 @@ def _mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> M
     if value is None:
         return None
     if not isinstance(value, Mapping) or "leader" not in value:
-        raise InputError("mimic is {leader, multiplier, offset}", where=where, found=repr(value))
+        raise InputError("mimic must be {leader, multiplier, offset}", where=where, found=repr(value))
     _check_keys(value, ("leader", "multiplier", "offset"), "mimic", where)
     return Mimic(
         name_of(value["leader"], f"{where}, leader"),
@@ -329,7 +329,7 @@ def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> L
     if value is None:
         return None
     if not isinstance(value, Mapping):
-        raise InputError("limit is {lower, upper, velocity, effort}", where=where, found=repr(value))
+        raise InputError("limit must be {lower, upper, velocity, effort}", where=where, found=repr(value))
     _check_keys(value, ("lower", "upper", "velocity", "effort"), "limit", where)
     lower, upper, velocity = (
         _own(name, value[name], fields, units, where) if name in value else default
@@ -439,7 +439,7 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
 def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
     """Check that each mimicked joint has a row or is in `coordinates`, and is not itself a mimic joint."""
     if not isinstance(coordinates, Sequence) or isinstance(coordinates, str):
-        raise InputError("coordinates are a list of names", where="coordinates", found=repr(coordinates))
+        raise InputError("coordinates must be a list of names", where="coordinates", found=repr(coordinates))
     leads = {row.joint for row in rows if row.mimic is None}
     known = [*leads, *(name_of(name, "coordinates") for name in coordinates)]
     for i, row in enumerate(rows):
@@ -466,7 +466,7 @@ def _pose(value: ArrayLike | None, what: str, units: Units) -> FloatArray:
     rows = value if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) else ()
     if len(rows) not in (3, 4) or not all(isinstance(row, Sequence) and len(row) == 4 for row in rows):
         raise InputError(
-            f"the {what} is a matrix of numbers, 4 x 4 or 3 x 4", where=what, found=safe_repr(value)
+            f"the {what} must be a matrix of numbers, 4 x 4 or 3 x 4", where=what, found=safe_repr(value)
         )
     pose = np.eye(4)
     for i, row in enumerate(rows):

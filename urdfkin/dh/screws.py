@@ -221,11 +221,11 @@ def screws_from(
     home = np.asarray(M, dtype=np.float64)
     if S.ndim != 2 or S.shape[1] != 6 or home.shape not in ((4, 4), (3, 4)) or frame not in ("space", "body"):
         raise InputError(
-            "screws are (n, 6) with a zero pose M (4, 4); frame is space or body",
+            "screws must be (n, 6) with a zero pose M (4, 4), and the frame space or body",
             found=f"{S.shape}, {home.shape}, {frame!r}",
         )
     if not (np.isfinite(S).all() and np.isfinite(home).all()):
-        raise InputError("screws and M are finite numbers", found="nan or inf")
+        raise InputError("screws and M must be finite numbers", found="nan or inf")
     pose = _rigid(home)
     if frame == "body":
         w = S[:, :3] @ pose[:3, :3].T
@@ -239,7 +239,7 @@ def screws_from(
         size = float(np.linalg.norm(S[i, :3] if turns else S[i, 3:]))
         if abs(size - 1.0) > _WRITTEN:
             raise InputError(
-                "an axis has length 1",
+                "an axis must have length 1",
                 where=f"screw {i + 1}",
                 found=f"{size:.6g}",
                 remedy="write (w, v), angular first",
@@ -275,7 +275,9 @@ def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
     except (TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError("screws and M are lists of numbers", where=frame, found=str(error)[:100]) from None
+        raise InputError(
+            "screws and M must be lists of numbers", where=frame, found=str(error)[:100]
+        ) from None
 
 
 def exp_screw(screw: FloatArray, values: ArrayLike) -> FloatArray:

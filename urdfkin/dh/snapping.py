@@ -41,7 +41,7 @@ def checked_tolerance(snap: float) -> float:
     """Return the tolerance as a float; raise InputError unless it is between 0 and 5 degrees."""
     tolerance = real_number(snap, "snap")
     if not 0.0 <= tolerance <= LARGEST_TOLERANCE:
-        raise InputError("snap is an angle in radians between 0 and 0.087 (5 degrees)", found=repr(snap))
+        raise InputError("snap must be an angle in radians between 0 and 0.087 (5 degrees)", found=repr(snap))
     return tolerance
 
 

@@ -364,7 +364,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
-        raise InputError("an OPW arm has six revolute joints", where=where, found=str(len(path.joints)))
+        raise InputError("an OPW arm must have six revolute joints", where=where, found=str(len(path.joints)))
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (SAMPLES, len(path.joints)))
     wanted, best, reason = free.placement(q), None, ""

@@ -99,10 +99,12 @@ class DHRow:
                     f"{name} is not a finite number", where=where, found=str(getattr(self, name))
                 )
         if self.sense not in (1, -1):
-            raise InputError("the sense is +1 or -1", where=where, found=str(self.sense))
+            raise InputError("the sense must be +1 or -1", where=where, found=str(self.sense))
         if not self.kind.has_axis:
             raise InputError(
-                "a row is a revolute, continuous or prismatic joint", where=where, found=self.kind.value
+                "the joint of a row must be revolute, continuous or prismatic",
+                where=where,
+                found=self.kind.value,
             )
 
     @property
@@ -446,7 +448,7 @@ def _rigid(T: ArrayLike, where: str) -> FloatArray:
     pose = frozen(T)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise InputError(
-            "a pose is a (4, 4) array of finite numbers", where=where, found=f"shape {pose.shape}"
+            "a pose must be a (4, 4) array of finite numbers", where=where, found=f"shape {pose.shape}"
         )
     with np.errstate(over="ignore", invalid="ignore"):  # an overflow is rejected below
         off = np.abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max()
