@@ -49,9 +49,9 @@ def test_a_wrong_d1_that_the_base_takes_up_is_told_with_its_millimetres() -> Non
     assert (0, "d") in found.hidden
     text = comparison_text(found, units_of("radians", "millimetres"))
     assert "very cell" not in text
-    assert "once base, tool and joint offsets are fitted" in text
+    assert "after a fit of base, tool and joint offsets" in text
     assert "the base 10 mm" in text
-    assert "stand in for d1" in text
+    assert "can replace them: d1" in text
     assert [(one.row, one.cell) for one in found.instead] == [(0, "d")]
     assert found.instead[0].difference == pytest.approx(-0.01, rel=1e-6)
 
@@ -84,7 +84,7 @@ def test_only_a_table_that_is_the_urdf_as_written_has_every_cell() -> None:
     table = robot.dh("panda_link8", "panda_link0")
     found = compare(robot.chain("panda_link8", "panda_link0"), table)
     assert found.as_written
-    assert "Every cell is the URDF's." in comparison_text(found, units_of())
+    assert "Every cell agrees with the URDF." in comparison_text(found, units_of())
     assert found.base.metres == found.base.radians == found.tool.metres == found.tool.radians == 0.0
 
 
@@ -196,7 +196,7 @@ def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
 
 def test_the_kinova_sheet_is_said_to_be_rounded() -> None:
     done = command("dh", "kinova", "--compare", "kinova")
-    assert "All within the last digit that the table gives (*)." in done.text
+    assert "All within the last digit of the table (*)." in done.text
     data = json.loads(command("dh", "kinova", "--compare", "kinova", "--format", "json").text)
     assert [one["within_last_digit"] for one in data["differences"]] == [True]
 

@@ -44,9 +44,9 @@ def of_rows(rows: str, **keys: str) -> str:
 @pytest.mark.parametrize(
     ("rows", "keys", "message"),
     [
-        ("[[0.1, 90, 0, 0]]", {}, "row 1, alpha: alpha is more than a turn.*found 90; write angles = 'deg"),
+        ("[[0.1, 90, 0, 0]]", {}, "row 1, alpha: alpha is more than one turn.*found 90; write angles = 'deg"),
         ("[[0, 0, 0, 0], [0, 0, 0, -180.0]]", {}, r"row 2, theta: .*found -180.0; write angles = 'degrees'"),
-        ('[{beta = 45, a = 1}]', {}, "row 1, beta: beta is more than a turn"),
+        ('[{beta = 45, a = 1}]', {}, "row 1, beta: beta is more than one turn in radians"),
         (
             "[[0, 0.089, 0, 1.5708], [0, 0.1, 0.4, 0], [0, 0.3, 0, -1.5708]]", {},
             "rows 1 to 3: the columns look like theta, d, a, alpha.*found second column 0.089",
@@ -55,25 +55,25 @@ def of_rows(rows: str, **keys: str) -> str:
             "[[0, 89.2, 0, 90], [0, 10.1, 0.4, 0]]", {"angles": '"degrees"', "lengths": '"millimetres"'},
             "the columns look like theta, d, a, alpha",
         ),
-        ("[[0, 0.089, 0, 1.5708, 0]]", {}, "row 1: .*entry is 'R' or 'P'.*found 0; .*theta, d, a, alpha"),
+        ("[[0, 0.089, 0, 1.5708, 0]]", {}, "row 1: .* must be 'R' or 'P'.*found 0; .*theta, d, a, alpha"),
         ("[[0, 0, 0.1, 0, 'R', 7]]", {}, r"row 1: .*found 6 entries, \[0, 0, 0.1, 0, 'R', 7\]"),
-        ("[{a = 1, sense = 1.9}]", {}, "row 1, sense: the sense is 1 or -1: found 1.9"),
-        ("[{a = 1, sense = '-1.5'}]", {}, "row 1, sense: the sense is 1 or -1: found '-1.5'"),
+        ("[{a = 1, sense = 1.9}]", {}, "row 1, sense: the sense must be 1 or -1: found 1.9"),
+        ("[{a = 1, sense = '-1.5'}]", {}, "row 1, sense: the sense must be 1 or -1: found '-1.5'"),
         (
             "[{joint = 'left', a = 1}, {joint = 'right', mimic = {leader = 'lefft'}}]", {},
             "row 2, leader: unknown joint 'lefft'; did you mean left.*coordinates",
         ),
         (
             "[{joint='a', mimic={leader='c'}}, {joint='b', mimic={leader='a'}}, {joint='c'}]", {},
-            "row 2, leader: a joint cannot follow one that follows: found 'a'",
+            "row 2, leader: a joint cannot mimic a mimic joint: found 'a'",
         ),
-        ("[{joint = 'a', mimic = {leader = 'a'}}]", {}, "row 1, leader: a joint cannot follow one"),
+        ("[{joint = 'a', mimic = {leader = 'a'}}]", {}, "row 1, leader: a joint cannot mimic a mimic joint"),
         ("[{mimic = {leader = 'b', factor = 2}}]", {}, "row 1: unknown key in mimic: found 'factor'"),
         ("[{joint = 'a', limit = {min = 2}}]", {}, "row 1: unknown key in limit: found 'min'"),
         ("[{limit = {lower = 2, upper = 1}}]", {}, "row 1, limit: lower is above upper: found 2 and 1"),
         ("[{joint = 'a', limit = {lower = nan}}]", {}, "row 1, lower: not a finite number: found nan"),
-        ("[]", {}, r"rows: a table without rows, base and tool says nothing: found \[\]"),
-        ("[{joint = 5}]", {}, "row 1, joint: a name is text: found 5"),
+        ("[]", {}, r"rows: a table needs a row, a base or a tool: found \[\]"),
+        ("[{joint = 5}]", {}, "row 1, joint: a name must be text: found 5"),
         ("[{a = true}]", {}, "row 1, a: not a number: found True"),
         ("[{a = '1_0'}]", {}, "row 1, a: not a number: found '1_0'"),
         ("[{a = '١'}]", {}, "row 1, a: not a number"),
@@ -81,15 +81,15 @@ def of_rows(rows: str, **keys: str) -> str:
         ("[{a = 'pi/0'}]", {}, "row 1, a: not a number: found 'pi/0'"),
         (f"[{{a = 1{'0' * 400}}}]", {}, "row 1, a: not a number"),
         ("[{a = 1979-05-27}]", {}, "row 1, a: not a number"),
-        ("[{a = 1}]", {"robot": "1979-05-27"}, "robot: a name is text"),
+        ("[{a = 1}]", {"robot": "1979-05-27"}, "robot: a name must be text"),
         ("[{a = 1}]", {"angles": "1979-05-27"}, "angles or lengths: unknown unit"),
-        ("[{kind = 3}]", {}, "row 1, kind: a row is revolute, continuous or prismatic: found 3"),
-        ("[{a = 1}]", {"robot": "7"}, "robot: a name is text: found 7"),
-        ("[{a = 1}]", {"base_frame": "''"}, "base_frame: a name is text: found ''"),
+        ("[{kind = 3}]", {}, "row 1, kind: the kind of a row must be revolute, .*: found 3"),
+        ("[{a = 1}]", {"robot": "7"}, "robot: a name must be text: found 7"),
+        ("[{a = 1}]", {"base_frame": "''"}, "base_frame: a name must be text: found ''"),
         ("[{a = 1}]", {"base": "[[1,0,0,'0'], [0,1,0,'x'], [0,0,1,0]]"}, "base, row 2, column 4: not a"),
-        ("[{a = 1}]", {"tool": "[1, 2, 3]"}, "tool: the tool is a matrix of numbers, 4 x 4 or 3 x 4"),
+        ("[{a = 1}]", {"tool": "[1, 2, 3]"}, "tool: the tool must be a matrix of numbers, 4 x 4 or 3 x 4"),
         ("[{a = 1}]", {"angles": "['deg']"}, "unknown unit"),
-        ("[{a = 1}]", {"coordinates": "'q'"}, "coordinates: coordinates are a list of names"),
+        ("[{a = 1}]", {"coordinates": "'q'"}, "coordinates: coordinates must be a list of names"),
         ("'none'", {}, "rows: a table needs a list of rows: found 'none'"),
     ],
 )  # fmt: skip
@@ -101,25 +101,25 @@ def test_a_wrong_table_says_where_and_what(
 
 def test_a_robot_that_is_null_is_an_error(tmp_path: Path) -> None:
     text = json.dumps({"convention": "standard", "robot": None, "rows": [[0.1, 0, 0, 0]]})
-    assert "robot: a name is text: found None" in refused(tmp_path, text, ".json")
+    assert "robot: a name must be text: found None" in refused(tmp_path, text, ".json")
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("a,alpha,d,theta\n0.1,0,0,0,7\n", "row 1: a row has a cell for each of the 4 columns: found 5"),
+        ("a,alpha,d,theta\n0.1,0,0,0,7\n", "row 1: a row needs a cell for each of the 4 columns: found 5"),
         (
             "a,alpha,d,theta\n0.1,0,0,0\n0.1,0,0\n",
-            "row 2: a row has a cell for each of the 4 columns: found 3",
+            "row 2: a row needs a cell for each of the 4 columns: found 3",
         ),
         ("a,d,theta\n0.1,0,0\n", "header: no column 'alpha': found a, d, theta"),
         ("0.1,0,0,0\n", "header: no column 'a'"),
-        ("a,a,alpha,d,theta\n1,1,0,0,0\n", "header: the column 'a' stands twice"),
+        ("a,a,alpha,d,theta\n1,1,0,0,0\n", "header: the column 'a' is there twice"),
         ("a,alpha,d,theta\n0.1,,0,0\n", "row 1, alpha: not a number: found ''"),
         ("a,alpha,d,theta,mass\n0.1,0,0,0,1\n", "row 1: unknown key in a row: found 'mass'"),
-        ("a,alpha,d,theta,twist\n0.1,0,0,0,1\n", "header: the column 'alpha' stands twice"),
+        ("a,alpha,d,theta,twist\n0.1,0,0,0,1\n", "header: the column 'alpha' is there twice"),
         ("", "header: no column 'a': found nothing"),
-        ("a,alpha,d,theta\n", "rows: a table without rows"),
+        ("a,alpha,d,theta\n", "rows: a table needs a row"),
     ],
 )
 def test_a_wrong_csv_says_where_and_what(text: str, message: str, tmp_path: Path) -> None:

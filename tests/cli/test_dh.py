@@ -105,13 +105,17 @@ def test_unverified_tables_exit_3() -> None:
     ("arguments", "error", "message"),
     [
         ((*UR5[:-1], "tool1"), UnknownNameError, "did you mean tool0"),
-        (("ur5", "--all", "--tree"), InputError, "do not go together"),
-        (("ur5", "--all", "--format", "c"), InputError, "--all has no form 'c'"),
-        (("ur5", "--tree", "--format", "c"), InputError, "--tree has no form 'c'"),
-        (("ur5", "--compare", "ur5", "--format", "c"), InputError, "--compare has no form 'c'"),
+        (("ur5", "--all", "--tree"), InputError, "cannot be used together"),
+        (("ur5", "--all", "--format", "c"), InputError, "--all does not support the format 'c'"),
+        (("ur5", "--tree", "--format", "c"), InputError, "--tree does not support the format 'c'"),
+        (
+            ("ur5", "--compare", "ur5", "--format", "c"),
+            InputError,
+            "--compare does not support the format 'c'",
+        ),
         (("ur5", "--compare", "ur6"), UnknownNameError, "unknown reference table 'ur6'"),
         (("panda", "--compare", "ur5"), InputError, "choose base and tip"),
-        (("ur5", "--snap", "1"), InputError, "snap is an angle"),
+        (("ur5", "--snap", "1"), InputError, "snap must be an angle"),
         (("ur5", "--flip", "elbow"), UnknownNameError, "did you mean elbow_joint"),
     ],
 )

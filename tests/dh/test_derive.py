@@ -364,13 +364,13 @@ def test_sliding_joints_may_stand_anywhere(kinds: str) -> None:
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        ({"convention": "craig"}, r"unknown convention: found 'craig'; say 'standard' or 'modified'"),
-        ({"near_parallel": "drop"}, r"near_parallel: found 'drop'; say 'hayati' or 'strict'"),
-        ({"last": "hand"}, r"last: found 'hand'; say 'tip' or 'flange'"),
-        ({"parallel_offset": "none"}, r"say 'last' or 'first' or 'each'"),
-        ({"snap": -1.0}, r"snap is (an angle|a finite)"),
-        ({"snap": math.nan}, r"snap is (an angle|a finite)"),
-        ({"snap": 1.0}, r"snap is (an angle|a finite)"),
+        ({"convention": "craig"}, r"unknown convention: found 'craig'; write 'standard' or 'modified'"),
+        ({"near_parallel": "drop"}, r"near_parallel: found 'drop'; write 'hayati' or 'strict'"),
+        ({"last": "hand"}, r"last: found 'hand'; write 'tip' or 'flange'"),
+        ({"parallel_offset": "none"}, r"write 'last' or 'first' or 'each'"),
+        ({"snap": -1.0}, r"snap (must be an angle|is a finite)"),
+        ({"snap": math.nan}, r"snap (must be an angle|is a finite)"),
+        ({"snap": 1.0}, r"snap (must be an angle|is a finite)"),
     ],
 )
 def test_an_unknown_choice_says_what_there_is(option: dict[str, object], message: str) -> None:

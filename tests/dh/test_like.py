@@ -96,9 +96,9 @@ def test_kinovas_sheet_comes_out_with_its_zeros_and_the_urdfs_lengths() -> None:
 
 def test_another_robots_table_is_refused() -> None:
     other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
-    with pytest.raises(InputError, match=r"another robot.*hold it against the URDF with --compare"):
+    with pytest.raises(InputError, match=r"another robot.*compare it with the URDF by --compare"):
         dh_table(elbow(), "tip", like=other)
-    with pytest.raises(InputError, match="the table's joints are not the path's"):
+    with pytest.raises(InputError, match="the table and the path have different joints"):
         dh_table(elbow(), "tip", like=replace(other, rows=other.rows[:3]))
 
 
@@ -155,11 +155,11 @@ def test_columns_stand_in_the_order_asked_for() -> None:
 @pytest.mark.slow
 def test_a_robot_with_a_published_table_is_told_of_it() -> None:
     assert published("xarm7") == [
-        "the modified table that is published of this robot: --like xarm7_modified --snap 1e-04",
-        "the standard table that is published of this robot: --like xarm7_standard --snap 1e-04",
+        "published modified table of this robot: --like xarm7_modified --snap 1e-04",
+        "published standard table of this robot: --like xarm7_standard --snap 1e-04",
     ]
     assert published("nobody") == []
-    assert "hint: the standard table that is published of this robot: --like ur5" in run("ur5").stdout
+    assert "hint: published standard table of this robot: --like ur5" in run("ur5").stdout
     assert "published" not in run("ur5", "--like", "ur5").stdout
     for name in references():
         assert Convention(read_mapping(reference_path(name))["convention"])

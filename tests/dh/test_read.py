@@ -51,7 +51,7 @@ def test_a_file_is_read_by_its_ending(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        ({"rows": ROWS}, "does not say its convention"),
+        ({"rows": ROWS}, "does not name its convention"),
         ({"convention": "dh", "rows": ROWS}, "unknown convention: found 'dh'"),
         (
             {"convention": "standard", "rows": ROWS, "anlges": "degrees"},
@@ -60,21 +60,21 @@ def test_a_file_is_read_by_its_ending(tmp_path: Path) -> None:
         ({"convention": "standard"}, "needs a list of rows"),
         (
             {"convention": "standard", "rows": [[1, 2, 3]]},
-            r"row 1: a row is a mapping or \[a, alpha, d, theta",
+            r"row 1: a row must be a mapping or \[a, alpha, d, theta",
         ),
         (
             {"convention": "standard", "rows": [[0, 0, 0, 0, "X"]]},
-            "row 1, kind: a row is revolute, continuous or prismatic",
+            "row 1, kind: the kind of a row must be revolute, continuous or prismatic",
         ),
         ({"convention": "standard", "rows": [{"a": 0, "alhpa": 1}]}, "unknown key in a row: found 'alhpa'"),
         ({"convention": "standard", "rows": [{"a": "wide"}]}, "row 1, a: not a number: found 'wide'"),
-        ({"convention": "standard", "rows": [{"a": 0, "sense": 0}]}, "the sense is"),
+        ({"convention": "standard", "rows": [{"a": 0, "sense": 0}]}, "the sense must be"),
         (
             {"convention": "standard", "rows": ROWS, "base": [[1, 0], [0, 1]]},
-            "base: the base is a matrix of numbers, 4 x 4",
+            "base: the base must be a matrix of numbers, 4 x 4",
         ),
-        ({"convention": "standard", "rows": ROWS, "tool": "none"}, "the tool is a matrix of numbers"),
-        ({"convention": "standard", "rows": [{"mimic": "j1"}]}, "mimic is {leader"),
+        ({"convention": "standard", "rows": ROWS, "tool": "none"}, "the tool must be a matrix of numbers"),
+        ({"convention": "standard", "rows": [{"mimic": "j1"}]}, "mimic must be {leader"),
     ],
 )
 def test_an_inconsistent_table_says_where(data: dict[str, object], message: str) -> None:
@@ -89,7 +89,7 @@ def test_a_broken_or_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match="cannot be read"):
         read_table(tmp_path / "missing.toml")
     (tmp_path / "arm.xls").write_text("")
-    with pytest.raises(InputError, match=r"ends in .toml, .json, .csv, .tsv"):
+    with pytest.raises(InputError, match=r"must have the suffix .toml, .json, .csv, .tsv"):
         read_table(tmp_path / "arm.xls")
     (tmp_path / "bad.toml").write_text('convention = "standard"\nrows = [["x", 0, 0, 0]]')
     with pytest.raises(InputError, match=r"bad.toml, row 1, a: not a number"):

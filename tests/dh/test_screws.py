@@ -154,9 +154,9 @@ def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("screws", "home", "message"),
     [
-        ([[0, 0, 2, 0, 0, 0]], M, "screw 1: an axis has length 1: found 2"),
-        ([[0, 0, 1, 0, 0, 0.1]], M, "turns or slides, and does not both: found a pitch of 0.1"),
-        ([[0, 0, 1]], M, r"screws are \(n, 6\)"),
+        ([[0, 0, 2, 0, 0, 0]], M, "screw 1: an axis must have length 1: found 2"),
+        ([[0, 0, 1, 0, 0, 0.1]], M, "is revolute or prismatic, not both: found a pitch of 0.1"),
+        ([[0, 0, 1]], M, r"screws must be \(n, 6\)"),
         ([[0, 0, 1, 0, 0, 0]], np.ones((4, 4)), "M must be a rotation"),
         ([[0, 0, 1, 0, 0, np.nan]], M, "finite"),
     ],
@@ -169,7 +169,7 @@ def test_what_is_no_screw_says_why(screws: Any, home: Any, message: str) -> None
 def test_a_file_of_screws_with_a_slip_says_where(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
     path.write_text("M = [[1,0,0,0],[0,1,0,0],[0,0,1,0]]\nspace = [['x']]\n")
-    with pytest.raises(InputError, match=r"arm.toml, space: screws and M are lists of numbers"):
+    with pytest.raises(InputError, match=r"arm.toml, space: screws and M must be lists of numbers"):
         load(path)
     path.write_text("M = [[1,0,0,0],[0,1,0,0],[0,0,1,0]]\nscrews = []\n")
     with pytest.raises(InputError, match="unknown key in screws: found 'screws'"):

@@ -138,15 +138,15 @@ def test_the_printed_form_of_any_robot_is_read(tree: KinematicTree, convention: 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("i  a  alpha  d  theta\n1  0  pi/2  0.1  q1\n", "does not say its convention"),
+        ("i  a  alpha  d  theta\n1  0  pi/2  0.1  q1\n", "does not name its convention"),
         ("# anlges: degrees\na,alpha,d,theta\n0,0,0,0\n", "unknown key in a table: found 'anlges'"),
         ('a,alpha,d,theta\n"0,3",0,0,0\n', "row 1, a: not a number.*by semicolons if commas are decimal"),
         ("a;alpha;d;phi\n0;0;0;0\n", "header: no column 'theta'"),
-        ("a;alpha;d;theta\n0;0;0\n", "row 1: a row has a cell for each of the 4 columns: found 3"),
-        ("a;alpha;d;theta\n0;q1;0;0\n", "variable of a joint stands in theta if it turns and in d"),
-        ("a;alpha;d;theta\n0;0;0;q7\n", "row 1, theta: a row moves with a variable that no row has"),
+        ("a;alpha;d;theta\n0;0;0\n", "row 1: a row needs a cell for each of the 4 columns: found 3"),
+        ("a;alpha;d;theta\n0;q1;0;0\n", "joint variable belongs in theta of a revolute joint, or in d"),
+        ("a;alpha;d;theta\n0;0;0;q7\n", "row 1, theta: no row has the variable of this row"),
         ("a;alpha;d;theta\n0;0;0;90 deg rad\n", "deg and rad in one cell"),
-        ("a;alpha;d;theta\n90 deg;0;0;0\n", "row 1, a: a is a length"),
+        ("a;alpha;d;theta\n90 deg;0;0;0\n", "row 1, a: a must be a length"),
     ],
 )
 def test_what_is_no_table_says_where(text: str, message: str) -> None:
@@ -218,5 +218,5 @@ def test_a_base_with_an_infinite_number_is_refused(number: str) -> None:
     """LAPACK's singular values of such a matrix never returned."""
     rows = f" 1 0 0 0\n {number} 1 0 0\n 0 0 1 0\n"
     sheet = f"standard\na  alpha  d  theta\n0  pi/2  0.3  q1\n\nbase (metres):\n{rows}"
-    with pytest.raises(InputError, match="the base is a matrix of finite numbers"):
+    with pytest.raises(InputError, match="the base must be a matrix of finite numbers"):
         table_from_text(sheet, ".txt")

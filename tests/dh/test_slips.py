@@ -188,7 +188,7 @@ def test_a_table_that_fits_in_no_convention_is_refused_with_how_far_it_is_off(tm
         InputError, match=r"and neither fits: found off by .* mm as standard and .* as modified"
     ):
         run("ur3", *UR5[1:], "--compare", str(file))
-    with pytest.raises(InputError, match="joints are not the path's"):
+    with pytest.raises(InputError, match="the path have different joints"):
         run("panda", "--compare", str(file))
 
 

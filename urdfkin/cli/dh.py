@@ -1,7 +1,4 @@
-"""What `urdfkin dh` does, once its options are read.
-
-`urdfkin dh`: Denavit-Hartenberg tables, checked, compared, in every format.
-"""
+"""Implement `urdfkin dh`: write, check, compare and export Denavit-Hartenberg tables."""
 
 from __future__ import annotations
 
@@ -47,11 +44,11 @@ from urdfkin.verify.sampling import draw
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
-#: Forms that can hold several tables one after the other.
-_SEVERAL = ("terminal", "markdown", "latex", "json")
-#: Forms under which the check's result is written; elsewhere it goes to stderr.
-_READ = ("terminal", "markdown")
-#: Forms that round, and with how many digits they write base and tool, if not with those asked for.
+#: Formats that can contain several tables.
+_FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
+#: Formats with the check's result below the table; for the others it goes to stderr.
+_PRINTED = ("terminal", "markdown")
+#: Formats that round numbers, with their digits of base and tool (None: the option --digits).
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 
@@ -60,8 +57,8 @@ class Work:
     """The command's options.
 
     Attributes:
-        written: The table's file that is the robot, if it is to be written as it stands.
-        choices: What else `Robot.dh` is asked for.
+        written: File of a table that is the robot and is written without a derivation; None otherwise.
+        choices: Other arguments of `Robot.dh`.
     """
 
     robot: Robot
@@ -86,7 +83,7 @@ class Work:
 
     @property
     def units(self) -> Units:
-        """As the options say."""
+        """Number format of the options."""
         return Units(
             Angles.DEGREES if self.degrees else Angles.RADIANS,
             Lengths.MILLIMETRES if self.millimetres else Lengths.METRES,
@@ -96,12 +93,12 @@ class Work:
 
 
 def run(work: Work) -> int:
-    """Do it; the exit code."""
+    """Run the command and return its exit code."""
     chosen = [
         name for name, on in (("--all", work.all_), ("--tree", work.tree), ("--compare", work.compare)) if on
     ]
     if len(chosen) > 1:
-        raise InputError(f"{' and '.join(chosen)} do not go together", remedy="ask for one after the other")
+        raise InputError(f"{' and '.join(chosen)} cannot be used together", remedy="use one at a time")
     if work.compare is not None:
         return _compare(work, work.compare)
     if work.tree:
@@ -114,19 +111,22 @@ def run(work: Work) -> int:
 
 def _tables(work: Work) -> int:
     tips = _tips(work)
-    if len(tips) > 1 and work.format_ not in _SEVERAL:
-        raise InputError(f"--all has no form {work.format_!r}", remedy=f"say --format {', '.join(_SEVERAL)}")
+    if len(tips) > 1 and work.format_ not in _FORMATS_OF_SEVERAL:
+        raise InputError(
+            f"--all does not support the format {work.format_!r}",
+            remedy=f"use --format {', '.join(_FORMATS_OF_SEVERAL)}",
+        )
     made = [_table(work, tip) for tip in tips]
     if work.format_ == "json" and work.all_:
         text = json.dumps([_document(table, check) for table, check in made], indent=2) + "\n"
     elif work.format_ == "json":
         text = json.dumps(_document(*made[0]), indent=2) + "\n"
     else:
-        text = "\n".join(_written(work, table, check) for table, check in made)
-    _put(work, text)
-    if work.format_ not in (*_READ, "json"):
+        text = "\n".join(_format_table(work, table, check) for table, check in made)
+    _write_output(work, text)
+    if work.format_ not in (*_PRINTED, "json"):
         for table, check in made:
-            for line in _said(work, table, check).split("\n"):
+            for line in _notes(work, table, check).split("\n"):
                 say(line, err=True)
     return 0 if all(check is not None and check.within for _, check in made) else 3
 
@@ -137,20 +137,23 @@ def _tips(work: Work) -> list[str | None]:
 
 
 def _table(work: Work, tip: str | None) -> tuple[DHTable, TableCheck | None]:
-    robot, table = work.robot, _made(work, tip, work.snap)
+    robot, table = work.robot, _make_table(work, tip, work.snap)
     return table, robot.verifier.table(table) if robot.verifier.policy else None
 
 
-def _made(work: Work, tip: str | None, snap: float) -> DHTable:
+def _make_table(work: Work, tip: str | None, snap: float) -> DHTable:
     robot, base = work.robot, work.base
     if work.written is not None:
         table = read_table_or_screws(at_home(work.written))
-        if isinstance(table, DHTable):  # screws are derived like a URDF
+        if isinstance(table, DHTable):  # a table is derived from screws as from a URDF
             return to_convention(table, work.convention or table.convention)
     like = None
     if work.like is not None:
         like = read_table(reference_path(work.like))
-        tip, base = tip or _known(work, like.tip_frame), base or _known(work, like.base_frame)
+        tip, base = (
+            tip or _frame_of_robot(work, like.tip_frame),
+            base or _frame_of_robot(work, like.base_frame),
+        )
     if base is None and work.all_:
         base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
     return robot.dh(
@@ -164,7 +167,7 @@ def _made(work: Work, tip: str | None, snap: float) -> DHTable:
     )
 
 
-def _written(work: Work, table: DHTable, check: TableCheck | None) -> str:
+def _format_table(work: Work, table: DHTable, check: TableCheck | None) -> str:
     if work.format_ == "urdf":
         return to_urdf(table)
     if work.format_ == "svg":
@@ -172,17 +175,19 @@ def _written(work: Work, table: DHTable, check: TableCheck | None) -> str:
 
         return drawing(table)
     text = export(table, work.format_, work.units)
-    return f"{text}\n{_said(work, table, check)}\n" if work.format_ in _READ else text
+    return f"{text}\n{_notes(work, table, check)}\n" if work.format_ in _PRINTED else text
 
 
-def _said(work: Work, table: DHTable, check: TableCheck | None) -> str:
-    """The lines under a table: the check, what its digits lose, and whether to snap."""
+def _notes(work: Work, table: DHTable, check: TableCheck | None) -> str:
+    """Return the lines under a table: the check, the error of the printed digits, and hints."""
     lines = [check_line(check)]
     if work.format_ in _ROUNDED:
         lines.append(str(printed(table, work.units, _ROUNDED[work.format_])))
-    if work.written is None and (hint := snap_hint(table, lambda snap: _made(work, table.tip_frame, snap))):
+    if work.written is None and (
+        hint := snap_hint(table, lambda snap: _make_table(work, table.tip_frame, snap))
+    ):
         lines.append(f"hint: {hint}")
-    if work.like is None and work.format_ in _READ:
+    if work.like is None and work.format_ in _PRINTED:
         lines += [f"hint: {line}" for line in published(work.robot.origin.source)]
     return "\n".join(lines)
 
@@ -192,7 +197,7 @@ def _document(table: DHTable, check: TableCheck | None) -> dict[str, Any]:
 
 
 def check_line(check: TableCheck | None) -> str:
-    """One line on what Pinocchio says."""
+    """Return one line with the result of Pinocchio's check."""
     if check is None:
         return f"NOT VERIFIED by Pinocchio {version()}"
     return f"Pinocchio {version()}: {check}"
@@ -208,15 +213,18 @@ def _tree(work: Work) -> int:
     elif work.format_ in ("terminal", "markdown", "csv"):
         text = write_tree(parameters, work.format_, work.units)
     else:
-        raise InputError(f"--tree has no form {work.format_!r}", remedy="say terminal, markdown, csv or json")
+        raise InputError(
+            f"--tree does not support the format {work.format_!r}",
+            remedy="use terminal, markdown, csv or json",
+        )
     check = work.robot.verifier.tree_parameters(parameters) if work.robot.verifier.policy else None
-    if work.format_ in _READ:
+    if work.format_ in _PRINTED:
         text += f"\n{check or check_line(None)}\n"
         q = draw(work.robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
         text += f"{printed_tree(parameters, work.units, q)}\n"
     else:
         say(str(check or check_line(None)), err=True)
-    _put(work, text)
+    _write_output(work, text)
     return 0 if check is not None else 3
 
 
@@ -225,11 +233,13 @@ def _tree(work: Work) -> int:
 
 def _compare(work: Work, name: str) -> int:
     if work.format_ not in ("terminal", "json"):
-        raise InputError(f"--compare has no form {work.format_!r}", remedy="say terminal or json")
+        raise InputError(
+            f"--compare does not support the format {work.format_!r}", remedy="use terminal or json"
+        )
     path = reference_path(name)
     data = read_mapping(path)
-    tip = work.tip or _known(work, data.get("tip_frame"))
-    base = work.base or _known(work, data.get("base_frame"))
+    tip = work.tip or _frame_of_robot(work, data.get("tip_frame"))
+    base = work.base or _frame_of_robot(work, data.get("base_frame"))
     chain, tolerance = work.robot.chain(tip, base), work.tolerance / 1e3
     note = ""
     if "convention" not in data:
@@ -248,12 +258,12 @@ def _compare(work: Work, name: str) -> int:
         text = json.dumps(_comparison(found, reference, slip), indent=2, allow_nan=False) + "\n"
     else:
         text = note + comparison_text(found, work.units) + (f"\nhint: {slip}\n" if slip else "")
-    _put(work, text)
+    _write_output(work, text)
     return 0 if found.passes else 1
 
 
-def _known(work: Work, name: object) -> str | None:
-    """What a table calls one of its ends, if the robot has such a frame."""
+def _frame_of_robot(work: Work, name: object) -> str | None:
+    """Return the name of a table's base or tip frame if the robot has a frame of that name."""
     return name if isinstance(name, str) and name in work.robot.frame_names else None
 
 
@@ -307,16 +317,16 @@ def _mistake(one: Mistake) -> dict[str, Any]:
     }
 
 
-def _put(work: Work, text: str) -> None:
+def _write_output(work: Work, text: str) -> None:
     if work.output is not None:
         write_file(work.output, text.encode())
-    elif work.format_ in _READ:
+    elif work.format_ in _PRINTED:
         click.echo(text, nl=False)
     else:
         say_file(text)
 
 
-#: Forms of a table. They repeat `urdfkin.dh.export.FORMATS`, whose import --help does not need.
+#: Formats of a table. They repeat `urdfkin.dh.export.FORMATS`, so that --help need not import that module.
 FORMATS = (
     *("terminal", "markdown", "html", "latex", "csv", "json", "toml"),
     *("numpy", "sympy", "casadi", "matlab", "matlab-symbolic", "matlab-rst", "roboticstoolbox", "ets"),
@@ -340,7 +350,7 @@ def _choice(name: str, choices: tuple[str, ...], text: str) -> Any:
 def _columns(_context: click.Context, _option: click.Parameter, value: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in value.split(","))
     if sorted(names) != ["a", "alpha", "d", "theta"]:
-        raise click.BadParameter(f"{value!r} is not a, alpha, d and theta, each once, with commas between")
+        raise click.BadParameter(f"{value!r} is not a, alpha, d and theta, each once, separated by commas")
     return names
 
 
@@ -367,13 +377,17 @@ choice_options = together(
         metavar="RAD",
         help="Round angles within this tolerance to multiples of 15 degrees.",
     ),
-    _choice("--last", ("tip", "flange"), "Whether the last row reaches the tip, or the tool holds the rest."),
+    _choice(
+        "--last", ("tip", "flange"), "Whether the last row reaches the tip, or the tool contains the rest."
+    ),
     _choice(
         "--parallel-offset", ("last", "first", "each"), "The row that takes the offset along parallel axes."
     ),
     click.option("--flip", multiple=True, metavar="JOINT", help="Reverse the sense of a joint; repeatable."),
     _choice(
-        "--first", ("base", "joint"), "Where frame 0 is: d1 holds the base's offset, or is zero (Craig's)."
+        "--first",
+        ("base", "joint"),
+        "Position of frame 0: d1 contains the base's offset, or is zero (Craig's).",
     ),
     _choice(
         "--sign",
@@ -395,7 +409,7 @@ compare_options = together(
         "--compare",
         metavar="TABLE",
         shell_complete=complete_table,
-        help="Compare the URDF with a table: a file (as for ROBOT), or the name of a shipped one.",
+        help="Compare the URDF with a table: a file (as for ROBOT), or the name of a reference table.",
     ),
     click.option(
         "--tolerance",
@@ -438,16 +452,16 @@ form_options = together(
 )
 
 
-#: What --like has decided.
+#: Options that --like decides.
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
-#: What a table that is a robot has to be derived for; without, it is written as it stands.
+#: Options that need a new derivation of a table that is the robot; without them it is written unchanged.
 _DERIVED = ("base", "tip", "all_", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 
 
-def _refuse_idle(context: click.Context, is_table: bool, options: dict[str, Any]) -> None:
-    """Which options do nothing beside which others."""
+def _reject_unused(context: click.Context, is_table: bool, options: dict[str, Any]) -> None:
+    """Reject options that have no effect together with other options."""
     compares, tree, form = options["compare"] is not None, options["tree"], options["format_"]
     written = ("terminal", "markdown") if tree or compares else ("terminal", "markdown", "html", "latex")
     for idle, where, because in (
@@ -456,13 +470,13 @@ def _refuse_idle(context: click.Context, is_table: bool, options: dict[str, Any]
         ((*_CHOICES, "base", "tip"), tree, "with --tree"),
         (("tip", "like"), options["all_"], "with --all"),
         (_SIGNS, options["like"] is not None, "with --like"),
-        (("columns",), tree or compares, "but in the form of one table"),
+        (("columns",), tree or compares, "except for one table"),
         (
             _UNITS,
             form not in written,
-            f"in the form {form!r}, which is in metres and radians, to the last digit",
+            f"in the format {form!r}, which is exact, in metres and radians",
         ),
-        (("mimic", "root_joint", "xacro_arg"), is_table, "for a robot that is a table"),
+        (("mimic", "root_joint", "xacro_arg"), is_table, "for a robot from a table"),
     ):
         if where:
             reject_unused_options(context, idle, because)
@@ -480,21 +494,21 @@ def _refuse_idle(context: click.Context, is_table: bool, options: dict[str, Any]
 def command(context: click.Context, /, robot: str, verify: bool, output: Path | None, **options: Any) -> None:
     """Write the Denavit-Hartenberg table of the path between two frames, exact to rounding and checked.
 
-    The path may run down the tree, up, or through the common ancestor. Angles and lengths are the file's.
-    --snap rounds angles; the table then states by how much the tip moves at most.
+    The path may lead down the tree, up, or through the common ancestor. Angles and lengths are the file's.
+    --snap rounds angles; the table then states a bound of the tip's motion.
     ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
-    .tsv, .md, .tex, .txt). A table is written as it stands, in the convention asked for. Options that choose
-    rows derive it anew from the robot that it describes. `urdfkin explain urdf-to-dh` says more.
+    .tsv, .md, .tex, .txt). A table is written with its own numbers, in the chosen convention. Options that
+    choose rows derive a new table from the robot that it describes. See `urdfkin explain urdf-to-dh`.
 
-    Exit 0: verified, or the compared table agrees. 1: the compared table differs, or agrees only while base,
-    tool and zeros absorb a mistake that is printed. 2: bad input. 3: not checked, or a strict table that
-    loses more to rounding than the robot itself.
+    Exit 0: verified, or the compared table agrees. 1: the compared table differs, or agrees only because
+    base, tool and zeros absorb a mistake, which is printed. 2: bad input. 3: not checked, or a strict table
+    that loses more to rounding than the robot itself.
     """
     from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415
 
     is_table = is_table_file(robot)
     options["format_"] = format_from_suffix(context, output, ENDINGS, "terminal")
-    _refuse_idle(context, is_table, options)
+    _reject_unused(context, is_table, options)
     check_writable(output)
     loaded = load_robot(robot, verify=verify)
     written = robot if is_table and not any(typed(context, name) for name in _DERIVED) else None

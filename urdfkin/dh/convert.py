@@ -1,18 +1,18 @@
-"""From one convention to the other: the same factors, bracketed differently.
+"""Convert a table to the other convention, to a kinematic tree, or to a URDF.
+
+Both conventions group the same factors differently:
 
     standard   base . (S_1 X_1) (S_2 X_2) ... (S_n X_n) . tool
     modified   base' . (X_0 S_1) (X_1 S_2) ... (X_{n-1} S_n) . tool'
 
-X_n moves into the tool on the way to modified, and X_0 into the base on the way back. Where base or tool is
-itself a step Tx(a) Rx(alpha), it moves into the row that gained a place, so that both ways undo each other.
+The conversion to modified moves X_n into the tool; the conversion to standard moves X_0 into the base. A base
+or a tool of the form Tx(a) Rx(alpha) moves into the free cells of the first or the last row. The two
+conversions are therefore inverse to each other.
 
-
-Back again: a table as a kinematic tree, with each joint standing on its Denavit-Hartenberg frame.
-
-In a standard table joint i turns about z_{i-1}, so its frame is frame i - 1, and the way to the next one is
-S_i X_i with the joint at zero: d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). In a modified table joint i turns
-about its own z_i, so its frame is frame i, reached by X_{i-1} S_i. The tree is what the recursion runs on,
-and what a URDF is written from.
+In a tree, each joint's frame is a Denavit-Hartenberg frame. In a standard table z_{i-1} is the axis of joint
+i, so its frame is frame i - 1. S_i X_i with the joint at zero leads to the next frame: d_{i-1,i} = d_i
+z_{i-1} + a_i x_i (7.64). In a modified table z_i is the axis of joint i, so its frame is frame i, and X_{i-1}
+S_i leads to it. The forward recursion uses this tree, and URDFs are written from it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from urdfkin.urdf.writer import to_urdf as write_urdf
 
 
 def to_convention(table: DHTable, convention: str) -> DHTable:
-    """The same table in a convention by name; raises InputError for an unknown one."""
+    """Return the same table in this convention; raise InputError for an unknown one."""
     wanted = convention_of(convention)
     if wanted is table.convention or not table.rows:
         return replace(table, convention=wanted)
@@ -35,7 +35,7 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
 
 
 def to_modified(table: DHTable) -> DHTable:
-    """A standard table as a modified one: row i takes a, alpha and beta from row i - 1."""
+    """Convert a standard table to a modified one: row i takes a, alpha and beta from row i - 1."""
     first = as_step(table.base)
     steps = [(*(first or (0.0, 0.0)), 0.0), *((row.a, row.alpha, row.beta) for row in table.rows[:-1])]
     base = np.eye(4) if first else table.base
@@ -43,7 +43,7 @@ def to_modified(table: DHTable) -> DHTable:
 
 
 def to_standard(table: DHTable) -> DHTable:
-    """A modified table as a standard one: row i takes a, alpha and beta from row i + 1."""
+    """Convert a modified table to a standard one: row i takes a, alpha and beta from row i + 1."""
     last = as_step(table.tool)
     steps = [*((row.a, row.alpha, row.beta) for row in table.rows[1:]), (*(last or (0.0, 0.0)), 0.0)]
     tool = np.eye(4) if last else table.tool
@@ -64,16 +64,17 @@ def _with(
     return replace(table, convention=convention, rows=rows, base=base, tool=tool)
 
 
-#: A sliding joint that no file bounds: a kilometre either way, m and m/s and N.
+#: Limits of a prismatic joint without limits: -1 km to 1 km, 1000 m/s, 1000 N.
 UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 
 def to_tree(table: DHTable) -> KinematicTree:
-    """The robot that the table describes, its root the table's base frame and its leaf the tip.
+    """Return the table's robot as a tree from the base frame to the tip.
 
-    Joint names, senses, limits and followers are the rows'. A leader that is not on the path gets a joint of
-    its own on a link beside the base, so that the coordinates stay the table's. A revolute joint without
-    limits becomes continuous; a sliding one gets a kilometre either way, since a URDF must say something.
+    Joint names, senses, limits and mimic rules are those of the rows. A mimicked joint outside the path
+    becomes a separate joint on the base, so that the coordinates are the table's. A revolute joint without
+    limits becomes continuous. A prismatic joint without limits gets -1 km to 1 km, because URDF requires
+    limits.
 
     Args:
         table: Any table.
@@ -95,12 +96,12 @@ def to_tree(table: DHTable) -> KinematicTree:
 
 
 def to_urdf(table: DHTable) -> str:
-    """A URDF of the table's robot, without shapes and masses; see `to_tree` for names and limits."""
+    """Return a URDF of the table's robot without shapes and masses; names and limits as in `to_tree`."""
     return write_urdf(to_tree(table))
 
 
 def free_tree(table: DHTable) -> KinematicTree:
-    """The same tree with followers set free: one coordinate a row, in row order."""
+    """Return the same tree without mimic rules: one coordinate for each row, in row order."""
     joints, here = list[tuple[Joint, str, str]](), link_names(table)
     poses = frame_poses(table)
     for i, row in enumerate(table.rows):
@@ -112,7 +113,7 @@ def free_tree(table: DHTable) -> KinematicTree:
 
 
 def frame_poses(table: DHTable) -> list[FloatArray]:
-    """Each joint's frame in the one before it, at zero, then the tip in the last joint's frame."""
+    """Return each joint's frame in the frame before it at zero, then the tip in the last joint's frame."""
     S = [row.S() for row in table.rows]
     X = [row.X for row in table.rows]
     if table.convention is Convention.STANDARD:
@@ -127,7 +128,7 @@ def frame_poses(table: DHTable) -> list[FloatArray]:
 
 
 def link_names(table: DHTable) -> list[str]:
-    """The base, a link for each row, the tip; no name twice."""
+    """Return unique link names: the base, a link for each row, and the tip."""
     names = [table.base_frame]
     names += [_new(f"{row.joint}_link", [*names, table.tip_frame]) for row in table.rows]
     return [*names, _new(table.tip_frame, names)]
@@ -145,7 +146,7 @@ def _fixed(name: str, T: FloatArray, table: DHTable) -> Joint:
 
 
 def _kind(row: DHRow) -> JointKind:
-    """By the row's own word, not by whether it turns: that the table's matrices ask, which check the URDF."""
+    """Return the kind of the row's joint in a URDF; a revolute joint without limits is continuous."""
     unbounded = row.kind is JointKind.REVOLUTE and not is_bounded(row.limit)
     return JointKind.CONTINUOUS if unbounded else row.kind
 

@@ -1,9 +1,13 @@
-"""From a chain of axes to a table: the canonical choices, in one pass from base to tip.
+"""Derive a Denavit-Hartenberg table from a chain of axes, in one pass from base to tip.
 
-docs/dh.md gives the reasons. In short: frame 0 at the foot of the base's origin on the first axis, x_0 the
-base's x projected; x_i along the common normal; between parallel axes d = 0 and the offset carried into the
-first row after the run; x_i turned round where theta would exceed a right angle; the last row takes the tip
-where four parameters can; a prismatic axis keeps the line that the URDF draws, except at the two ends.
+docs/dh.md gives the reasons for the canonical choices:
+
+- Frame 0 is at the foot of the perpendicular from the base's origin to the first axis. x_0 is the projection
+  of the base's x axis.
+- x_i is along the common normal. It is reversed where theta would exceed a right angle.
+- Between parallel axes d = 0. The first row after the run takes the offset.
+- The last row reaches the tip if four parameters suffice.
+- A prismatic axis is on the line that the URDF draws, except for the first and the last joint.
 """
 
 from __future__ import annotations
@@ -35,26 +39,26 @@ from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
 from urdfkin.model.chain import ChainJoint, FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: x is turned round when |theta| exceeds a right angle by more than this (rad): 1.5708 and 1.571 do not.
+#: x is reversed if |theta| exceeds a right angle by more than this (rad). 1.5708 and 1.571 do not.
 RIGHT_ANGLE_SLACK = 1e-3
 
 
 class Last(StrEnum):
-    """Where the tip goes: into the last row if that is exact, or into the tool."""
+    """Part of the table that reaches the tip: the last row where that is exact, or the tool."""
 
     TIP = "tip"
     FLANGE = "flange"
 
 
 class First(StrEnum):
-    """Where the way from the base to the first joint goes: into d_1 and theta_1, or into the base."""
+    """Part of the table with the transform from base to first joint: d_1 and theta_1, or the base."""
 
     BASE = "base"
     JOINT = "joint"
 
 
 class Sign(StrEnum):
-    """Which way x points: so that theta is no more than a right angle, or that a or alpha is not negative."""
+    """Direction of x: theta at most a right angle, or a (alpha) not negative."""
 
     THETA = "theta"
     A = "a"
@@ -62,14 +66,14 @@ class Sign(StrEnum):
 
 
 class Slide(StrEnum):
-    """Where the line of a sliding joint is: where the URDF draws it, or through a neighbour's axis."""
+    """Line of a prismatic joint: the one in the URDF, or one through the origin of a neighbouring joint."""
 
     DRAWN = "drawn"
     MINIMAL = "minimal"
 
 
 class ParallelOffset(StrEnum):
-    """Which row of a run of parallel axes gets the offset along them."""
+    """Row of a run of parallel axes that takes the offset along them."""
 
     LAST = "last"
     FIRST = "first"
@@ -98,7 +102,7 @@ def _choice(kind: type[_Choice], name: str, value: str) -> _Choice:
         return kind(value)
     except ValueError:
         known = " or ".join(repr(member.value) for member in kind)
-        raise InputError(f"unknown value for {name}", found=repr(value), remedy=f"say {known}") from None
+        raise InputError(f"unknown value for {name}", found=repr(value), remedy=f"write {known}") from None
 
 
 def choices_of(
@@ -113,7 +117,7 @@ def choices_of(
     sign: str = "theta",
     slide: str = "drawn",
 ) -> Choices:
-    """Options by name; raises InputError or UnknownNameError for what does not exist."""
+    """Return the options of these names; raise InputError or UnknownNameError for an unknown one."""
     names = [joint.name for joint in chain.joints]
     for name in flip:
         if name not in names:
@@ -131,13 +135,13 @@ def choices_of(
 
 
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
-    """The table of a chain: base . rows . tool equals the chain's placement for every q, to rounding.
+    """Return the table of a chain: base . rows . tool equals the chain's placement for every q, to rounding.
 
     Args:
         chain: The path.
         choices: The options.
-        like: A standard table of the same joints, whose directions of x, zeros of the first and the last
-            joint and offsets along parallel axes are taken, whatever the options say of these.
+        like: A standard table of the same joints. The result takes its directions of x, its zeros of the
+            first and the last joint, and its offsets along parallel axes. These override `choices`.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -153,7 +157,7 @@ def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> 
             PairLike(A, row, reach, noise, choices.near_parallel)
             for A, row, noise in zip(constants[1:-1], like.rows[:-1], between, strict=True)
         ]
-        tip = _passed_to_last(like, constants[-1], choices, end)
+        tip = _offset_for_last_row(like, constants[-1], choices, end)
         steps, thetas = steps_like(pairs, phi_in, carry, tip)
     if steps:
         phi_in, carry = steps[-1].phi_next, steps[-1].delta_next
@@ -179,7 +183,7 @@ def _table(
     steps: list[Step],
     ends: tuple[FloatArray, FloatArray],
 ) -> DHTable:
-    """Bracket the factors S_1 X_1 S_2 X_2 ... S_n X_n as the convention says."""
+    """Group the factors S_1 X_1 S_2 X_2 ... S_n X_n into rows by the convention."""
     if choices.convention is Convention.MODIFIED and turns:
         first = as_step(ends[0])
         a, alpha = first or (0.0, 0.0)
@@ -212,7 +216,7 @@ def _row(joint: ChainJoint, turn: tuple[float, float], step: Step, sense: int) -
 
 
 def _reversed_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
-    """The chain's constants with the z of some joints turned round, by half a turn about their x."""
+    """Return the chain's constants with the z axis of some joints reversed by a half turn about x."""
     constants = [np.array(A) for A in chain.constants]
     half = np.diag([1.0, -1.0, -1.0, 1.0])
     for i, joint in enumerate(chain.joints):
@@ -225,11 +229,12 @@ def _reversed_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]
 def _use_freedom_of_prismatic_axes(
     chain: FrameChain, constants: list[FloatArray], choices: Choices, reach: float
 ) -> None:
-    """Shift lines of sliding joints, which have a direction only: Tz(q) commutes with any translation.
+    """Choose the lines of prismatic joints, of which only the direction is defined.
 
-    The first joint's goes through the base's origin, so that the base can be the identity; the last one's
-    through the tip where that lets the last row take the tip. In strict tables a line that is nearly
-    parallel to a neighbour's is moved onto that neighbour, so that no foot is far away.
+    Tz(q) commutes with any translation, so a shift of the line changes no placement. The first joint's line
+    passes through the base's origin, so that the base can be the identity. The last joint's line passes
+    through the tip if the last row can then reach the tip. In strict tables a line that is nearly parallel to
+    a neighbouring axis passes through that joint's origin, so that no foot is far away.
     """
     slides = [not joint.kind.turns for joint in chain.joints]
     noise = noises(chain, reach)
@@ -255,7 +260,7 @@ def _use_freedom_of_prismatic_axes(
 
 
 def _onto_neighbour(constants: list[FloatArray], k: int, slides: list[bool]) -> bool:
-    """Move joint k's line through the origin of a turning neighbour, the next if it has one: a is 0 there."""
+    """Move joint k's line through the origin of a revolute neighbour (the next one first), so that a = 0."""
     if k + 1 < len(slides) and not slides[k + 1]:
         _shift_before(constants, k, constants[k + 1][:3, 3].copy())
         return True
@@ -278,13 +283,13 @@ def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) ->
 
 
 def _shift_after(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """Take all of the offset before joint k, given in its frame, and put it after the joint."""
+    """Move the whole offset before joint k, in the joint's frame, to the pose after the joint."""
     constants[k][:3, 3] = 0.0
     constants[k + 1][:3, 3] += offset
 
 
 def _shift_before(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """Take `offset` (in joint k's frame) from the pose after joint k and put it into the one before."""
+    """Move `offset` (in joint k's frame) from the pose after joint k to the pose before it."""
     constants[k][:3, 3] += constants[k][:3, :3] @ offset
     constants[k + 1][:3, 3] -= offset
 
@@ -293,16 +298,16 @@ def _shift_before(constants: list[FloatArray], k: int, offset: FloatArray) -> No
 
 
 def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, float, float]:
-    """T_base_0, then the turn and the offset along z_0 that lead to the first joint's frame."""
+    """Return T_base_0, and the angle about z_0 and the offset along it to the first joint's frame."""
     z, p = A[:3, 2], A[:3, 3]
     offset = cleaned_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
     base[:3, 3] = [cleaned_length(component, reach, noise.metres) for component in p - offset * z]
-    if tilt_of(A) <= noise.radians:  # the base's own z, either way up
+    if tilt_of(A) <= noise.radians:  # z_0 is the base's z axis or its reverse
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # (1, 0, 0) - z_0 z for a unit vector z: the difference itself would cancel where z is close to x.
+    # (1, 0, 0) - z_0 z for a unit vector z, without the cancellation of the difference for z close to x.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    if np.linalg.norm(x) < NEARLY_PARALLEL:  # the axis runs along the base's x, whose shadow is a point
+    if np.linalg.norm(x) < NEARLY_PARALLEL:  # the axis is along the base's x: project its y instead
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
     base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
@@ -312,7 +317,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, 
 
 
 def _clean_rotation(T: FloatArray) -> None:
-    """Entries of a rotation that are rounding noise become zero; lengths have their own scale."""
+    """Set the entries of the rotation that are rounding noise to zero."""
     R = T[:3, :3]
     R[np.abs(R) <= ENTRY * EPS] = 0.0
 
@@ -325,13 +330,13 @@ def _steps(
     choices: Choices,
     noise: Sequence[Noise],
 ) -> tuple[list[Step], list[float]]:
-    """The steps between consecutive axes and theta of each row, with x turned so that theta stays small."""
+    """Return the steps between consecutive axes and theta of each row, with x reversed where needed."""
     each = choices.parallel_offset is not ParallelOffset.LAST
     steps, thetas = list[Step](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
         step = step_between(lifted(A, carry), reach, choices.near_parallel, -phi_in, each, rounding)
         theta = cleaned_angle(phi_in + step.phi)
-        if _points_back(step, theta, choices.sign):
+        if _needs_reversal(step, theta, choices.sign):
             step = step.turned()
             theta = cleaned_angle(phi_in + step.phi)
         steps.append(step)
@@ -340,8 +345,8 @@ def _steps(
     return steps, thetas
 
 
-def _passed_to_last(like: DHTable, A: FloatArray, choices: Choices, noise: Noise) -> float | None:
-    """What gives the last joint the other table's d if passed on to it; None where tool or slide takes it."""
+def _offset_for_last_row(like: DHTable, A: FloatArray, choices: Choices, noise: Noise) -> float | None:
+    """Return the offset that gives the last row the other table's d; None if d is free or there is a tool."""
     row = like.rows[-1]
     if not row.kind.turns or not _has_no_tool(like) or not _representable(A, choices, noise):
         return None
@@ -355,7 +360,7 @@ def _has_no_tool(table: DHTable) -> bool:
 def _first_like(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Theta of the first row as another table has it, d where it is none there; the base takes the rest."""
+    """Give the first row another table's theta, and d = 0 where it has d = 0; the base takes the rest."""
     theta, d = first
     rest = (math.remainder(theta - row.theta, 2.0 * math.pi), 0.0 if row.d else d)
     if abs(rest[0]) > ANGLE * EPS or rest[1]:
@@ -367,7 +372,7 @@ def _first_like(
 def _last_like(
     like: DHTable, theta: float, d: float, last: Step, tool: FloatArray
 ) -> tuple[float, float, Step, FloatArray]:
-    """The last row's own numbers if it ends where the other one does, else the other's, and a tool."""
+    """Return the last row's own numbers if it ends like the other table's; else the other's, and a tool."""
     row = like.rows[-1]
     as_there = _has_no_tool(like) and np.array_equal(tool, np.eye(4))
     if as_there and abs(math.remainder(theta - row.theta, 2.0 * math.pi)) < RIGHT_ANGLE_SLACK:
@@ -382,8 +387,8 @@ def _last_like(
     return row.theta, height, Step(0.0, 0.0, row.a, row.alpha, 0.0, 0.0, 0.0), tool
 
 
-def _points_back(step: Step, theta: float, sign: Sign) -> bool:
-    """Whether x is to be turned round; what says nothing (a = 0, alpha = 0 or pi) leaves it to the other."""
+def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
+    """Whether x must be reversed. Where a = 0, alpha decides; where alpha is 0 or pi, a decides."""
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
     if sign is Sign.THETA or (not step.a and not by_alpha):
         return abs(theta) > math.pi / 2.0 + RIGHT_ANGLE_SLACK
@@ -391,7 +396,7 @@ def _points_back(step: Step, theta: float, sign: Sign) -> bool:
 
 
 def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:
-    """Whether Rz Tz Tx Rx (standard) or Rz Tz (modified) is all of A."""
+    """Whether A has the form Rz Tz Tx Rx (standard) or Rz Tz (modified)."""
     if choices.last is Last.FLANGE:
         return False
     x_along_z, lateral = abs(A[2, 0]), abs(A[0, 0] * A[1, 3] - A[1, 0] * A[0, 3])
@@ -404,7 +409,7 @@ def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:
 def _last(
     A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: Noise
 ) -> tuple[float, float, Step, FloatArray]:
-    """theta, d and the step of the last row, and the tool; `A` is measured from O_{n-1}."""
+    """Return theta, d and the step of the last row, and the tool; `A` is measured from O_{n-1}."""
     if _representable(A, choices, noise):
         phi = math.atan2(A[1, 0], A[0, 0])
         a = cleaned_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)
@@ -426,7 +431,7 @@ def _last(
 def _offsets_first(rows: list[tuple[float, float]], steps: list[Step]) -> list[tuple[float, float]]:
     """Move the offsets of each run of parallel axes into the run's first row.
 
-    An offset slides through Tx(a) Rx(0 or pi) unchanged but for its sign.
+    An offset commutes with Tx(a) Rx(0), and changes its sign with Tx(a) Rx(pi).
     """
     moved = list(rows)
     for i in range(len(steps) - 1, -1, -1):

@@ -1,8 +1,8 @@
-r"""A cell as people write it: `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}`, `180°`.
+r"""Parse a cell of a table, such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`.
 
-A cell is a sum: at most one of its terms is the joint's variable, the others are numbers, multiples of pi, in
-a unit that the cell says or not. What a cell may not be is refused here; what its numbers mean where no unit
-is said, and which cells may have a variable, is for the row to know (`urdfkin.dh.rows`).
+A cell is a sum. At most one term is the joint's variable; the others are numbers or multiples of pi, with or
+without a unit. Invalid cells are rejected here. `urdfkin.dh.rows` supplies a missing unit, and decides which
+cells may have a variable.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from urdfkin.errors.numbers import UNITS
 
-#: Signs and letters of pages, PDFs and LaTeX -> what they mean.
+#: Characters of web pages, PDFs and LaTeX -> plain text.
 _SAME = str.maketrans(
     {
         **dict.fromkeys("\u2212\u2013\u2010\u2011\ufe63", "-"),
@@ -50,19 +50,19 @@ _LONGEST = 200
 
 
 class NoCellError(ValueError):
-    """A text that is no cell; its message says what of it is not understood."""
+    """A text that is not a cell; the message names the invalid part."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What a cell says.
+    """The content of a cell.
 
     Attributes:
-        number: The constant part, in `unit`, or in whatever the table's is.
-        unit: "rad", also for a multiple of pi, "deg", "m" or "mm"; None if the cell says none.
-        times: What the joint's variable is multiplied by; None where the cell has no variable.
-        variable: Its number, q3 is 3; None if it has none.
-        text: The one number that the constant is, as written; "" where it is computed.
+        number: The constant part, in `unit`, or in the table's unit if that is None.
+        unit: "rad" (also for a multiple of pi), "deg", "m" or "mm"; None without a unit.
+        times: Factor of the joint's variable; None without a variable.
+        variable: Number of the variable (3 for q3); None without a number.
+        text: The constant's text if it is a single number; "" if it is computed.
     """
 
     number: float
@@ -73,7 +73,7 @@ class Cell:
 
 
 def spelled(text: str) -> str:
-    r"""A text of a page or of LaTeX in plain letters.
+    r"""Convert a text with symbols or LaTeX to plain letters.
 
     >>> spelled("−π/2"), spelled(r"$\frac{\pi}{2} + \theta_{1}$").split(), spelled("θ₁*")
     ('- pi /2', ['pi/2', '+', 'theta_{1}'], 'theta1*')
@@ -84,10 +84,10 @@ def spelled(text: str) -> str:
 
 
 def cell_of(written: str) -> Cell:
-    """What a cell says.
+    """Parse a cell.
 
     Raises:
-        NoCellError: with what is not understood.
+        NoCellError: an invalid cell; the message names the invalid part.
 
     Example:
         >>> cell_of("-q2 + 90°")
@@ -121,7 +121,7 @@ def cell_of(written: str) -> Cell:
 
 @dataclass(slots=True)
 class _Term:
-    """What stands between two signs."""
+    """A term: the text between two signs."""
 
     sign: float = 1.0
     size: float | None = None
@@ -140,7 +140,7 @@ class _Term:
         return self.size is None and not self.variable
 
     def take(self, token: str, kind: str) -> None:
-        """One token more; NoCellError for one that cannot stand here."""
+        """Add a token; raise NoCellError if it is invalid here."""
         divides, joined = self.operator == "/", self.operator == ""
         if kind == "sign" and not self.is_empty and joined:
             self.operator = token

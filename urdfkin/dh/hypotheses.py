@@ -1,15 +1,12 @@
-"""The few ways in which a table is misread: convention, units, and what its columns are called.
+"""Read a table under other conventions, units and column names, to find a misread table.
 
-Each is another reading of the same plain data (`urdfkin.dh.rows` says what stands in them), made by changing
-what the data say and reading them again; so whatever a table may not be, an angle of eighty turns say, rules
-a reading out by itself.
+`other_readings` changes the convention, units or column names of the same data (`urdfkin.dh.rows` defines
+their form) and parses them again. A reading with an impossible value, such as an angle of eighty turns, is
+rejected by the parser.
 
-
-What looks misread in a table that nothing is held against: its units, or two of its columns.
-
-Right angles and their thirds are what designers choose for angles, and hardly ever for lengths; and an arm
-is some centimetres to some metres long. A table that is the other way round was meant otherwise. Where there
-is a URDF, `urdfkin.dh.compare.slips` knows instead of guessing.
+`doubts` finds a suspicious table without a URDF. It checks the units, and whether two columns are exchanged.
+Designers choose right angles and thirds of them for angles, and hardly ever such numbers for lengths. An arm
+is between some centimetres and some metres long. With a URDF, `urdfkin.dh.compare.slips` decides exactly.
 """
 
 from __future__ import annotations
@@ -25,7 +22,7 @@ from urdfkin.dh.table import Convention, DHTable, convention_of, looks_round
 from urdfkin.dh.units import Angles, Lengths, units_of
 from urdfkin.errors import InputError
 
-#: What a reading does not need: it is about the four cells of each row, and the ends are fitted.
+#: Keys of a row that a reading uses, and keys of a table that it ignores because base and tool are fitted.
 _CELLS = ("joint", "kind", "sense", "beta", *ORDER)
 _ENDS = ("base", "tool", "coordinates")
 
@@ -35,10 +32,10 @@ class ConventionHypothesis:
     """One way to read a table.
 
     Attributes:
-        convention: Standard or modified; None where a table names none.
+        convention: Standard or modified; None if the table names none.
         lengths: Metres or millimetres.
         angles: Radians or degrees.
-        columns: What the columns that are called a, alpha, d, theta (or come in this order) really hold.
+        columns: True contents of the columns named a, alpha, d, theta (or in this order).
     """
 
     convention: Convention | None
@@ -47,7 +44,7 @@ class ConventionHypothesis:
     columns: tuple[str, ...] = ORDER
 
     def of(self, data: Mapping[str, Any]) -> DHTable:
-        """The table that the data are, read so, without base and tool; InputError where it cannot be one."""
+        """Return the table under this reading, without base and tool; raise InputError if it is invalid."""
         said = {"convention": self.convention, "lengths": self.lengths, "angles": self.angles}
         rows = [self._row(row) for row in data["rows"]]
         return table_from_mapping({**_bare(data), **said, "rows": rows})
@@ -57,31 +54,31 @@ class ConventionHypothesis:
         return {meant.get(key, key): value for key, value in row.items()}
 
     def slips(self, other: ConventionHypothesis) -> int:
-        """How many things differ from another reading; a pair of columns that changed places is one."""
+        """Count the differences from another reading; two exchanged columns count as one."""
         moved = sum(mine != theirs for mine, theirs in zip(self.columns, other.columns, strict=True))
-        return len(self._said_differently(other)) + (moved + 1) // 2
+        return len(self._differences(other)) + (moved + 1) // 2
 
     def words(self, other: ConventionHypothesis) -> str:
-        """What is to be said differently, from another reading: modified, millimetres, columns ..."""
-        words = self._said_differently(other)
+        """Describe the differences from another reading: modified, millimetres, columns ..."""
+        words = self._differences(other)
         if self.columns != other.columns:
             words.append(f"its columns {', '.join(ORDER)} as {', '.join(self.columns)}")
         return ", ".join(words)
 
-    def _said_differently(self, other: ConventionHypothesis) -> list[str]:
+    def _differences(self, other: ConventionHypothesis) -> list[str]:
         mine, theirs = ((one.convention, one.lengths, one.angles) for one in (self, other))
         return [str(word) for word, instead in zip(mine, theirs, strict=True) if word is not instead]
 
 
 def as_said(data: Mapping[str, Any]) -> ConventionHypothesis:
-    """How the data say that they are to be read; InputError for a convention or a unit that is none."""
+    """Return the reading that the data name; raise InputError for an unknown convention or unit."""
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
     convention = convention_of(data["convention"]) if "convention" in data else None
     return ConventionHypothesis(convention, units.lengths, units.angles)
 
 
 def other_readings(data: Mapping[str, Any]) -> Iterator[tuple[ConventionHypothesis, DHTable]]:
-    """Every other way to read a table in which it is one, the fewest slips first."""
+    """Yield every other reading that gives a valid table, the fewest differences first."""
     if not _has_rows(data):
         return
     data, said = {**data, "rows": [_row(row) for row in data["rows"]]}, as_said(data)
@@ -105,17 +102,17 @@ def _bare(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _row(row: Mapping[str, Any] | Sequence[Any]) -> dict[str, Any]:
-    """A row of a file's data by name, without followers and limits."""
+    """Return a row of a file's data by name, without mimic rules and limits."""
     named = row if isinstance(row, Mapping) else dict(zip((*ORDER, "kind"), row, strict=False))
     return {key: value for key, value in named.items() if key in _CELLS}
 
 
-#: Metres: a row of an arm is not longer, nor is a thousandth of it shorter than a millimetre.
+#: Range of plausible lengths in a row of an arm (metres).
 _LONGEST, _SHORTEST = 20.0, 1e-3
 
 
 def doubts(table: DHTable) -> list[str]:
-    """What looks misread, in sentences that say what to write instead.
+    """Return warnings about units or columns that look misread, each with its remedy.
 
     Example:
         >>> from urdfkin.dh.rows import table_from_rows
@@ -148,6 +145,6 @@ def doubts(table: DHTable) -> list[str]:
             and not any(map(looks_round, called_angles))
         ):
             found.append(
-                f"the columns {length} and {angle} look exchanged: the round angles stand in {length}"
+                f"the columns {length} and {angle} look exchanged: {length} contains the round angles"
             )
     return found

@@ -1,4 +1,4 @@
-"""`dh_table`: a tree, two frames and a few choices in, a table out."""
+"""Make the Denavit-Hartenberg table of the path between two frames of a robot."""
 
 from __future__ import annotations
 
@@ -30,39 +30,39 @@ def dh_table(
     slide: str = "drawn",
     like: DHTable | None = None,
 ) -> DHTable:
-    """The Denavit-Hartenberg table of the path between two frames, exact to rounding.
+    """Return the Denavit-Hartenberg table of the path between two frames, exact to rounding.
 
     Args:
         tree: The robot.
         tip: Name of a link or joint frame.
-        base: Likewise; the root link when None.
-        convention: "standard" (distal, the text's) or "modified" (proximal, Craig's).
-        near_parallel: "hayati" gives nearly parallel axes a fifth parameter beta; "strict" keeps to four,
-            which may need offsets of kilometres.
-        snap: Radians: angles within this of a multiple of 15 degrees are made round, and the table's `snap`
-            says what that moved. 0 leaves every angle as the file has it.
-        last: "tip" lets the last row reach the tip where four parameters can; "flange" leaves the tip to
+        base: Name of a link or joint frame; the root link when None.
+        convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
+        near_parallel: "hayati" gives nearly parallel axes a fifth parameter beta; "strict" uses the four
+            parameters, with possible offsets of kilometres.
+        snap: Tolerance in radians. Angles within it of a multiple of 15 degrees become that multiple, and the
+            table's `snap` reports the effect. 0 leaves every angle as it is in the file.
+        last: "tip" lets the last row reach the tip where four parameters suffice; "flange" puts the rest into
             the tool.
-        parallel_offset: Which row of a run of parallel axes has the offset along them: the "last" (first
-            after the run), the "first", or "each" its own link's.
-        flip: Names of joints to count the other way; their rows get sense -1.
-        first: "base" puts the way from the base to the first axis into d_1 and theta_1 where it can; "joint"
-            into the base, so that d_1 and theta_1 are zero (Craig's frame 0).
-        sign: Which way x points: "theta" keeps theta within a right angle, "a" and "alpha" keep that cell
-            from being negative.
-        slide: Where the line of a sliding joint is, which has a direction only: "drawn" as in the URDF, or
-            "minimal", through the next turning axis' origin, so that its a is zero.
-        like: A published table: its senses, directions of x, zeros of the first and last joint and offsets
-            along parallel axes are taken, with the URDF's own numbers, base and tool; `flip`, `first`,
-            `last`, `sign` and `parallel_offset` then have no say.
+        parallel_offset: Row that takes the offset along a run of parallel axes: the "last" (the first row
+            after the run), the "first", or "each" row its own link's.
+        flip: Names of joints to reverse; their rows have sense -1.
+        first: "base" puts the transform from the base to the first axis into d_1 and theta_1 where possible;
+            "joint" puts it into the base, so that d_1 and theta_1 are zero (Craig's frame 0).
+        sign: Direction of x: "theta" limits theta to a right angle; "a" and "alpha" make that cell not
+            negative.
+        slide: Line of a prismatic joint, of which only the direction is defined: "drawn" as in the URDF, or
+            "minimal", through the origin of the next revolute joint, so that a = 0.
+        like: A published table. The result takes its senses, directions of x, zeros of the first and last
+            joint, and offsets along parallel axes. The lengths, angles, base and tool are the URDF's. `flip`,
+            `first`, `last`, `sign` and `parallel_offset` are then ignored.
 
     Raises:
         UnknownNameError: a frame or a joint that does not exist.
-        InputError: an option's value, or a planar or floating joint on the way.
-        RangeError: lengths whose squares leave the range of doubles.
+        InputError: an invalid value of an option, or a planar or floating joint on the path.
+        RangeError: lengths with squares outside the range of doubles.
     """
     exact = chain(tree, tip, base)
-    # The whole way counts, whatever part of it the table is of: Pinocchio measures from the root.
+    # Check the whole path from the root, because Pinocchio measures from the root.
     ends = [tip] if base is None else [base, tip]
     demand_squares(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
     choices = choices_of(

@@ -1,9 +1,9 @@
-"""The URDF's own numbers in the frames of a published table: its senses, its directions of x, its zeros.
+"""Derive a table with the URDF's numbers in the frames of a published table.
 
-A table leaves signs to its author: which way each joint counts, which way x points. Every pattern of senses
-with which the URDF's axes come near the table's cells is derived, and the one is taken whose cells are the
-table's, whose zeros are, and whose base and tool are, in this order: Kinova's first joint so counts the other
-way, and its frame 0 stands upright as on the sheet.
+The author of a table chooses the sense of each joint and the direction of each x. For every pattern of senses
+that fits the published table approximately, a table is derived. The result is the table closest to the
+published one: first in its cells, then in its zeros, then in base and tool. For Kinova, for example, the
+first joint has sense -1, and frame 0 is upright as in the data sheet.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors import InputError, Question
 from urdfkin.model.chain import FrameChain
 
-#: Of the reach, or radians: cells that differ by more are another robot's; zeros that do are other zeros.
+#: Differences (relative to the reach, or in rad) of the cells of another robot, and of different zeros.
 _ANOTHER, _OTHER = 0.1, 1e-2
-#: Likewise: cells that differ by less are equal.
+#: Cells with a smaller difference (relative to the reach, or in rad) are equal.
 _ROUNDING = 1e-12
 
 
 def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
-    """A chain's table in the frames of another table, in the convention that the choices say.
+    """Return a chain's table in the frames of another table, in the convention of `choices`.
 
     Args:
         chain: The path.
-        choices: The options; `flip` holds the senses (`reversed_like`).
+        choices: The options, with `flip` from `reversed_like`.
         reference: The other table.
     """
     standard = replace(choices, convention=Convention.STANDARD)
@@ -40,45 +40,46 @@ def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTa
 
 
 def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tuple[str, ...]:
-    """The joints that count the other way in a table than in the URDF.
+    """Return the joints with opposite senses in the table and in the URDF.
 
     Raises:
-        InputError: the table has other joints, or is another robot's.
+        InputError: the table has other joints, or describes another robot.
     """
     check_joints(chain, reference)
     there = to_convention(reference, "standard")
     ends = replace(there, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
     patterns = [one.senses for one in align(chain, ends)]
-    # What the first and the last joint count, base and tool take up.
+    # Base and tool absorb the senses of the first and the last joint.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
     for senses in dict.fromkeys(patterns):
         reversed_ = tuple(name for name, sense in zip(names, senses, strict=True) if sense < 0)
         found = derive(chain, replace(choices, convention=Convention.STANDARD, flip=reversed_), there)
-        if (unlike := _unlike(found, there, chain.reach or 1.0)) < best:
-            best, flip = unlike, reversed_
+        if (key := _difference_key(found, there, chain.reach or 1.0)) < best:
+            best, flip = key, reversed_
     if best[0] > _ANOTHER:
         raise InputError(
-            "the table to be like is of another robot",
+            "the table for `like` describes another robot",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
-            found=f"cells that differ by {best[0]:.0%} of the reach, or so many radians",
-            remedy="hold it against the URDF with --compare, which says what differs",
+            found=f"cells that differ by {best[0]:.0%} of the reach, or by {best[0]:.2g} rad",
+            remedy="compare it with the URDF by --compare, which reports the differences",
             question=Question.DH_AND_URDF_DISAGREE,
         )
     return flip
 
 
-def _unlike(found: DHTable, there: DHTable, reach: float) -> tuple[float, int, int, float, int]:
-    """How unlike two tables are: in cells, by powers of ten, in zeros and signs of d, base and tool, senses.
+def _difference_key(found: DHTable, there: DHTable, reach: float) -> tuple[float, int, int, float, int]:
+    """Return a key that ranks tables by their difference; the smallest is the best.
 
-    A slide's line may be anywhere, so that the cells that tell of it decide between equals only.
+    The key compares, in this order: the cells, their power of ten, zeros and signs of d, base and tool,
+    senses. The line of a prismatic joint is free, so cells that depend on it only affect the power of ten.
     """
     n, cells, lines, zeros = len(found.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(found.rows, there.rows, strict=True)):
         apart = abs(row.a - other.a) / reach
-        if i < n - 1:  # base and tool take up what leads to the first axis and away from the last
+        if i < n - 1:  # base and tool absorb the transforms before the first and after the last axis
             placed = row.kind.turns and found.rows[i + 1].kind.turns
             cells = max(cells, abs(_angle(row.alpha, other.alpha)), apart * placed)
             lines = max(lines, abs(row.beta - other.beta), apart)

@@ -1,8 +1,8 @@
-"""Velocity, Jacobian and acceleration of a table: the text's recursion run on its own frames.
+"""Compute velocity, Jacobian and acceleration of a table by the textbook's recursion on the table's frames.
 
-Equations 7.85 and 7.127 to 7.130, with d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). The recursion exists once
-(`urdfkin.compiled`); it runs here on the tree whose joints stand on the table's frames. Followers are free
-joints there, and the coupling values = G q + g is applied outside: J = J_rows G.
+Equations 7.85 and 7.127 to 7.130, with d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). The forward recursion is
+that of `urdfkin.compiled`. It runs on a tree with its joint frames at the table's frames. In this tree mimic
+joints are free; the coupling values = G q + g is applied outside it: J = J_rows G.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-#: How many tables' plans are kept at a time.
+#: Number of compiled tables in the cache.
 _TABLES = 64
 
 
 @lru_cache(_TABLES)
 def plan_of(table: DHTable) -> CompiledTree:
-    """The walk over a table's frames to its tip."""
+    """Return the compiled tree of a table's frames, base to tip."""
     tree = free_tree(table)
     return compile_tree(tree, [len(tree.links) - 1])
 
@@ -34,12 +34,12 @@ def plan_of(table: DHTable) -> CompiledTree:
 def jacobian(
     table: DHTable, q: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
-    """(..., 6, coordinates) Jacobian of the tip in the base frame, [linear; angular]: 7.85.
+    """Return the (..., 6, coordinates) Jacobian of the tip, [linear; angular] (7.85).
 
     Args:
         table: Any table.
         q: (..., coordinates) in the order of `joint_names`, rad or m, or a mapping by name.
-        reference: As everywhere; the world is the table's base frame.
+        reference: LOCAL, WORLD or LOCAL_WORLD_ALIGNED; the world is the table's base frame.
 
     Raises:
         InputError: `q` has the wrong length.
@@ -52,49 +52,49 @@ def jacobian(
 def velocity(
     table: DHTable, q: Given, v: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
-    """(..., 6) velocity of the tip in the base frame, [linear; angular]: 7.127, 7.128.
+    """Return the (..., 6) velocity of the tip, [linear; angular] (7.127, 7.128).
 
     Args:
         table: Any table.
         q: (..., coordinates), rad or m, or a mapping by name.
         v: (..., coordinates), rad/s or m/s; batches broadcast.
-        reference: As everywhere; the world is the table's base frame.
+        reference: LOCAL, WORLD or LOCAL_WORLD_ALIGNED; the world is the table's base frame.
 
     Raises:
         InputError: an array has the wrong length.
     """
-    shape, (values, rates) = _flat(table, table.coupling.values(q), _rates(table, v, "v"))
+    shape, (values, rates) = _flat(table, table.coupling.values(q), _joint_derivatives(table, v, "v"))
     return velocities(plan_of(table), values, rates, Reference.of(reference)).reshape(*shape, 6)
 
 
 def acceleration(
     table: DHTable, q: Given, v: Given, a: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
-    """(..., 6) classical acceleration of the tip in the base frame, [linear; angular]: 7.129, 7.130.
+    """Return the (..., 6) classical acceleration of the tip, [linear; angular] (7.129, 7.130).
 
     Args:
         table: Any table.
         q: (..., coordinates), rad or m, or a mapping by name.
         v: (..., coordinates), rad/s or m/s.
         a: (..., coordinates), rad/s^2 or m/s^2; batches broadcast.
-        reference: As everywhere; the world is the table's base frame.
+        reference: LOCAL, WORLD or LOCAL_WORLD_ALIGNED; the world is the table's base frame.
 
     Raises:
         InputError: an array has the wrong length.
     """
-    arrays = (table.coupling.values(q), _rates(table, v, "v"), _rates(table, a, "a"))
-    shape, (values, rates, rates_of_rates) = _flat(table, *arrays)
-    found = accelerations(plan_of(table), values, rates, rates_of_rates, Reference.of(reference))
+    arrays = (table.coupling.values(q), _joint_derivatives(table, v, "v"), _joint_derivatives(table, a, "a"))
+    shape, (values, velocities_, accelerations_) = _flat(table, *arrays)
+    found = accelerations(plan_of(table), values, velocities_, accelerations_, Reference.of(reference))
     return found.reshape(*shape, 6)
 
 
-def _rates(table: DHTable, rates: Given, what: str) -> FloatArray:
-    """(..., rows) rates of all joints from rates of the coordinates."""
+def _joint_derivatives(table: DHTable, rates: Given, what: str) -> FloatArray:
+    """Return (..., rows) velocities or accelerations of all joints from those of the coordinates."""
     return table.coupling.checked(rates, what) @ table.coupling.matrix.T
 
 
 def _flat(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """The common batch shape, and the arrays broadcast to it as (n, rows)."""
+    """Return the common batch shape, and the arrays broadcast to it with shape (n, rows)."""
     shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     rows = len(table.rows)
     wide = [np.broadcast_to(array, (*shape, rows)).reshape(math.prod(shape), rows) for array in arrays]

@@ -1,15 +1,14 @@
-"""Lengths with which a table can be computed and checked: their squares are still doubles.
+"""Decide which tilts and offsets of a chain are rounding noise, and reject lengths that are too large.
 
-What of a chain's constants is rounding: a tilt or an offset below this is none.
+Two correct programs read the same URDF and compute slightly different constant poses between two joint axes.
+The program that wrote the file may also have rounded each angle to fifteen digits.
+`urdfkin.kinematics.roundings` counts both effects. Angles of fourteen or fifteen digits are therefore treated
+as round: 1.5707963267949 and 3.14159265358979 differ by 15 eps from a multiple of a right angle. An angle of
+twelve digits differs by 900 eps or more and is not treated as round. `snap` makes it round and states the
+effect.
 
-Two correct programs that read one URDF do not get the same constant pose between two joint axes, and what
-wrote the file was a program as well, which may have kept fifteen digits of each angle.
-`urdfkin.kinematics.roundings` counts both. So angles of fourteen or fifteen digits (1.5707963267949 is 15 eps
-off a right angle, 3.14159265358979 as much) are round. One of twelve digits, 900 eps off and more, is not:
-what makes that one round is `snap`, which says what it moves.
-
-A tilt below this is zero in a table: no row is spent on it, and no foot stands at its inverse. It is counted
-by `left_out`, by which a table may then differ.
+A tilt below the noise is zero in a table. The axes then count as parallel, and no distant foot arises.
+`left_out` adds up these tilts; a table may differ from the URDF by their sum.
 """
 
 from __future__ import annotations
@@ -26,39 +25,39 @@ from urdfkin.kinematics.roundings import AXES, CONSTANT, EPS, SUMMED, WRITTEN
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Metres: beyond it squares of sums, of which common normals and the bounds of the check are made, overflow.
+#: Largest length (metres). The squares of sums of longer ones overflow in common normals and bounds.
 LONGEST = 1e150
 
 
 def demand_squares(joints: Iterable[Joint]) -> None:
-    """Every joint's offset can be squared.
+    """Check that the square of each joint's offset is a finite double.
 
     Raises:
-        RangeError: one of them cannot.
+        RangeError: an offset is longer than `LONGEST`.
     """
     for joint in joints:
-        _demand(f"joint {joint.name}", float(np.abs(joint.T_parent_joint[:3, 3]).max()))
+        _check_length(f"joint {joint.name}", float(np.abs(joint.T_parent_joint[:3, 3]).max()))
 
 
 def demand_squares_of(chain: FrameChain, table: DHTable) -> None:
-    """Every length of a path and of a table can be squared.
+    """Check that the square of each length of a path and of a table is a finite double.
 
     Raises:
-        RangeError: one of them cannot.
+        RangeError: a length is larger than `LONGEST`.
     """
     for i, row in enumerate(table.rows):
         for name, length in (("a", row.a), ("d", row.d)):
-            _demand(f"the table, row {i + 1}, {name}", abs(length))
+            _check_length(f"the table, row {i + 1}, {name}", abs(length))
     for name, T in (("base", table.base), ("tool", table.tool)):
-        _demand(f"the table, {name}", float(np.abs(T[:3, 3]).max()))
+        _check_length(f"the table, {name}", float(np.abs(T[:3, 3]).max()))
     for A in chain.constants:
-        _demand(f"{chain.robot}, {chain.base} to {chain.tip}", float(np.abs(A[:3, 3]).max()))
+        _check_length(f"{chain.robot}, {chain.base} to {chain.tip}", float(np.abs(A[:3, 3]).max()))
 
 
-def _demand(where: str, length: float) -> None:
+def _check_length(where: str, length: float) -> None:
     if length > LONGEST:
         raise RangeError(
-            "a table needs the squares of lengths, and they leave the range of double precision",
+            "the square of this length is outside the range of double precision",
             where=where,
             found=f"{length:.3g} m",
             remedy="give smaller numbers",
@@ -67,19 +66,19 @@ def _demand(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Below what an angle (radians) and a length (metres) of one constant pose are rounding."""
+    """Largest angle (radians) and length (metres) of a constant pose that count as rounding."""
 
     radians: float
     metres: float
 
 
 def noise_of(joints: int, length: float, reach: float) -> Noise:
-    """The noise of a constant pose.
+    """Return the noise of a constant pose.
 
     Args:
-        joints: How many URDF joints' constants are multiplied into it.
-        length: Metres: their offsets added up.
-        reach: Metres: the whole way, from which the pose is measured.
+        joints: Number of URDF joints with constants in the pose.
+        length: Sum of their offsets (metres).
+        reach: Length of the whole path (metres).
 
     Example:
         >>> round(noise_of(1, 0.1, 1.0).radians / EPS, 1), round(noise_of(1, 0.1, 1.0).metres / EPS, 1)
@@ -90,7 +89,7 @@ def noise_of(joints: int, length: float, reach: float) -> Noise:
 
 
 def noises(chain: FrameChain, reach: float) -> list[Noise]:
-    """The noise of each of a chain's constants."""
+    """Return the noise of each constant of a chain."""
     return [
         noise_of(joints, float(length), reach)
         for joints, length in zip(chain.folded, chain.lengths, strict=True)
@@ -98,9 +97,9 @@ def noises(chain: FrameChain, reach: float) -> list[Noise]:
 
 
 def left_out(chain: FrameChain) -> float:
-    """Radians: all tilts of a chain that are taken for rounding, added up.
+    """Return the sum of all tilts of a chain that count as rounding (rad).
 
-    Between axes it is the second axis that leans against the first; at the tip its x may lean, too.
+    It includes the tilts between consecutive axes, and tilts of x axes such as the tip's.
     """
     found = 0.0
     for A, noise in zip(chain.constants, noises(chain, 0.0), strict=True):
@@ -109,5 +108,5 @@ def left_out(chain: FrameChain) -> float:
 
 
 def tilt_of(A: FloatArray) -> float:
-    """The sine of the angle between the two z axes of a pose."""
+    """Return the sine of the angle between the two z axes of a pose."""
     return math.hypot(A[0, 2], A[1, 2])

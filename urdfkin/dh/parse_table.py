@@ -1,12 +1,11 @@
-"""Tables as people have them: from a spreadsheet, a README, a paper, a web page, or as urdfkin prints them.
+"""Read tables from files: TOML and JSON, and text from a spreadsheet, README, paper or web page.
 
-Whatever separates the cells (commas, semicolons, tabs, bars, ampersands, blanks), there is a line of
-headings with a, alpha, d and theta among them, in any order, and a line for each joint below it. What stands
-around the table is searched for the convention, names, base and tool. The result is plain data for
-`urdfkin.dh.rows`: nothing is guessed here, and a table that does not say its convention is refused there.
+`urdfkin.dh.rows` defines the content of TOML and JSON files.
 
-
-Tables from files: TOML and JSON (`urdfkin.dh.rows` says what stands in them), and sheets of text.
+A table in text has a line of headings, with a, alpha, d and theta in any order, and below it a line for each
+joint. Commas, semicolons, tabs, bars, ampersands or blanks separate the cells. The lines around the table may
+give the convention, names, base and tool. urdfkin's own printed tables have this form. The result is plain
+data for `urdfkin.dh.rows`. Nothing is guessed: a table without a convention is an error there.
 """
 
 from __future__ import annotations
@@ -34,15 +33,15 @@ from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation.matrix import ROUNDED, polar_factor
 from urdfkin.system.files import read_text
 
-#: How far a rotation that was printed with six digits is from one; what is farther was meant otherwise.
+#: Largest difference of a printed rotation (six digits) from a rotation; a larger one is not corrected.
 _PRINTED = 1e-5
-#: In how many lines behind its heading the three rows of a pose stand, fences and blank lines among them.
+#: Number of lines after its heading that contain the three rows of a pose, with fences and blank lines.
 _POSE_LINES = 6
-#: What may be said in a line of its own, `convention: modified`, with or without a comment mark.
-_SAID = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
-#: In a file of separated values each `# key: value` is meant; a key that is none is refused with the others.
+#: A setting in a line of its own, such as `convention: modified`, with or without a comment mark.
+_SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
+#: In a CSV file each `# key: value` is a setting; `table_from_mapping` rejects an unknown key.
 _KEY = re.compile(r"^#?\s*(\w+)\s*:\s*([^,;\t].*)$")
-#: Columns whose names are taken as they are: the ones that urdfkin writes.
+#: Names of columns that urdfkin writes; they have no synonyms.
 _OWN = ("leader", "multiplier", "lower", "upper", "velocity", "effort", "sense")
 _NAMES = {
     **dict.fromkeys(("a", "link length", "length"), "a"),
@@ -55,7 +54,7 @@ _NAMES = {
     **dict.fromkeys(("kind", "type", "sigma", "joint type"), "kind"),
 }
 _KINDS = {"0": "R", "1": "P"}
-#: Headings of columns that count rows.
+#: Headings of columns with row numbers.
 _COUNTS = ("", "i", "j", "n", "#", "no", "row", "link", "index")
 _CONVENTIONS = {
     "modified": r"\b(?:modified|craig(?:'s)?|proximal|mdh)\b",
@@ -68,10 +67,10 @@ _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
 
 
 def from_sheet(text: str) -> dict[str, Any]:
-    """The plain data of a table in a text.
+    """Return the plain data of a table in a text.
 
     Raises:
-        InputError: no line of headings, a row with another number of cells, a cell that is none.
+        InputError: no line of headings, a row with another number of cells, or an invalid cell.
     """
     lines = text.lstrip("\ufeff").splitlines()
     for form in (_latex, _bars, _separated, _aligned):
@@ -80,9 +79,9 @@ def from_sheet(text: str) -> dict[str, Any]:
     else:
         raise _no_header(lines)
     around = [spelled(line) for line in grid.around]
-    # A title begins with the robot's name, which may be "robot".
+    # A title begins with the robot's name. This name may be "robot", which looks like a setting.
     plain = [line for line in grid.around if not _TITLE.search(line)]
-    data = _said(plain, _KEY if form is _separated else _SAID)
+    data = _settings(plain, _KEY if form is _separated else _SETTING)
     if "convention" not in data and (convention := _convention(around, grid.columns)):
         data["convention"] = convention
     for line in grid.around:
@@ -92,16 +91,16 @@ def from_sheet(text: str) -> dict[str, Any]:
     for end in ("base", "tool"):
         if end not in data and (pose := _pose(end, grid.around)):
             data[end] = pose
-    # An angle that some column's heading gives a unit needs none besides; the rows say it cell by cell.
+    # Each cell carries the unit of its column's heading, so the rows need no common unit.
     named = _named_coordinates(grid.around)
     data["rows"] = [_row(grid, cells, i) for i, cells in enumerate(grid.rows)]
-    _follow(data, named)
+    _interpret_variables(data, named)
     return data
 
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A heading: its column's name ("" for none of ours), itself, its unit, and whether it says (i-1)."""
+    """A column: its name ("" if unknown), its heading, its unit, and whether the heading has (i-1)."""
 
     name: str
     heading: str = ""
@@ -111,11 +110,14 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Grid:
-    """The headings, the rows' cells, and all lines that are not the table's.
+    """The parts of a text with a table.
 
     Attributes:
+        columns: The headings.
+        rows: The cells of each row.
+        around: All lines outside the table.
         commas: Whether commas in cells are decimal.
-        strict: Whether a column that is none of ours is refused.
+        strict: Whether an unknown column is an error.
     """
 
     columns: tuple[_Column, ...]
@@ -125,17 +127,17 @@ class _Grid:
     strict: bool = False
 
 
-# -- where the table is --------------------------------------------------------------------------------
+# -- the table's position ------------------------------------------------------------------------------
 
 
 def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -> _Grid | None:
-    """The first line that names the columns, and the rows below it up to a line that is none."""
+    """Find the first line of headings, and the rows below it up to the end of the table."""
     for k, line in enumerate(lines):
         columns = _columns(split(line))
         if columns is None:
             continue
         rows, end = list[list[str]](), k + 1
-        for end, below in enumerate(lines[k + 1 :], k + 1):  # noqa: B007  where it ended is the point
+        for end, below in enumerate(lines[k + 1 :], k + 1):  # noqa: B007  `end` is used below
             if not below.strip() and rows:
                 break
             cells = split(below)
@@ -145,7 +147,7 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
                 if rows and len(cells) == 1:
                     break
                 raise InputError(
-                    f"a row has a cell for each of the {len(columns)} columns",
+                    f"a row needs a cell for each of the {len(columns)} columns",
                     where=f"row {len(rows) + 1}",
                     found=f"{len(cells)}: {', '.join(cells)}"[:200],
                     remedy=f"the columns are {', '.join(column.name or '-' for column in columns)}",
@@ -158,7 +160,7 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
 
 
 def _no_header(lines: list[str]) -> InputError:
-    """What to say where no line has all four names: about the one that has most of them."""
+    """Return the error for a text without all four headings, about the line with most of them."""
     said = [re.split(r"[,;|&\t]|\s{2,}", line.strip()) for line in lines if not line.startswith("#")]
     named = [[cell.strip() for cell in cells if cell.strip()] for cells in said]
     best = max(named, key=lambda cells: sum(_column(cell).name in ORDER for cell in cells), default=[])
@@ -169,13 +171,13 @@ def _no_header(lines: list[str]) -> InputError:
             "the headings are not separated as one line of cells",
             where="header",
             found=", ".join(best)[:200],
-            remedy="separate all of them by the same sign: a comma, a semicolon, a tab or a bar",
+            remedy="separate them all by the same character: a comma, a semicolon, a tab or a bar",
         )
     return InputError(
         f"no column {missing!r}",
         where="header",
         found=", ".join(best)[:200] or "nothing",
-        remedy=f"the line before the rows names the columns, {', '.join(ORDER)} among them",
+        remedy=f"write a line of headings above the rows, with {', '.join(ORDER)}",
     )
 
 
@@ -196,7 +198,7 @@ def _latex(lines: list[str]) -> _Grid | None:
 
 
 def _bars(lines: list[str]) -> _Grid | None:
-    """Markdown's bars, and the lines of boxes that other programs print."""
+    """Parse columns between the bars of Markdown or the vertical lines of printed boxes."""
     plain = [re.sub("[\u2502\u2503\u2551]", "|", line) for line in lines]
 
     def split(line: str) -> list[str]:
@@ -206,7 +208,10 @@ def _bars(lines: list[str]) -> _Grid | None:
 
 
 def _separated(lines: list[str]) -> _Grid | None:
-    """Semicolons, tabs or commas; commas inside cells are decimal where something else separates them."""
+    """Parse cells separated by semicolons, tabs or commas.
+
+    With semicolons or tabs, a comma inside a cell is a decimal comma.
+    """
     for mark in (";", "\t", ","):
         kept = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
         if grid := _grid(kept, lambda line, mark=mark: _csv_cells(line, mark), mark):  # type: ignore[misc]
@@ -219,7 +224,7 @@ def _csv_cells(line: str, mark: str) -> list[str]:
 
 
 def _aligned(lines: list[str]) -> _Grid | None:
-    """Columns that blanks hold apart: two at least, or one where a cell has none inside."""
+    """Parse columns separated by two or more blanks, or by one blank if no cell contains a blank."""
 
     def loose(line: str) -> list[str]:
         return [cell for cell in re.split(r"\s{2,}", line.strip()) if cell]
@@ -232,19 +237,19 @@ def _aligned(lines: list[str]) -> _Grid | None:
 
 
 def _columns(cells: list[str]) -> tuple[_Column, ...] | None:
-    """The headings that a line is, or None: the four names must be among them, once each."""
+    """Parse a line of headings; None unless each of the four names is there. Names must be unique."""
     columns = tuple(map(_column, cells))
     names = [column.name for column in columns]
     if any(name not in names for name in ORDER):
         return None
     double = [name for name in names if name and names.count(name) > 1]
     if double:
-        raise InputError(f"the column {double[0]!r} stands twice", where="header", found=", ".join(cells))
+        raise InputError(f"the column {double[0]!r} is there twice", where="header", found=", ".join(cells))
     return columns
 
 
 def _column(heading: str) -> _Column:
-    """What a heading says; a name of nobody's is no column of ours, and is skipped."""
+    """Parse a heading; an unknown name gives a column with the name ""."""
     text = spelled(heading).strip("*` ")
     unit = None
     if found := re.search(
@@ -261,10 +266,10 @@ def _column(heading: str) -> _Column:
     return _Column(text if text in _OWN else _NAMES.get(text, ""), text, unit, previous)
 
 
-# -- what stands around it -----------------------------------------------------------------------------
+# -- the lines around the table-------------------------------------------------------------------------
 
 
-def _said(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
+def _settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
     data: dict[str, Any] = {}
     for line in lines:
         if found := pattern.match(line.strip()):
@@ -276,7 +281,7 @@ def _said(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
 
 
 def _convention(around: list[str], columns: tuple[_Column, ...]) -> str | None:
-    """What the headings or the text say; None where they say nothing or both."""
+    """Return the convention that the headings or the text name; None if they name none or both."""
     if any(column.previous for column in columns):
         return "modified"
     text = "\n".join(around)
@@ -285,7 +290,7 @@ def _convention(around: list[str], columns: tuple[_Column, ...]) -> str | None:
 
 
 def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
-    """The three rows under `base (metres):`, or the matrix in LaTeX, as urdfkin prints them."""
+    """Parse the three rows under `base (metres):`, or the LaTeX matrix, that urdfkin prints."""
     matrix = rf"{end.title()} \(m\): \$\\begin{{bmatrix}}(.*?)\\end{{bmatrix}}"
     if found := re.search(matrix, " ".join(lines)):
         return _rigid(
@@ -300,10 +305,10 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
 
 
 def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
-    """A pose that was printed with some digits: with the nearest rotation; refuses infinite numbers."""
+    """Return a printed pose with the nearest rotation; raise InputError for infinite numbers."""
     pose = np.array(rows)
-    if not np.isfinite(pose).all():  # LAPACK's singular values of an infinite matrix need not return
-        raise InputError(f"the {end} is a matrix of finite numbers", where=end, found=safe_repr(rows))
+    if not np.isfinite(pose).all():  # LAPACK may not return for an infinite matrix
+        raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
     off = polar_factor(pose[:3, :3]) - pose[:3, :3]
     if ROUNDED < np.abs(off).max() < _PRINTED:
         pose[:3, :3] += off
@@ -311,7 +316,7 @@ def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
 
 
 def _named_coordinates(lines: list[str]) -> list[str]:
-    """`with q1 = left, q2 = right`, as urdfkin prints where coordinates are not row by row."""
+    """Parse `with q1 = left, q2 = right`, which urdfkin prints if rows and coordinates differ."""
     line = next((line for line in lines if line.startswith("with q1 = ")), "")
     return [_unescaped(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]
 
@@ -320,11 +325,11 @@ def _named_coordinates(lines: list[str]) -> list[str]:
 
 
 def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
-    """A row by name, with each cell's unit; empty cells are not said, but for the four that make a row."""
+    """Return a row by name, with each cell's unit; leave out empty cells except the four required ones."""
     row: dict[str, Any] = {}
     for column, cell in zip(grid.columns, cells, strict=True):
         if not column.name and grid.strict and column.heading not in _COUNTS:
-            row[column.heading] = cell  # which is refused with the row: it may be a column of ours misspelt
+            row[column.heading] = cell  # an error later: the name may be misspelt
         elif not column.name or (not cell and column.name not in ORDER):
             continue
         elif column.name in (*ORDER, "beta", "offset"):
@@ -338,7 +343,7 @@ def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
 
 
 def _number(cell: str, column: _Column, where: str, commas: bool) -> str:
-    """A cell with its heading's unit, if it says none; refuses what is no cell."""
+    """Return a cell with its own unit or its heading's; raise InputError for an invalid cell."""
     text = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", cell) if commas else cell
     try:
         found: Cell = cell_of(text)
@@ -355,12 +360,12 @@ def _number(cell: str, column: _Column, where: str, commas: bool) -> str:
 
 
 def _unescaped(name: str) -> str:
-    r"""A name as Markdown and LaTeX write it: `a\_b` is a_b."""
+    r"""Remove the escapes of Markdown and LaTeX from a name: `a\_b` is a_b."""
     return re.sub(r"\\([_&%$#{}])", r"\1", name)
 
 
 def _nested(row: dict[str, Any]) -> dict[str, Any]:
-    """Flat columns of followers and limits as the row has them; `offset` beside theta is added to it."""
+    """Nest the columns of mimic rules and limits; without a mimic rule, add `offset` to theta or d."""
     leads: dict[str, Any] = {key: row.pop(key) for key in ("leader", "multiplier") if key in row}
     if leads and "offset" in row:
         leads["offset"] = row.pop("offset")
@@ -371,8 +376,8 @@ def _nested(row: dict[str, Any]) -> dict[str, Any]:
     return {**row, **({"mimic": leads} if leads else {}), **({"limit": limit} if limit else {})}
 
 
-def _follow(data: dict[str, Any], named: list[str]) -> None:
-    """Variables that are numbered otherwise than the rows: a row with another's variable follows it."""
+def _interpret_variables(data: dict[str, Any], named: list[str]) -> None:
+    """Interpret the variables q1, q2, ...: a row with another row's variable is a mimic joint."""
     rows = data["rows"]
     names = named or [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
     for i, row in enumerate(rows):
@@ -385,7 +390,7 @@ def _follow(data: dict[str, Any], named: list[str]) -> None:
             number = cell.variable or i + 1
             if number > len(names):
                 raise InputError(
-                    "a row moves with a variable that no row has",
+                    "no row has the variable of this row",
                     where=f"row {i + 1}, {name}",
                     found=row[name],
                 )
@@ -406,7 +411,7 @@ _T = TypeVar("_T")
 
 
 def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Whether a robot's source is the path of a table, by its name.
+    """Whether a robot's source is the path of a table file, by its suffix.
 
     >>> is_table_file("arm.toml"), is_table_file("arm.urdf"), is_table_file("<robot/>")
     (True, False, False)
@@ -419,37 +424,37 @@ def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
 
 
 def read_table(path: str | os.PathLike[str]) -> DHTable:
-    """A table from a file whose name ends in .toml, .json, .csv, .tsv, .md, .tex or .txt.
+    """Read a table from a .toml, .json, .csv, .tsv, .md, .tex or .txt file.
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: another ending, broken syntax, or anything `table_from_mapping` rejects, with the file.
+        InputError: another suffix, invalid syntax, or an error of `table_from_mapping`; with the file's name.
     """
     return table_of(read_mapping(path), str(path))
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
-    """A table, or screws where the file has an M; errors as for `read_table`."""
+    """Read a table, or screws if the file has an M; errors as for `read_table`."""
     data = read_mapping(path)
-    return _placed(screws_of_mapping, data, str(path)) if "M" in data else table_of(data, str(path))
+    return _with_place(screws_of_mapping, data, str(path)) if "M" in data else table_of(data, str(path))
 
 
 def read_mapping(path: str | os.PathLike[str]) -> Mapping[str, Any]:
-    """The plain data of a table's file, its numbers as they are written; errors as for `read_table`."""
+    """Return the plain data of a table file, with each number's text; errors as for `read_table`."""
     return mapping_from_text(read_text(Path(path), pipes=True), Path(path).suffix.lower(), where=str(path))
 
 
 def table_from_text(text: str, suffix: str, where: str = "table") -> DHTable:
-    """A table from the text of a file with a given ending; errors as for `read_table`."""
+    """Parse a table from the text of a file with this suffix; errors as for `read_table`."""
     return table_of(mapping_from_text(text, suffix, where), where)
 
 
 def table_of(data: Mapping[str, Any], where: str) -> DHTable:
-    """The table of a file's plain data; errors as for `read_table`."""
-    return _placed(table_from_mapping, data, where)
+    """Make a table from a file's plain data; errors as for `read_table`."""
+    return _with_place(table_from_mapping, data, where)
 
 
-def _placed(make: Callable[[Mapping[str, Any]], _T], data: Mapping[str, Any], where: str) -> _T:
+def _with_place(make: Callable[[Mapping[str, Any]], _T], data: Mapping[str, Any], where: str) -> _T:
     try:
         return make(data)
     except UrdfkinError as error:
@@ -458,10 +463,10 @@ def _placed(make: Callable[[Mapping[str, Any]], _T], data: Mapping[str, Any], wh
 
 
 def mapping_from_text(text: str, suffix: str, where: str) -> Mapping[str, Any]:
-    """The plain data of a table file; errors as for `read_table`."""
+    """Parse the text of a table file into plain data; errors as for `read_table`."""
     if suffix not in _PARSERS:
         raise InputError(
-            f"a table's file ends in {', '.join(_PARSERS)}",
+            f"a table file must have the suffix {', '.join(_PARSERS)}",
             where=where,
             found=repr(suffix),
             remedy="rename the file",
@@ -475,13 +480,13 @@ def mapping_from_text(text: str, suffix: str, where: str) -> Mapping[str, Any]:
         raise InputError(f"not valid {suffix[1:].upper()}", where=where, found=str(error)[:200]) from None
     if not isinstance(data, Mapping):
         raise InputError(
-            "a table is a mapping with convention and rows", where=where, found=type(data).__name__
+            "a table must be a mapping with convention and rows", where=where, found=type(data).__name__
         )
     return data
 
 
 def _is_markup(path: Path) -> bool:
-    """Whether a text file is a URDF, which may end in .txt as well."""
+    """Whether a .txt file is a URDF."""
     try:
         return read_text(path.expanduser()).lstrip().startswith("<")
     except SourceError:

@@ -1,8 +1,8 @@
-"""What a table loses by being written with so many digits: read again from its text, against the exact one.
+"""Compute the error of a printed table, caused by the rounding of its numbers.
 
-Every angle that is written rounded turns what lies beyond, at a lever of all later lengths at most; every
-length shifts it. These add up to a bound that holds for every configuration within the limits; what is
-measured is the largest distance on samples.
+Each rounded angle turns the rest of the chain, with a lever of at most the sum of all later lengths. Each
+rounded length shifts the rest of the chain. The sum is a bound for every configuration within the limits. The
+largest error on samples is measured as well.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from urdfkin.model.tree import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class PrintedPrecision:
-    """What the digits lose.
+    """The error of a printed table.
 
     Attributes:
-        digits: How many there are.
-        metres: The largest distance between the tips, as printed and exact, on the samples.
-        bound: Metres that no configuration within the limits exceeds; None where nothing is guaranteed.
-        samples: How many.
+        digits: Number of digits.
+        metres: Largest distance between the tips of the printed and the exact table, on samples.
+        bound: Guaranteed bound of this distance within the limits (metres); None without a bound.
+        samples: Number of samples.
     """
 
     digits: int
@@ -45,19 +45,19 @@ class PrintedPrecision:
 
 
 def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
-    """Read a table's printed form again and hold it against the table.
+    """Parse a table's printed form and compare it with the table.
 
     Args:
         table: The table.
-        units: In which it is printed.
-        pose_digits: Digits of base and tool, if others.
+        units: Format of the printed table.
+        pose_digits: Digits of base and tool; those of `units` when None.
     """
     digits = pose_digits or units.digits
     rows = tuple(_row(row, units) for row in table.rows)
     base, tool = (_pose(T, digits) for T in (table.base, table.tool))
     bounds = {row.joint: range_of(row) for row in table.rows if row.mimic is None}
     q = values_within(bounds, table.joint_names, SAMPLES)
-    # Rounded entries are no rotation: base and tool are multiplied on as they are printed.
+    # The rounded entries of base and tool are not a rotation, so these are multiplied outside the table.
     between = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     off = np.linalg.norm((base @ between @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound(table, rows, base, tool)
@@ -66,10 +66,10 @@ def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Pri
 
 
 def _row(row: DHRow, units: Units) -> DHRow:
-    """The row as its text says."""
+    """Return the row as it is printed."""
     a, alpha, d, theta, beta = row.cells
     rule = row.mimic
-    own = row.sense * rule.offset if rule else 0.0  # the text has it in the constant
+    own = row.sense * rule.offset if rule else 0.0  # the printed constant contains it
     constant = constant_of(row)
     theta, d = (
         (_angle(constant, units) - own, _length(d, units))
@@ -106,7 +106,7 @@ def _pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
-    """All changes, each with the longest lever that it may have."""
+    """Add up the errors of all numbers, each with its longest lever."""
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))
     for row, other in zip(reversed(table.rows), reversed(rows), strict=True):
@@ -124,12 +124,12 @@ def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: Floa
 
 
 def printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
-    """What the digits of a whole robot's parameters lose, at its worst link.
+    """Return the error of a whole robot's printed parameters, at the link with the largest error.
 
     Args:
         table: The parameters.
-        units: In which they are printed.
-        q: (n, coordinates) where to look.
+        units: Format of the printed parameters.
+        q: (n, coordinates) configurations.
     """
     again = replace(table, rows=tuple(_tree_row(row, units) for row in table.rows))
     off = np.linalg.norm((again.placements(q) - table.placements(q))[..., :3, 3], axis=-1)

@@ -1,4 +1,4 @@
-"""The reference tables that ship with urdfkin: vendors' and textbooks', each with its source."""
+"""Find the reference tables in urdfkin: tables of vendors and textbooks, each with its source."""
 
 from __future__ import annotations
 
@@ -11,28 +11,26 @@ from urdfkin.system.resources import robots_dir
 
 
 def references() -> dict[str, Path]:
-    """Name -> file of each shipped table."""
+    """Return name -> file for each reference table in urdfkin."""
     return {path.stem: path for path in sorted((robots_dir() / "dh").glob("*.toml"))}
 
 
 def published(robot: str) -> list[str]:
-    """How to have a catalogue robot's published tables, a line for each; none for other robots."""
+    """Return a line with the option `--like` for each published table of a robot."""
     lines = []
     for name, path in references().items():
         data = read_mapping(path)
         if data.get("robot") == robot:
             snap = f" --snap {data['snap']:.0e}" if "snap" in data else ""
-            lines.append(
-                f"the {data['convention']} table that is published of this robot: --like {name}{snap}"
-            )
+            lines.append(f"published {data['convention']} table of this robot: --like {name}{snap}")
     return lines
 
 
 def reference_path(name: str) -> Path:
-    """The file of a table: a path that exists, or the name of a shipped one.
+    """Return the file of a table, given its path or the name of a reference table.
 
     Raises:
-        UnknownNameError: neither; the nearest names are offered.
+        UnknownNameError: neither; the message lists the nearest names.
     """
     path = Path(name)
     if path.suffix or exists(path):

@@ -1,28 +1,23 @@
-"""How exactly a table's file says its numbers: half a unit of the last digit, read from the literal text.
+"""Make tables from handwritten rows: Python, TOML, JSON or CSV, in the units that they name.
 
-A sheet that gives 311.1 mm has nothing to say about 0.05 mm. What is written without a decimal point is taken
-as exact (a right angle of 90 degrees, a zero), except for whole millimetres, which are rounded lengths; so
-are multiples of pi.
+All formats become one mapping:
 
-
-One row of a table as people write it, a mapping or a list, taken literally or refused with its place.
-
-Tables from rows that people write: code, TOML, JSON and CSV, in the units they say.
-
-One form underlies all of them, a mapping:
-
-    convention = "modified"         # or "standard"; never guessed
-    angles = "degrees"              # radians when not said
-    lengths = "millimetres"         # metres when not said
+    convention = "modified"         # or "standard"; required
+    angles = "degrees"              # default: radians
+    lengths = "millimetres"         # default: metres
     robot, base_frame, tip_frame    # names, optional
-    base, tool                      # 4 x 4 (or 3 x 4); the identity when not said
-    coordinates = ["leader", ...]   # only where a joint follows one that is on no row
+    base, tool                      # 4 x 4 (or 3 x 4); default: the identity
+    coordinates = ["leader", ...]   # only for mimicked joints that have no row
     rows = [{joint = "j1", kind = "revolute", a = 0, alpha = "-pi/2", d = 0.3, theta = 0}, ...]
 
-A row may also be a list [a, alpha, d, theta, "R" or "P"]; `theta` and `d` are the constant parts. In a
+A row may also be a list [a, alpha, d, theta, "R" or "P"]. `theta` and `d` are the constant parts. In a
 modified table a and alpha of row i are a_{i-1} and alpha_{i-1}. A row's `mimic` is {leader, multiplier,
-offset}, its `limit` {lower, upper, velocity, effort}. The units hold for cells, limits, offsets of followers
-and for the places of base and tool; a multiplier is a ratio of SI values, an effort N or N m.
+offset}; its `limit` is {lower, upper, velocity, effort}. The units apply to cells, limits, offsets of mimic
+joints, and the positions of base and tool. A multiplier is a ratio of SI values; an effort is in N or N m.
+
+`last_digits` returns the precision of the numbers as they are written: half a unit of the last digit. A data
+sheet's 311.1 mm is uncertain by 0.05 mm. A number without a decimal point is exact (90 degrees, zero), and so
+is a multiple of pi. A whole number of millimetres is a rounded length.
 """
 
 from __future__ import annotations
@@ -44,22 +39,22 @@ from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic
 
 
 class Literal(float):
-    """A number that remembers how it was written: what a parser makes of a decimal."""
+    """A number with its text, as a parser found it."""
 
     text: str
 
     def __new__(cls, text: str) -> Literal:
-        """The number that the text is."""
+        """Parse the number, and store its text."""
         number = super().__new__(cls, text)
         number.text = text
         return number
 
 
 def last_digits(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
-    """Of each row of a table's plain data: half a unit of each cell's last digit, metres and radians.
+    """Return for each row half a unit of the last digit of each cell, in metres and radians.
 
     Args:
-        data: As `urdfkin.dh.parse_table.mapping_from_text` reads it; a table can be made of it.
+        data: A valid table's mapping from `urdfkin.dh.parse_table.mapping_from_text`.
     """
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
     return tuple(_of_row(row, units) for row in data["rows"])
@@ -70,16 +65,16 @@ def _of_row(row: Mapping[str, Any] | Sequence[Any], units: Units) -> dict[str, f
     found = {}
     for name in (*ORDER, "beta"):
         if name in cells:
-            value, said = cells[name], units
+            value, unit = cells[name], units
             if isinstance(value, str):
-                said = units_in(cell_of(value), units)
-            half = half_a_digit(value, name in "ad" and said.counts_millimetres)
-            found[name] = cell_in_si(name, half, said)
+                unit = units_in(cell_of(value), units)
+            half = half_a_digit(value, name in "ad" and unit.counts_millimetres)
+            found[name] = cell_in_si(name, half, unit)
     return found
 
 
 def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
-    """Half a unit of the last digit of a number as it is written, in the number's own unit; 0 if exact.
+    """Return half a unit of the last digit of a number, in the number's own unit; 0 if it is exact.
 
     Example:
         >>> half_a_digit(Literal("0.3111")), half_a_digit("90"), half_a_digit(425, True), half_a_digit("pi")
@@ -97,7 +92,7 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     return 0.5 * 10.0 ** min(exponent, 0)
 
 
-#: What a list has in this order, with "R" or "P" behind it if it says so; beta has no place there.
+#: Order of the cells in a list; "R" or "P" may follow. beta needs a mapping.
 ORDER = ("a", "alpha", "d", "theta")
 _KINDS = {
     "r": JointKind.REVOLUTE,
@@ -107,16 +102,16 @@ _KINDS = {
     "prismatic": JointKind.PRISMATIC,
 }
 _KEYS = ("joint", "kind", *ORDER, "sense", "beta", "mimic", "limit")
-_BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, which no order can confuse"
+_BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, which has no order"
 
 
 def written_row(row: Any, index: int, units: Units) -> DHRow:
-    """The row that somebody wrote.
+    """Parse a handwritten row.
 
     Args:
         row: A `DHRow`, a mapping of its fields, or a list in the order of `ORDER`.
-        index: Which row it is, from 0.
-        units: Of its numbers.
+        index: Index of the row, from 0.
+        units: Units of its numbers.
 
     Raises:
         InputError: anything else, with the row and the column.
@@ -126,8 +121,8 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
     row = row.tolist() if isinstance(row, np.ndarray) else row
     where = f"row {index + 1}"
     fields = row if isinstance(row, Mapping) else _of_list(row, where)
-    _known(fields, _KEYS, "a row", where)
-    fields = _without_variable(fields, index, where)
+    _check_keys(fields, _KEYS, "a row", where)
+    fields = _split_variable(fields, index, where)
     cells = {name: _cell(name, fields.get(name, 0.0), units, where) for name in (*ORDER, "beta")}
     return DHRow(
         **cells,
@@ -140,21 +135,21 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
 
 
 def refuse_other_order(rows: Sequence[Any]) -> None:
-    """Refuse lists whose columns stand in the Robotics Toolbox's order, theta, d, a, alpha.
+    """Reject lists with columns that look like the Robotics Toolbox's order theta, d, a, alpha.
 
-    Angles are multiples of 15 degrees nearly everywhere, lengths hardly ever. Lists whose second column is
-    never such a multiple, but whose first and fourth always are, have angles there and lengths here.
+    Angles of a table are nearly always multiples of 15 degrees; lengths are hardly ever. Lists are rejected
+    if all numbers in the first and fourth columns are such multiples and none in the second column is.
 
     Raises:
-        InputError: with both orders.
+        InputError: the columns look exchanged; the message names both orders.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):
         return
     first, second, _, fourth = ([row[k] for row in lists if not _is_zero(row[k])] for k in range(4))
-    if second and fourth and not any(map(_is_round, second)) and all(map(_is_round, [*first, *fourth])):
+    if second and fourth and not any(map(_looks_round, second)) and all(map(_looks_round, [*first, *fourth])):
         raise InputError(
-            "the columns look like theta, d, a, alpha, the Robotics Toolbox's order; a row that is a list has"
+            "the columns look like theta, d, a, alpha, the Robotics Toolbox's order; a list must have"
             f" {', '.join(ORDER)}",
             where=f"rows 1 to {len(rows)}",
             found=f"second column {second[0]!r}, fourth column {fourth[0]!r}",
@@ -163,9 +158,9 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
 
 
 def name_of(value: Any, where: str) -> str:
-    """A name; raises InputError for what is no text or empty."""
+    """Return a name; raise InputError unless it is a text that is not empty."""
     if not isinstance(value, str) or not value.strip():
-        raise InputError("a name is text", where=where, found=repr(value), remedy="write it in quotes")
+        raise InputError("a name must be text", where=where, found=repr(value), remedy="write it in quotes")
     return value
 
 
@@ -177,8 +172,8 @@ def _is_zero(value: Any) -> bool:
     return not isinstance(value, str) and value == 0
 
 
-def _is_round(value: Any) -> bool:
-    """Whether a cell, be it radians or degrees, is a multiple of 15 degrees as far as people write them."""
+def _looks_round(value: Any) -> bool:
+    """Whether a cell looks like a multiple of 15 degrees, written in radians or in degrees."""
     if isinstance(value, str):
         return "pi" in value
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
@@ -189,17 +184,17 @@ def _is_round(value: Any) -> bool:
 def _of_list(row: Any, where: str) -> dict[str, Any]:
     wanted = f"[{', '.join(ORDER)}, 'R' or 'P']"
     if not isinstance(row, Sequence) or isinstance(row, (str, bytes)):
-        raise InputError(f"a row is a mapping or {wanted}", where=where, found=repr(row))
+        raise InputError(f"a row must be a mapping or {wanted}", where=where, found=repr(row))
     if not len(ORDER) <= len(row) <= len(ORDER) + 1:
         raise InputError(
-            f"a row is a mapping or {wanted}",
+            f"a row must be a mapping or {wanted}",
             where=where,
             found=f"{len(row)} entries, {list(row)!r}",
             remedy=_BY_NAME,
         )
     if len(row) > len(ORDER) and not isinstance(row[-1], str):
         raise InputError(
-            f"a row's fifth entry is 'R' or 'P': {wanted}",
+            f"a row's fifth entry must be 'R' or 'P': {wanted}",
             where=where,
             found=repr(row[-1]),
             remedy=f"the Robotics Toolbox's order is theta, d, a, alpha, sigma: {_BY_NAME}",
@@ -207,7 +202,7 @@ def _of_list(row: Any, where: str) -> dict[str, Any]:
     return dict(zip((*ORDER, "kind"), row, strict=False))
 
 
-def _known(given: Mapping[str, Any], keys: Sequence[str], what: str, where: str) -> None:
+def _check_keys(given: Mapping[str, Any], keys: Sequence[str], what: str, where: str) -> None:
     for key in given:
         if key not in keys:
             raise InputError(
@@ -215,8 +210,8 @@ def _known(given: Mapping[str, Any], keys: Sequence[str], what: str, where: str)
             )
 
 
-def _without_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
-    """The row with "q3 + pi" taken apart into a constant, a kind and a sense."""
+def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
+    """Replace a cell such as "q3 + pi" with its constant, a kind and a sense."""
     written = {name: fields[name] for name in ORDER if isinstance(fields.get(name), str)}
     cells = {name: _read(value, f"{where}, {name}") for name, value in written.items()}
     own = [name for name, cell in cells.items() if cell.times is not None]
@@ -227,24 +222,24 @@ def _without_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapp
     at = f"{where}, {name}"
     if len(own) > 1 or kind is None or _kind(fields.get("kind", kind), where).turns != (kind == "R"):
         raise InputError(
-            "the variable of a joint stands in theta if it turns and in d if it slides",
+            "the joint variable belongs in theta of a revolute joint, or in d of a prismatic joint",
             where=at,
             found=repr(written[name]),
             remedy="write numbers into the other cells",
         )
     if cell.times not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
         raise InputError(
-            f"the variable of row {index + 1} is q{index + 1} or -q{index + 1}",
+            f"the variable of row {index + 1} must be q{index + 1} or -q{index + 1}",
             where=at,
             found=repr(written[name]),
-            remedy="a joint that follows another has mimic = {leader, multiplier, offset}",
+            remedy="write mimic = {leader, multiplier, offset} for a mimic joint",
         )
     constant = f"{cell.number!r} {cell.unit or ''}"
     return {"kind": kind, **fields, name: constant, "sense": cell.times}
 
 
 def units_in(cell: Cell, units: Units) -> Units:
-    """The units of a cell: its own, where it says one."""
+    """Return the units of a cell: its own unit where it has one."""
     if cell.unit in ("m", "mm"):
         return units_of(units.angles, cell.unit, units.digits)
     return units_of(cell.unit or units.angles, units.lengths, units.digits)
@@ -263,7 +258,7 @@ def _read(text: str, where: str) -> Cell:
 
 
 def _cell(name: str, value: Any, units: Units, where: str) -> float:
-    """A cell in metres or radians; no angle of a table is more than a turn."""
+    """Parse a cell into metres or radians; an angle above one turn in radians is an error."""
     in_pi = False
     if isinstance(value, str):
         cell = _read(value, f"{where}, {name}")
@@ -271,7 +266,7 @@ def _cell(name: str, value: Any, units: Units, where: str) -> float:
         if cell.unit is not None:
             if (cell.unit in ("m", "mm")) != (name in ("a", "d")):
                 kind = "a length" if name in ("a", "d") else "an angle"
-                raise InputError(f"{name} is {kind}", where=f"{where}, {name}", found=repr(value))
+                raise InputError(f"{name} must be {kind}", where=f"{where}, {name}", found=repr(value))
             units = units_in(cell, units)
     else:
         number = read_number(value, f"{where}, {name}")
@@ -279,7 +274,7 @@ def _cell(name: str, value: Any, units: Units, where: str) -> float:
         return cell_in_si(name, number, units)
     if not in_pi and units.angles is Angles.RADIANS and abs(number) > 2.0 * math.pi:
         raise InputError(
-            f"{name} is more than a turn, if it is radians",
+            f"{name} is more than one turn in radians",
             where=f"{where}, {name}",
             found=repr(value),
             remedy="write angles = 'degrees' if the table's angles are degrees",
@@ -291,7 +286,7 @@ def _kind(value: Any, where: str) -> JointKind:
     kind = _KINDS.get(value.strip().lower()) if isinstance(value, str) else None
     if kind is None:
         raise InputError(
-            "a row is revolute, continuous or prismatic",
+            "the kind of a row must be revolute, continuous or prismatic",
             where=f"{where}, kind",
             found=repr(value),
             remedy="write R or P",
@@ -303,16 +298,16 @@ def _sense(value: Any, where: str) -> int:
     number = read_number(value, f"{where}, sense")
     if number not in (1.0, -1.0):
         raise InputError(
-            "the sense is 1 or -1",
+            "the sense must be 1 or -1",
             where=f"{where}, sense",
             found=repr(value),
-            remedy="-1 counts the joint the other way; a factor stands in mimic as multiplier",
+            remedy="write -1 to reverse the joint; write another factor as the multiplier in mimic",
         )
     return int(number)
 
 
 def _own(name: str, value: Any, fields: Mapping[str, Any], units: Units, where: str) -> float:
-    """A number in the unit of the joint's own value: an angle if it turns, a length if it slides."""
+    """Parse a joint's value: an angle of a revolute joint, a length of a prismatic joint."""
     number = read_number(value, f"{where}, {name}")
     return cell_in_si("theta" if _kind(fields.get("kind", "R"), where).turns else "d", number, units)
 
@@ -321,8 +316,8 @@ def _mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> M
     if value is None:
         return None
     if not isinstance(value, Mapping) or "leader" not in value:
-        raise InputError("mimic is {leader, multiplier, offset}", where=where, found=repr(value))
-    _known(value, ("leader", "multiplier", "offset"), "mimic", where)
+        raise InputError("mimic must be {leader, multiplier, offset}", where=where, found=repr(value))
+    _check_keys(value, ("leader", "multiplier", "offset"), "mimic", where)
     return Mimic(
         name_of(value["leader"], f"{where}, leader"),
         read_number(value.get("multiplier", 1.0), f"{where}, multiplier"),
@@ -334,8 +329,8 @@ def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> L
     if value is None:
         return None
     if not isinstance(value, Mapping):
-        raise InputError("limit is {lower, upper, velocity, effort}", where=where, found=repr(value))
-    _known(value, ("lower", "upper", "velocity", "effort"), "limit", where)
+        raise InputError("limit must be {lower, upper, velocity, effort}", where=where, found=repr(value))
+    _check_keys(value, ("lower", "upper", "velocity", "effort"), "limit", where)
     lower, upper, velocity = (
         _own(name, value[name], fields, units, where) if name in value else default
         for name, default in (("lower", -math.inf), ("upper", math.inf), ("velocity", math.inf))
@@ -354,7 +349,7 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys that a file may carry for people: where the numbers come from, and about which URDF.
+#: Keys for information only: the source of the numbers and the URDF that they describe.
 NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
 
 
@@ -371,24 +366,24 @@ def table_from_rows(
     tip_frame: str = "tip",
     coordinates: Sequence[str] = (),
 ) -> DHTable:
-    """A table from rows written by hand.
+    """Make a table from handwritten rows.
 
     Args:
-        rows: Each a `DHRow` (always metres and radians), a mapping with the row's fields, or a list
-            [a, alpha, d, theta] with an optional "R" or "P".
+        rows: The rows. Each is a `DHRow` (always metres and radians), a mapping with the row's fields, or a
+            list [a, alpha, d, theta] with an optional "R" or "P".
         convention: "standard" or "modified".
         angles: "radians" or "degrees".
         lengths: "metres" or "millimetres".
-        base: (4, 4) or (3, 4) T_base_0, its lengths like the rows'; the identity when None.
-        tool: Likewise T_n_tip.
+        base: (4, 4) or (3, 4) T_base_0, with lengths in `lengths`; the identity when None.
+        tool: (4, 4) or (3, 4) T_n_tip, with lengths in `lengths`; the identity when None.
         robot: The robot's name.
-        base_frame: What the base is called.
-        tip_frame: What the tip is called.
-        coordinates: Joints that move rows without standing in one: leaders that are elsewhere on the robot.
+        base_frame: Name of the base frame.
+        tip_frame: Name of the tip frame.
+        coordinates: Names of mimicked joints that have no row because they are elsewhere on the robot.
 
     Raises:
-        InputError: an unknown convention or unit, a row that is none or none at all, two rows for one joint.
-        UnknownNameError: a row follows a joint that is neither a row's nor a coordinate.
+        InputError: an unknown convention or unit, an invalid row, no rows, or two rows for one joint.
+        UnknownNameError: a mimicked joint that has no row and is not in `coordinates`.
 
     Example:
         >>> table = table_from_rows([[0, 90, 0.3, 0], [0.4, 0, 0, 0]], "standard", angles="degrees")
@@ -401,7 +396,7 @@ def table_from_rows(
         raise InputError("a table needs a list of rows", where="rows", found=safe_repr(rows))
     if len(rows) == 0 and base is None and tool is None:
         raise InputError(
-            "a table without rows, base and tool says nothing",
+            "a table needs a row, a base or a tool",
             where="rows",
             found="[]",
             remedy="write a row for each moving joint",
@@ -421,15 +416,15 @@ def table_from_rows(
 
 
 def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
-    """A table from the mapping of the module's first lines.
+    """Make a table from a mapping in the form of the module's docstring.
 
     Raises:
-        InputError: no convention, an unknown key, or whatever `table_from_rows` raises.
+        InputError: no convention, an unknown key, or an error of `table_from_rows`.
     """
     if "convention" not in data:
         raise InputError(
-            "the table does not say its convention",
-            remedy="write convention = 'standard' or 'modified', in a sheet a line `convention: standard`",
+            "the table does not name its convention",
+            remedy="write convention = 'standard' or 'modified' (in text: a line `convention: standard`)",
             question=Question.WHICH_DH_CONVENTION,
         )
     for key in data:
@@ -442,9 +437,9 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
 
 
 def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
-    """A leader has a row of its own, or is said to be elsewhere; it does not follow another."""
+    """Check that each mimicked joint has a row or is in `coordinates`, and is not itself a mimic joint."""
     if not isinstance(coordinates, Sequence) or isinstance(coordinates, str):
-        raise InputError("coordinates are a list of names", where="coordinates", found=repr(coordinates))
+        raise InputError("coordinates must be a list of names", where="coordinates", found=repr(coordinates))
     leads = {row.joint for row in rows if row.mimic is None}
     known = [*leads, *(name_of(name, "coordinates") for name in coordinates)]
     for i, row in enumerate(rows):
@@ -453,13 +448,13 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
         where = f"row {i + 1}, leader"
         if any(row.mimic.leader == other.joint for other in rows):
             raise InputError(
-                "a joint cannot follow one that follows",
+                "a joint cannot mimic a mimic joint",
                 where=where,
                 found=repr(row.mimic.leader),
-                remedy="name the joint at the end, with the multipliers multiplied",
+                remedy="name the joint that the other one mimics, and multiply the multipliers",
             )
         error = UnknownNameError("joint", row.mimic.leader, known, where=where)
-        error.remedy = f"{error.remedy}; a leader that no row has is named in coordinates = [...]"
+        error.remedy = f"{error.remedy}; name a mimicked joint without a row in coordinates = [...]"
         raise error
 
 
@@ -471,7 +466,7 @@ def _pose(value: ArrayLike | None, what: str, units: Units) -> FloatArray:
     rows = value if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) else ()
     if len(rows) not in (3, 4) or not all(isinstance(row, Sequence) and len(row) == 4 for row in rows):
         raise InputError(
-            f"the {what} is a matrix of numbers, 4 x 4 or 3 x 4", where=what, found=safe_repr(value)
+            f"the {what} must be a matrix of numbers, 4 x 4 or 3 x 4", where=what, found=safe_repr(value)
         )
     pose = np.eye(4)
     for i, row in enumerate(rows):

@@ -1,11 +1,11 @@
-"""The product of exponentials: a home pose and a screw for each joint, in Lynch and Park's form.
+"""Compute the product of exponentials in Lynch and Park's form: a zero pose, and a screw for each joint.
 
     T(q) = exp([S_1] q_1) ... exp([S_n] q_n) M = M exp([B_1] q_1) ... exp([B_n] q_n)    (Modern Robotics, 4.1)
 
-M is the tip's pose with every joint at zero. A screw is (w, v), **angular first** as in that book and in its
-code: w the joint's unit axis and v = p x w for a turning joint through p; w = 0 and v the unit direction for
-a sliding one. Space screws S are in the base, body screws B = Ad(M^-1) S in the tip. Nothing is chosen here,
-as frames are in a Denavit-Hartenberg table: who agrees on base, tip and zero has the same numbers.
+M is the tip's pose in the zero configuration. A screw is (w, v), **angular first** as in that book and in its
+code. For a revolute joint through p, w is the unit axis and v = p x w. For a prismatic joint, w = 0 and v is
+the unit direction. Space screws S are in the base frame, body screws B = Ad(M^-1) S in the tip frame. Unlike
+the frames of a Denavit-Hartenberg table, screws leave no choice: base, tip and zeros define all numbers.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, frozen
 
-#: How far a written screw may be from one: the length of its axis from 1, its pitch from 0, metres a radian.
+#: Tolerances of a handwritten screw: its axis' length from 1, and its pitch from 0 (m/rad).
 _WRITTEN = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
 class ScrewJoint:
-    """One joint: its name, whether it turns, whom it follows, and its bounds."""
+    """One joint: its name, kind, mimic rule and limits."""
 
     name: str
     kind: JointKind
@@ -48,12 +48,12 @@ class ProductOfExponentials:
     """A robot's path as a product of exponentials.
 
     Attributes:
-        joints: Base to tip.
-        M: (4, 4) the tip's pose in the base with every joint at zero, metres.
-        space: (n, 6) screws in the base, (w, v): rad/rad and m/rad, or 0 and m/m.
+        joints: The joints, base to tip.
+        M: (4, 4) the tip's pose in the base in the zero configuration (metres).
+        space: (n, 6) screws (w, v) in the base frame: rad/rad and m/rad, or 0 and m/m.
         robot: The robot's name.
-        base_frame: What the base is called.
-        tip_frame: What the tip is called.
+        base_frame: Name of the base frame.
+        tip_frame: Name of the tip frame.
 
     Example:
         >>> M = [[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0]]
@@ -71,19 +71,19 @@ class ProductOfExponentials:
 
     @cached_property
     def body(self) -> FloatArray:
-        """(n, 6) screws in the tip: B = Ad(M^-1) S."""
+        """(n, 6) screws in the tip frame: B = Ad(M^-1) S."""
         R, p = self.M[:3, :3], self.M[:3, 3]
         w, v = self.space[:, :3], self.space[:, 3:]
         return frozen(np.hstack([w @ R, (v - np.cross(p, w)) @ R]))
 
     @cached_property
     def coupling(self) -> Coupling:
-        """How the path's coordinates move its joints."""
+        """The map from the path's coordinates to its joints' values."""
         return coupling_of([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
 
     @property
     def points(self) -> FloatArray:
-        """(n, 3) of each turning axis the point nearest to the base; of a sliding one the one before."""
+        """(n, 3) point of each revolute axis nearest to the base; a prismatic joint: the previous point."""
         here, found = np.zeros(3), []
         for joint, screw in zip(self.joints, self.space, strict=True):
             here = np.cross(screw[:3], screw[3:]) if joint.kind.turns else here
@@ -91,7 +91,9 @@ class ProductOfExponentials:
         return np.array(found).reshape(-1, 3)
 
     def placement(self, q: Given) -> FloatArray:
-        """(..., 4, 4) the tip in the base for `q` (..., coordinates), in the order of `coupling.names`.
+        """Return the (..., 4, 4) pose of the tip in the base for `q` (..., coordinates).
+
+        The coordinates are in the order of `coupling.names`.
 
         Raises:
             InputError: `q` has the wrong length.
@@ -103,7 +105,7 @@ class ProductOfExponentials:
         return np.ascontiguousarray(T @ self.M)
 
     def jacobian(self, q: Given) -> FloatArray:
-        """(6, joints) the space Jacobian in the book's order, [angular; linear], of every joint (5.11)."""
+        """Return the (6, joints) space Jacobian of all joints, [angular; linear] (Modern Robotics, 5.11)."""
         T, columns = np.eye(4), list[FloatArray]()
         for screw, value in zip(self.space, self.coupling.values(q), strict=True):
             w, v = T[:3, :3] @ screw[:3], T[:3, :3] @ screw[3:]
@@ -113,11 +115,14 @@ class ProductOfExponentials:
 
     @property
     def roundings(self) -> float:
-        """How many eps rounding may turn `placement` by, angles apart: two rows' for each exponential."""
+        """Bound of the rotation error of `placement` by rounding, in eps, without the rounding of q.
+
+        It counts the rounding of two table rows for each exponential.
+        """
         return 2.0 * of_rows(len(self.joints))
 
     def rounding(self, q: Given) -> FloatArray:
-        """(...,) metres: what rounding may do to `placement(q)`."""
+        """Return the (...,) bound of the rounding error in the position of `placement(q)`, in metres."""
         values = np.abs(self.coupling.values(q))
         turns = np.array([joint.kind.turns for joint in self.joints], dtype=bool)
         way = np.vstack([np.zeros(3), self.points, self.M[:3, 3]])
@@ -126,7 +131,11 @@ class ProductOfExponentials:
         return np.asarray(EPS * (self.roundings + values[..., turns].sum(axis=-1)) * lever)
 
     def to_tree(self) -> KinematicTree:
-        """The robot: with all joints at zero every link frame stands like the base's, on its joint's axis."""
+        """Return the robot as a tree.
+
+        In the zero configuration each link frame is parallel to the base frame. Its origin is on its joint's
+        axis.
+        """
         links = [self.base_frame, *(f"{joint.name}_link" for joint in self.joints)]
         joints, here = list[tuple[Joint, str, str]](), np.zeros(3)
         for i, (joint, screw, point) in enumerate(zip(self.joints, self.space, self.points, strict=True)):
@@ -143,7 +152,7 @@ class ProductOfExponentials:
         return build_tree(self.robot, self.base_frame, [*joints, (end, links[-1], self.tip_frame)])
 
     def as_mapping(self) -> dict[str, Any]:
-        """Plain data that `screws_of_mapping` reads back; every joint has a value of its own there."""
+        """Return plain data for `screws_of_mapping`; mimic rules and limits are not part of it."""
         return {
             "robot": self.robot,
             "base_frame": self.base_frame,
@@ -156,7 +165,7 @@ class ProductOfExponentials:
 
 
 def screws_of(path: FrameChain) -> ProductOfExponentials:
-    """The screws of a path of a robot, at zero of every joint."""
+    """Return the screws of a robot's path in the zero configuration."""
     T, rows = np.eye(4), list[FloatArray]()
     for joint, A in zip(path.joints, path.constants, strict=False):
         T = T @ A
@@ -170,7 +179,7 @@ def screws_of(path: FrameChain) -> ProductOfExponentials:
 
 
 def _rigid(M: FloatArray) -> FloatArray:
-    """The rigid transform that a written home pose means; one that is exact to rounding stays as it is."""
+    """Return the nearest rigid transform of a handwritten zero pose; keep one that is exact to rounding."""
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]
@@ -192,54 +201,55 @@ def screws_from(
     base_frame: str = "base",
     tip_frame: str = "tip",
 ) -> ProductOfExponentials:
-    """Screws that somebody wrote; a joint turns where w is not zero.
+    """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
 
     Args:
         screws: (n, 6) rows (w, v), angular first; or Modern Robotics' columns, (6, n), unless n is six.
-        M: (4, 4) or (3, 4) home pose of the tip, metres.
+        M: (4, 4) or (3, 4) pose of the tip in the zero configuration (metres).
         frame: "space" or "body".
-        joints: The joints' names; joint_1 ... when not given.
+        joints: The joints' names; joint_1, joint_2, ... by default.
         robot: The robot's name.
-        base_frame: What the base is called.
-        tip_frame: What the tip is called.
+        base_frame: Name of the base frame.
+        tip_frame: Name of the tip frame.
 
     Raises:
-        InputError: a shape; an axis that has not length 1; a pitch (w . v is not 0), which no URDF has.
+        InputError: a wrong shape, an axis without length 1, or a pitch (w . v is not 0). URDF has no joint
+            with a pitch.
     """
     S = np.array(screws, dtype=np.float64)
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S
     home = np.asarray(M, dtype=np.float64)
     if S.ndim != 2 or S.shape[1] != 6 or home.shape not in ((4, 4), (3, 4)) or frame not in ("space", "body"):
         raise InputError(
-            "screws are (n, 6) with a home pose M (4, 4), in space or body",
+            "screws must be (n, 6) with a zero pose M (4, 4), and the frame space or body",
             found=f"{S.shape}, {home.shape}, {frame!r}",
         )
     if not (np.isfinite(S).all() and np.isfinite(home).all()):
-        raise InputError("screws and M are finite numbers", found="nan or inf")
+        raise InputError("screws and M must be finite numbers", found="nan or inf")
     pose = _rigid(home)
     if frame == "body":
         w = S[:, :3] @ pose[:3, :3].T
         S = np.hstack([w, S[:, 3:] @ pose[:3, :3].T + np.cross(pose[:3, 3], w)])
     names = tuple(joints) or tuple(f"joint_{i + 1}" for i in range(len(S)))
     if len(names) != len(S):
-        raise InputError("a name for each screw", found=f"{len(names)} names, {len(S)} screws")
+        raise InputError("each screw needs a name", found=f"{len(names)} names, {len(S)} screws")
     made = []
     for i, name in enumerate(names):
         turns = bool(S[i, :3].any())
         size = float(np.linalg.norm(S[i, :3] if turns else S[i, 3:]))
         if abs(size - 1.0) > _WRITTEN:
             raise InputError(
-                "an axis has length 1",
+                "an axis must have length 1",
                 where=f"screw {i + 1}",
                 found=f"{size:.6g}",
-                remedy="(w, v), angular first",
+                remedy="write (w, v), angular first",
             )
         S[i] /= size
         pitch = float(S[i, :3] @ S[i, 3:])
         if abs(pitch) > _WRITTEN:
             raise InputError(
-                "a joint turns or slides, and does not both", where=f"screw {i + 1}",
-                found=f"a pitch of {pitch:.3g} m/rad", remedy="w . v is 0 for a joint that turns",
+                "a joint is revolute or prismatic, not both", where=f"screw {i + 1}",
+                found=f"a pitch of {pitch:.3g} m/rad", remedy="make w . v = 0 for a revolute joint",
             )  # fmt: skip
         S[i, 3:] -= pitch * S[i, :3]
         made.append(ScrewJoint(name, JointKind.CONTINUOUS if turns else JointKind.PRISMATIC))
@@ -247,7 +257,7 @@ def screws_from(
 
 
 def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
-    """Screws from a file's plain data: M, and space or body; errors as for `screws_from`.
+    """Make screws from a file's plain data: M, and space or body; errors as for `screws_from`.
 
     Raises:
         InputError: an unknown key, or neither space nor body.
@@ -265,17 +275,19 @@ def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
     except (TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError("screws and M are lists of numbers", where=frame, found=str(error)[:100]) from None
+        raise InputError(
+            "screws and M must be lists of numbers", where=frame, found=str(error)[:100]
+        ) from None
 
 
 def exp_screw(screw: FloatArray, values: ArrayLike) -> FloatArray:
-    """(..., 4, 4) exp([S] q) of one screw (w, v) at `values` (...), rad or m (Modern Robotics, 3.88)."""
+    """Return (..., 4, 4) exp([S] q) of a screw (w, v) at `values` (...), rad or m (Modern Robotics, 3.88)."""
     w, v, q = screw[:3], screw[3:], np.asarray(values, dtype=np.float64)
     T = motion_about_z(np.zeros(q.shape), turns=True)
     if not w.any():
         T[..., :3, 3] = q[..., None] * v
         return T
     T[..., :3, :3] = exp_rotation(q[..., None] * w)
-    p = np.cross(w, v)  # the axis' point nearest to the origin: a turn leaves it where it is
+    p = np.cross(w, v)  # the point of the axis nearest to the origin; a rotation does not move it
     T[..., :3, 3] = p - T[..., :3, :3] @ p + q[..., None] * (w @ v) * w
     return T

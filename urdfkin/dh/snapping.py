@@ -1,15 +1,18 @@
-"""Angles that a file has rounded (1.5708) or a calibration has nudged, made round again, and accounted for.
+"""Snap angles to multiples of 15 degrees, and state the effect on the tip.
 
-Three places, base to tip: the orientation of each joint's origin in the URDF (its roll, pitch and yaw); the
-tilt between consecutive axes and the turns before and after it; theta of the finished rows. Positions are
-kept as the file has them, so that what follows is turned about a joint's origin and nothing else moves: see
-`urdfkin.dh.table` for why the bound holds.
+A file may write an angle inexactly (1.5708), or a calibration may have changed it slightly. Three angles are
+snapped, from base to tip:
 
+1. the orientation of each joint's origin in the URDF (roll, pitch and yaw);
+2. the tilt between consecutive axes, and the rotations before and after it;
+3. theta of the finished rows.
 
-Cells that look like angles which the file rounded (1.5708, 3.14159265359), and the `snap` that cures them.
+Positions stay as they are in the file, so each change only turns the rest of the chain about a joint's
+origin. `urdfkin.dh.table` derives the bound from this.
 
-A tilt of 5e-12 rad is no rounding of the computation (`urdfkin.dh.noise`), so a table keeps it, and the
-offsets of some 1e-12 m that come with it. Whoever reads the table should be told that they are the file's.
+`snap_hint` finds cells that look like angles rounded by the file (1.5708, 3.14159265359). A tilt of 5e-12 rad
+is larger than the rounding of the computation (`urdfkin.dh.noise`). A table therefore contains it, and the
+offsets of about 1e-12 m that it causes. The hint states that these numbers come from the file.
 """
 
 from __future__ import annotations
@@ -28,24 +31,24 @@ from urdfkin.kinematics.roundings import ANGLE, EPS, TURN
 from urdfkin.model.chain import ChainJoint, FrameChain, chain, steps_between
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen, is_bounded
 
-#: Half of 15 degrees is where the next multiple begins; a tolerance must stay clear of it.
+#: Largest tolerance (rad): 5 degrees. Beyond 7.5 degrees the nearest multiple of 15 degrees changes.
 LARGEST_TOLERANCE = math.pi / 36.0
-#: Configurations on which a changed table is measured.
+#: Number of configurations at which a snapped table is compared with the exact chain.
 SAMPLES = 500
 
 
 def checked_tolerance(snap: float) -> float:
-    """The tolerance as a float; raises InputError unless it lies between 0 and 5 degrees."""
+    """Return the tolerance as a float; raise InputError unless it is between 0 and 5 degrees."""
     tolerance = real_number(snap, "snap")
     if not 0.0 <= tolerance <= LARGEST_TOLERANCE:
-        raise InputError("snap is an angle in radians between 0 and 0.087 (5 degrees)", found=repr(snap))
+        raise InputError("snap must be an angle in radians between 0 and 0.087 (5 degrees)", found=repr(snap))
     return tolerance
 
 
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """The chain with its angles made round, and each change with the index of the constant it is in."""
+    """Return the chain with its angles snapped, and each change with the index of its constant."""
     exact = chain(tree, tip, base)
     rounder, moved = _snap_origins(tree, tolerance)
     path = chain(rounder, tip, base)
@@ -64,14 +67,14 @@ def snap_chain(
 
 
 def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DHTable, list[SnapChange]]:
-    """Theta of the finished rows made round: everything beyond turns about the row's axis."""
+    """Snap theta of the finished rows; the rest of the chain turns about the row's axis."""
     rows, changes = list(table.rows), list[SnapChange]()
     for i, row in enumerate(rows):
         theta = wrapped(nearest_twelfth(row.theta)) + 0.0
         angle = abs(math.remainder(row.theta - theta, 2.0 * math.pi))
         if 0.0 < angle <= tolerance:
             rows[i] = replace(row, theta=theta)
-            # A sliding axis may have been moved up to the joint before it.
+            # The line of a prismatic axis may have been moved to the joint before it.
             pivot = i + 1 if row.kind.turns else i
             what = f"theta of {row.joint}: {row.theta:.9g} to {theta:.9g}"
             changes.append(replace(_change(exact, pivot, what, angle), row=i))
@@ -81,7 +84,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
 def statement(
     exact: FrameChain, table: DHTable, changes: Sequence[SnapChange], tolerance: float
 ) -> SnapReport:
-    """Add the changes up, and measure them against the exact chain on samples within limits."""
+    """Add up the bounds of the changes, and measure their effect on samples within the limits."""
     radians = sum((change.angle for change in changes), 0.0)
     per_metre = dict[str, float]()
     for change in changes:
@@ -108,16 +111,19 @@ def statement(
 
 
 def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
-    """(...,) radians between rotations (..., 3, 3), also small ones: |R - S| = 2 sqrt2 sin(angle / 2)."""
+    """Return the (...,) angles between rotations (..., 3, 3) in radians.
+
+    The formula |R - S| = 2 sqrt2 sin(angle / 2) is also accurate for small angles.
+    """
     chord = np.linalg.norm(R - S, axis=(-2, -1)) / (2.0 * math.sqrt(2.0))
     return np.asarray(2.0 * np.arcsin(np.minimum(chord, 1.0)))
 
 
-# -- the three places ----------------------------------------------------------------------------------
+# -- the three kinds of angles ---------------------------------------------------------------------------
 
 
 def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree, dict[str, float]]:
-    """The tree with roll, pitch and yaw of its joint origins made round; how far each origin turned."""
+    """Snap roll, pitch and yaw of all joint origins; return the tree and each joint's rotation (rad)."""
     joints, moved = list(tree.joints), dict[str, float]()
     for i, joint in enumerate(joints):
         T = np.array(joint.T_parent_joint)
@@ -131,10 +137,10 @@ def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree,
 
 
 def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
-    """Rz(yaw) Ry(pitch) Rx(roll) with each angle that is nearly a multiple of pi/12 made one."""
+    """Factor R into Rz(yaw) Ry(pitch) Rx(roll), and snap each angle to a multiple of pi/12."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    if level <= tolerance:  # roll and yaw turn about one line: give it all to the yaw
+    if level <= tolerance:  # roll and yaw have the same axis: use yaw alone
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:
         roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
@@ -142,7 +148,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
 
 
 def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-    """Rz(phi) Rx(tilt) Rz(psi) with each angle made round where it nearly is; the position is kept."""
+    """Factor a rotation into Rz(phi) Rx(tilt) Rz(psi) and snap each angle; the position stays."""
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
     tilt = math.atan2(sine, R[2, 2])
@@ -160,7 +166,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
 
 
 def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
-    """Turns about coordinate axes multiplied, each first made round if it is nearly so."""
+    """Multiply rotations about coordinate axes, with each angle snapped within the tolerance."""
     R = np.eye(3)
     for axis, angle in turns:
         twelfth = nearest_twelfth(angle)
@@ -172,13 +178,13 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
     return R
 
 
-# -- accounting ----------------------------------------------------------------------------------------
+# -- bounds -----------------------------------------------------------------------------------------
 
 
 def _changes_of_origins(
     steps: Sequence[tuple[Joint, bool]], moved: Mapping[str, float]
 ) -> list[tuple[int, SnapChange]]:
-    """A change for each origin on the path, the lever being the way from it to the tip."""
+    """Return a change for each snapped origin on the path; its lever is the path length to the tip."""
     changes, lever, sliders = list[tuple[int, SnapChange]](), 0.0, list[str]()
     moving = sum(joint.kind.has_axis for joint, _ in steps)
     for joint, backwards in reversed(steps):
@@ -197,13 +203,13 @@ def _changes_of_origins(
 
 
 def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """A turn about the origin of joint k (from 1; one more is the tip), seen at the tip."""
+    """Return a change about the origin of joint k (from 1; n + 1 is the tip), with its effect at the tip."""
     sliders = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
     return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), sliders)
 
 
 def row_of_constant(table: DHTable, k: int) -> int:
-    """Index of the row in which the chain's constant A_k shows; -1 is the base, the row count the tool."""
+    """Return the index of the row that contains the chain's constant A_k; -1: the base, n: the tool."""
     n = len(table.rows)
     if k == 0:
         return -1
@@ -213,31 +219,31 @@ def row_of_constant(table: DHTable, k: int) -> int:
 
 
 def travel(limit: Limit | None) -> float:
-    """Metres: how far a sliding joint may be from zero; one metre where the file does not say."""
+    """Return the largest distance of a prismatic joint from zero (metres); one metre without limits."""
     return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
 
 
 def values_within(bounds: Mapping[str, tuple[float, float]], names: Sequence[str], count: int) -> FloatArray:
-    """(count, coordinates) within bounds by name, uniformly; -1 to 1 for a name that has none."""
+    """Draw (count, coordinates) values uniformly within bounds by name; within -1 to 1 without bounds."""
     lower, upper = np.array([bounds.get(name, (-1.0, 1.0)) for name in names]).reshape(-1, 2).T
     return np.random.default_rng(0).uniform(lower, upper, (count, len(names)))
 
 
 def range_of(joint: ChainJoint | DHRow) -> tuple[float, float]:
-    """Where a joint may be: its limits; a whole turn, or a metre either way, where there are none."""
+    """Return a joint's limits; without limits -pi to pi (revolute) or -1 m to 1 m (prismatic)."""
     if joint.kind is not JointKind.CONTINUOUS and is_bounded(joint.limit):
         return joint.limit.lower, joint.limit.upper
     return (-math.pi, math.pi) if joint.kind.turns else (-1.0, 1.0)
 
 
-#: Radians off a multiple of 15 degrees, and metres for each metre of span, that look like such rounding.
+#: Largest difference that looks rounded: radians from a multiple of 15 degrees; metres per metre of span.
 LARGEST = 1e-4
-#: Tolerances that are tried, in radians, the smallest first.
+#: Tolerances to try, in radians, in ascending order.
 TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
 
 def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
-    """(joint, cell, how far it is from a round value), radians and metres, the smallest first."""
+    """Return (joint, cell, distance from a round value in radians or metres), the smallest first."""
     found = []
     for row in table.rows:
         for name, angle in (("alpha", row.alpha), ("theta", row.theta), ("beta", row.beta)):
@@ -251,14 +257,14 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
-    """A line that says which cells look like rounding and which tolerance makes most of them round.
+    """Return a line that names a cell that looks rounded, and the tolerance that snaps most such cells.
 
     Args:
         table: An exact table.
-        snapped: Makes the same table with a tolerance.
+        snapped: Function that returns the same table, snapped with a tolerance (rad).
 
     Returns:
-        None where nothing looks so, or no tolerance helps.
+        None if no cell looks rounded, or if no tolerance helps.
     """
     noisy = noisy_cells(table) if table.snap is None else []
     if not noisy:
@@ -272,5 +278,5 @@ def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None
     many = f"{len(noisy)} cells look" if len(noisy) > 1 else "a cell looks"
     return (
         f"{many} like angles that the file rounded ({cell} of {joint}: {size:.2g} {unit}):"
-        f" --snap {best:.0e} leaves {left[best] or 'none'} and says what it moves"
+        f" --snap {best:.0e} leaves {left[best] or 'none'} and reports the effect"
     )

@@ -1,28 +1,27 @@
-"""What kind of arm it is: which axes are parallel or meet, how nearly, and what can be solved in closed form.
+"""Find the structure of an arm and export it for closed-form inverse kinematics solvers.
 
-Two consecutive axes keep their distance and their angle in every configuration, so that what is read from the
-screws at zero holds everywhere (`urdfkin.dh.screws`, which Pinocchio checks). Pieper (1968): six turning
-joints have a solution in closed form where three consecutive axes are parallel or meet in one point. A
-calibrated robot is never exactly of a kind; how far off it is is said in radians and metres.
+`structure` reports which axes are parallel or intersect, how nearly, and which closed-form solutions exist.
+The distance and the angle of two consecutive axes are the same in every configuration. The screws at the zero
+configuration therefore suffice (`urdfkin.dh.screws`, checked by Pinocchio). Pieper (1968): six revolute
+joints have a closed-form solution if three consecutive axes are parallel or intersect in one point. A
+calibrated robot has such a property only nearly; the deviation is given in radians and metres.
 
-
-The seven numbers of an ortho-parallel arm with a spherical wrist (Brandstoetter et al., 2014).
-
-An OPW arm is the standard table
+`opw_of` returns the seven parameters of an ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et
+al., 2014). An OPW arm is the standard table
 
     a1 -90 c1 q1    c2 0 0 q2-90    a2 90 b q3+90    0 -90 c3 q4    0 90 0 q5    0 0 c4 q6
 
-(a, alpha, d, theta), so its numbers are those of the URDF in this table's frames (`urdfkin.dh.match_table`),
-with the zeros and the ways its joints count. What the kind has no number for, a tilt of calibration, is left
-out, and `placement` is the solver's own forward kinematics, so that what this costs can be measured.
+with cells in the order a, alpha, d, theta. Its parameters are the URDF's numbers in the frames of this table
+(`urdfkin.dh.match_table`), with this table's zeros and senses. OPW has no parameter for a tilt from
+calibration, so the tilt is dropped. `Opw.placement` is the solver's own forward kinematics; it measures the
+resulting error.
 
-
-H and P, as solvers take an arm that go from subproblem to subproblem (IK-Geo, EAIK).
+`axes_and_steps` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
     T(q) = P_0 + R(h_1, q_1) (P_1 + R(h_2, q_2) (P_2 + ... + P_n)),    R(q) = R(h_1, q_1) ... R(h_n, q_n) R_6T
 
-Any point of an axis would do for this product. A solver that asks whether axes meet asks whether the step
-between their points is zero: axes that meet share their point here.
+This product is correct for any point on each axis. The solvers detect intersecting axes by a zero step
+between their points. Intersecting axes therefore share their point here.
 """
 
 from __future__ import annotations
@@ -43,17 +42,20 @@ from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain, motion_about_z
 from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 
-#: Radians and metres up to which a kind is said, with its distance; and up to which it is exact.
+#: Largest deviation of a reported kind (rad, metres), and of one that is exact (both units).
 NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
-#: Singular values below this are freedoms that a path does not have: far above rounding, far below a lever.
+#: Singular values below this are zero: far above rounding, far below a lever arm.
 _RANK = 1e-6
-#: Configurations on which the reach is looked for, each joint free within its limits.
+#: Number of random configurations within the limits that estimate the reach; mimic rules are ignored.
 _SAMPLES = 2000
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two consecutive axes: the angle between their lines, to pi/2, and their distance, 0 beside a slide."""
+    """Two consecutive axes: the angle of their lines (at most pi/2), and their distance.
+
+    The distance is 0 if one of the two joints is prismatic.
+    """
 
     first: str
     second: str
@@ -67,10 +69,10 @@ class Kind:
 
     Attributes:
         name: "parallel", "meet in a point", "spherical wrist", ...
-        joints: Whose.
-        radians: How far from it.
-        metres: Likewise.
-        at: (3,) where, in the base at zero, metres; None where that means nothing.
+        joints: Names of the joints.
+        radians: Deviation from the exact property.
+        metres: Deviation from the exact property.
+        at: (3,) position of the intersection in the base at the zero configuration (metres), or None.
     """
 
     name: str
@@ -81,25 +83,25 @@ class Kind:
 
     @property
     def is_exact(self) -> bool:
-        """Whether rounding explains the distance."""
+        """Whether the deviation is at most 1e-9 rad and 1e-9 m."""
         return self.radians <= EXACT and self.metres <= EXACT
 
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """What kind of arm a path is.
+    """The geometric structure of a path.
 
     Attributes:
         robot: The robot's name.
-        base_frame: What the base is called.
-        tip_frame: What the tip is called.
+        base_frame: Name of the base frame.
+        tip_frame: Name of the tip frame.
         joints: R or P for each joint.
-        freedoms: How many directions the tip can move in at a general configuration: the Jacobian's rank.
-        pairs: Of each pair of consecutive axes the angle and the distance.
-        kinds: What holds, exactly or nearly, the nearest first.
-        reach: Metres from the first axis' point nearest to the second to the tip: no more than this.
-        reached: Metres, the largest on samples.
-        solvers: What can be solved in closed form, by whom.
+        freedoms: Degrees of freedom of the tip: the Jacobian's rank at a general configuration.
+        pairs: Angle and distance of each pair of consecutive axes.
+        kinds: Properties that the path has exactly or nearly; the smallest deviation first.
+        reach: Upper bound of the tip's distance from the point of the first axis nearest to the second (m).
+        reached: Largest such distance on samples (metres).
+        solvers: Closed-form solutions, with libraries that implement them.
     """
 
     robot: str
@@ -114,21 +116,21 @@ class Structure:
     solvers: tuple[str, ...]
 
     def as_mapping(self) -> dict[str, Any]:
-        """Plain data; metres and radians."""
+        """Return the fields as plain data, in metres and radians."""
         return asdict(self)
 
 
 def structure(screws: ProductOfExponentials) -> Structure:
-    """The structure of a path.
+    """Return the structure of a path.
 
     Args:
         screws: The path as a product of exponentials.
     """
     letters = "".join("R" if joint.kind.turns else "P" for joint in screws.joints)
     pairs = tuple(_pair(screws, i) for i in range(len(letters) - 1))
-    kinds = [*_triples(screws, letters, pairs), *_whole(screws, letters, pairs)]
+    kinds = [*_triples(screws, letters, pairs), *_arm_kinds(screws, letters, pairs)]
     kinds = sorted(kinds, key=lambda kind: (not kind.is_exact, kind.radians + kind.metres))
-    tips, jacobian = _sampled(screws)
+    tips, jacobian = _sample_tips(screws)
     origin = _origin(screws)
     return Structure(
         screws.robot,
@@ -138,7 +140,7 @@ def structure(screws: ProductOfExponentials) -> Structure:
         int(np.linalg.matrix_rank(jacobian, tol=_RANK)) if letters else 0,
         pairs,
         tuple(kinds),
-        _longest(screws, origin),
+        _reach_bound(screws, origin),
         float(np.linalg.norm(tips - origin, axis=-1).max()),
         tuple(_solvers(letters, kinds, pairs)),
     )
@@ -169,7 +171,7 @@ def _pair(screws: ProductOfExponentials, i: int) -> Pair:
 
 
 def meeting(screws: ProductOfExponentials, at: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """The point nearest to some axes in least squares, and how far the farthest of them is."""
+    """Return the least-squares nearest point of some axes, and its largest distance from them (metres)."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in at:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -200,7 +202,7 @@ def _triples(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, ...
     return found
 
 
-def _whole(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, ...]) -> list[Kind]:
+def _arm_kinds(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, ...]) -> list[Kind]:
     names = tuple(joint.name for joint in screws.joints)
     tilt = max((pair.angle for pair in pairs), default=0.0)
     if sorted(letters) == ["P", "R", "R", "R"] and tilt <= NEAR_ANGLE:
@@ -213,7 +215,7 @@ def _whole(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, ...])
 
 
 def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[str]:
-    """What is known to be solved in closed form; a kind that holds nearly gives nearly the solution."""
+    """Return the known closed-form solutions; a nearly exact kind gives a nearly exact solution."""
     named = {kind.name for kind in kinds}
     spherical = [kind for kind in kinds if kind.name in ("spherical wrist", "spherical shoulder")]
     if letters == "R" * 7:
@@ -235,7 +237,7 @@ def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[s
         ik_geo = f", ik-geo's spherical{ends}" if "spherical wrist" in named else ""
         found.append(f"Pieper, three axes meet: EAIK{ik_geo}")
     if "three parallel axes" in named:
-        # ik-geo wants the axes 2, 3, 4 parallel, and 5, 6 to meet.
+        # ik-geo requires that axes 2, 3 and 4 are parallel and that axes 5 and 6 intersect.
         ik_geo = f"ik-geo's three_parallel{'_two_intersecting' if meet[4] else ''}"
         solvers = ["EAIK"] * any(meet) + [ik_geo] * (flat[1] and flat[2])
         if solvers:
@@ -247,7 +249,10 @@ def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[s
 
 
 def _origin(screws: ProductOfExponentials) -> FloatArray:
-    """The first axis' point nearest to the second axis, or to the tip where there is none."""
+    """Return the point of the first axis nearest to the second axis, if both joints are revolute.
+
+    Otherwise the result is the point in `screws.points`.
+    """
     if not screws.joints:
         return np.zeros(3)
     if len(screws.joints) > 1 and screws.joints[0].kind.turns and screws.joints[1].kind.turns:
@@ -260,8 +265,8 @@ def _origin(screws: ProductOfExponentials) -> FloatArray:
     return np.asarray(screws.points[0])
 
 
-def _longest(screws: ProductOfExponentials, origin: FloatArray) -> float:
-    """The way from axis to axis, by the feet of their common normals: the tip is never farther away."""
+def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
+    """Return an upper bound of the tip's distance: the path length over the feet of perpendiculars."""
     here, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
         if not joint.kind.turns:
@@ -275,8 +280,8 @@ def _longest(screws: ProductOfExponentials, origin: FloatArray) -> float:
     return total + float(np.linalg.norm(screws.M[:3, 3] - here))
 
 
-def _sampled(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Where the tip comes to, each joint within its limits, and the screws at one of these."""
+def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
+    """Return the tip's positions at samples within the limits, and the Jacobian at the first sample."""
     rng, bounds = np.random.default_rng(0), []
     for joint in screws.joints:
         limit = joint.limit
@@ -290,7 +295,7 @@ def _sampled(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     return tips, free.jacobian(values[0])
 
 
-#: Metres and radians that what a solver needs may be off by; configurations on which that is measured.
+#: Default tolerance of OPW parameters at the tip (metres, rad), and the number of samples that measure it.
 TOLERANCE, SAMPLES = 1e-6, 200
 _H = math.pi / 2.0
 _ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
@@ -298,15 +303,15 @@ _ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Opw:
-    """An arm's parameters as the solver takes them: q_opw = sign * q - offset.
+    """An arm's parameters in the solver's convention: q_opw = sign * q - offset.
 
     Attributes:
-        joints: Names, base to tip.
+        joints: Joint names, base to tip.
         lengths: a1, a2, b, c1, c2, c3, c4 in metres.
-        offsets: Radians, of each joint.
-        signs: +1 or -1, of each joint.
-        base: (4, 4) the solver's base in the URDF's.
-        tool: (4, 4) the URDF's tip in the solver's flange.
+        offsets: Offset of each joint (rad).
+        signs: +1 or -1 for each joint.
+        base: (4, 4) pose of the solver's base in the URDF's base.
+        tool: (4, 4) pose of the URDF's tip in the solver's flange.
     """
 
     joints: tuple[str, ...]
@@ -317,12 +322,18 @@ class Opw:
     tool: FloatArray
 
     def placement(self, q: FloatArray) -> FloatArray:
-        """(..., 4, 4) base . F(sign * q - offset) . tool, F as the solver's library computes it."""
+        """Return the (..., 4, 4) pose base . F(sign * q - offset) . tool, with F of the solver's library."""
         t = np.moveaxis(np.asarray(q) * self.signs - np.array(self.offsets), -1, 0)
         a1, a2, b, c1, c2, c3, c4 = self.lengths.values()
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1
         z = c2 * np.cos(t[1]) - a2 * np.sin(t[1] + t[2]) + c3 * np.cos(t[1] + t[2]) + c1
-        T = _turn(t[0], 2) @ _turn(t[1] + t[2], 1) @ _turn(t[3], 2) @ _turn(t[4], 1) @ _turn(t[5], 2)
+        T = (
+            _rotation(t[0], 2)
+            @ _rotation(t[1] + t[2], 1)
+            @ _rotation(t[3], 2)
+            @ _rotation(t[4], 1)
+            @ _rotation(t[5], 2)
+        )
         T[..., :3, 3] = np.stack(
             [x * np.cos(t[0]) - b * np.sin(t[0]), x * np.sin(t[0]) + b * np.cos(t[0]), z], -1
         )
@@ -330,7 +341,7 @@ class Opw:
         return np.asarray(self.base @ T @ self.tool)
 
     def as_mapping(self) -> dict[str, Any]:
-        """Plain data, with the keys of the solver's own configuration files; metres and radians."""
+        """Return plain data with the keys of the solver's configuration files, in metres and radians."""
         return {
             "opw_kinematics_geometric_parameters": self.lengths,
             "opw_kinematics_joint_offsets": list(self.offsets),
@@ -342,26 +353,26 @@ class Opw:
 
 
 def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
-    """The OPW parameters of a path of six turning joints.
+    """Return the OPW parameters of a path of six revolute joints.
 
     Args:
         path: The path, base to tip.
-        tolerance: Metres, and radians, that the tip may be off by, at worst of `SAMPLES`.
+        tolerance: Largest error of the tip on `SAMPLES` configurations, in metres and in radians.
 
     Raises:
-        InputError: other joints, or an arm that is not of the kind, with how far its tip would be off.
+        InputError: other joints, or no OPW arm; the message gives the error of the tip.
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
-        raise InputError("an OPW arm has six turning joints", where=where, found=str(len(path.joints)))
+        raise InputError("an OPW arm must have six revolute joints", where=where, found=str(len(path.joints)))
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (SAMPLES, len(path.joints)))
-    wanted, best, refused = free.placement(q), None, ""
-    for guide in _guides(path):
+    wanted, best, reason = free.placement(q), None, ""
+    for guide in _candidate_tables(path):
         try:
             choices = Choices(flip=reversed_like(path, Choices(), guide))
         except InputError as error:
-            refused = refused or error.found or ""
+            reason = reason or error.found or ""
             continue
         found = _read(derive_like(path, choices, guide))
         off = np.abs(found.placement(q) - wanted)
@@ -372,18 +383,18 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
             best = rank, size, found
     if best is None or best[0][0]:
         if best is not None:
-            refused = f"a tip that would be off by {best[1][0] * 1e3:.3g} mm and {best[1][1]:.3g} rad"
+            reason = f"an error of {best[1][0] * 1e3:.3g} mm and {best[1][1]:.3g} rad at the tip"
         raise InputError(
-            "the arm is no ortho-parallel one with a spherical wrist",
+            "the arm is not ortho-parallel with a spherical wrist (OPW)",
             where=where,
-            found=refused,
-            remedy="`urdfkin structure` says what it is and how nearly; a larger tolerance takes it for one",
+            found=reason,
+            remedy="run `urdfkin structure` to see its properties, or allow a larger tolerance",
         )
     return best[2]
 
 
-def _guides(path: FrameChain) -> Iterator[DHTable]:
-    """OPW tables with about the arm's lengths, in every combination of the signs of a1, a2 and b."""
+def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
+    """Yield OPW tables of approximately the arm's lengths, for each combination of signs of a1, a2 and b."""
     rows = derive(path, Choices(last=Last.FLANGE)).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
     a1, c2, a2 = (abs(row.a) for row in rows[:3])
@@ -399,7 +410,7 @@ def _guides(path: FrameChain) -> Iterator[DHTable]:
 
 
 def _read(table: DHTable) -> Opw:
-    """The parameters that a table in an OPW table's frames has; whatever else it has is left out."""
+    """Return the OPW parameters in a table that has an OPW table's frames; ignore its other numbers."""
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
@@ -410,25 +421,30 @@ def _read(table: DHTable) -> Opw:
     return Opw(names, lengths, tuple(offsets), signs, table.base, table.tool)
 
 
-def _turn(angle: FloatArray, axis: int) -> FloatArray:
-    """(..., 4, 4) a turn about y (1) or z (2)."""
+def _rotation(angle: FloatArray, axis: int) -> FloatArray:
+    """Return the (..., 4, 4) rotation about y (1) or z (2)."""
     T = motion_about_z(np.asarray(angle), turns=True)
-    order = [1, 2, 0, 3] if axis == 1 else [0, 1, 2, 3]  # where x, y, z of a turn about z go
+    order = [1, 2, 0, 3] if axis == 1 else [0, 1, 2, 3]  # permutation of the axes of a rotation about z
     return np.asarray(T[..., order, :][..., :, order])
 
 
 def axes_and_steps(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """H (n, 3), unit axes, and P (n + 1, 3), metres: from the base, point to point, to the tip.
+    """Return the unit axes H (n, 3) and the steps P (n + 1, 3) between their points, in metres.
+
+    The first step begins at the base; the last one ends at the tip.
 
     Args:
-        screws: A path of turning joints.
+        screws: A path of revolute joints.
     """
     way = np.vstack([np.zeros(3), _points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(way, axis=0)
 
 
 def _points(screws: ProductOfExponentials) -> FloatArray:
-    """(n, 3) a point of each axis: three that meet come first, the wrist before the shoulder, then two."""
+    """Return an (n, 3) array with a point of each axis; intersecting axes share their point.
+
+    Three intersecting axes have priority over two, and the wrist has priority over the shoulder.
+    """
     points, taken, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):
         for i in reversed(range(n - size + 1)):

@@ -1,33 +1,24 @@
-"""One row of a table, and the two conventions in which rows are written.
+"""Define the Denavit-Hartenberg table: rows, a base and a tool, in the standard or modified convention.
 
-The elementary transforms of Denavit and Hartenberg, for one row or for a batch.
+Section 7.5 of the textbook. A table is an alternating product of two kinds of factors:
 
-Every table here is a product of two kinds of factors, in turns:
-
-    S = Rz(theta) Tz(d)              along and about a joint's axis
+    S = Rz(theta) Tz(d)              about and along a joint's axis
     X = Tx(a) Rx(alpha) Ry(beta)     from one axis to the next; beta = 0 except in a Hayati row
 
-Standard rows are S_i X_i, modified rows X_{i-1} S_i: the same factors, bracketed differently.
-
-
-What snapping moved, said in metres and radians that are guaranteed, and measured besides.
-
-Turning one constant rotation of the chain by an angle eps about a joint's origin moves the tip by at most
-eps times the tip's distance from that origin. That distance never exceeds the length of the way: the sum of
-the constant offsets in between and the travel of the sliding joints. The changes add up. The bound so holds
-for every configuration; nothing in it was sampled.
-
-
-The Denavit-Hartenberg table: rows, a base and a tool, in a convention that is always named.
-
-Section 7.5 of the text. With S_i = Rz(theta_i) Tz(d_i) and X = Tx(a) Rx(alpha) Ry(beta):
+Both conventions have the same factors, grouped differently:
 
     standard   T_base_tip = base . S_1 X_1 . S_2 X_2 ... S_n X_n . tool        (X_i from row i)
     modified   T_base_tip = base . X_0 S_1 . X_1 S_2 ... X_{n-1} S_n . tool    (X_{i-1} from row i)
 
-The variable of row i is theta_i for a turning joint and d_i for a sliding one: the constant in the row plus
-`sense` times the joint's value. The standard convention is the text's: joint i turns about z_{i-1}, and
-d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+The variable of row i is theta_i for a revolute joint and d_i for a prismatic one. It is the constant in the
+row plus `sense` times the joint's value. The standard convention is the textbook's: z_{i-1} is the axis of
+joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+
+`SnapReport` states the effect of snapping: a guaranteed bound, and the largest effect on samples. A rotation
+by a small angle about a joint's origin moves the tip by at most that angle times the tip's distance from the
+origin. This distance is at most the path length: the sum of the constant offsets between them, plus the
+travel of the prismatic joints. The bounds of all changes are added. The result is valid for every
+configuration.
 """
 
 from __future__ import annotations
@@ -53,40 +44,40 @@ from urdfkin.system.lazy_import import hook
 
 
 class Convention(StrEnum):
-    """Where a joint's axis stands: z_{i-1} (standard, distal) or z_i (modified, proximal, Craig)."""
+    """Axis of joint i: z_{i-1} (standard, distal) or z_i (modified, proximal, Craig)."""
 
     STANDARD = "standard"
     MODIFIED = "modified"
 
 
 def convention_of(name: str) -> Convention:
-    """The convention by name; raises InputError for anything else."""
+    """Return the convention of this name; raise InputError for an unknown one."""
     try:
         return Convention(name)
     except (ValueError, TypeError):
         raise InputError(
             "unknown convention",
             found=repr(name),
-            remedy="say 'standard' or 'modified'",
+            remedy="write 'standard' or 'modified'",
             question=Question.WHICH_DH_CONVENTION,
         ) from None
 
 
 @dataclass(frozen=True, slots=True)
 class DHRow:
-    """One joint: the constant parts of its parameters, metres and radians.
+    """One joint: the constant parts of its parameters, in metres and radians.
 
     Attributes:
         a: Length along x: a_i in a standard table, a_{i-1} in a modified one.
-        alpha: Turn about x, likewise.
+        alpha: Rotation about x: alpha_i in a standard table, alpha_{i-1} in a modified one.
         d: Offset along the joint's axis; the joint's value is added for a prismatic joint.
-        theta: Turn about the joint's axis; the joint's value is added for a turning joint.
+        theta: Rotation about the joint's axis; the joint's value is added for a revolute joint.
         kind: Revolute, continuous or prismatic.
         joint: The joint's name.
-        sense: +1, or -1 where the row counts the joint's value the other way.
-        beta: Turn about y, after alpha: 0 except in a Hayati row.
-        mimic: Whom the joint follows; None if it has a coordinate of its own.
-        limit: Its bounds, None where there are none.
+        sense: +1, or -1 if the row subtracts the joint's value.
+        beta: Rotation about y, after alpha; 0 except in a Hayati row.
+        mimic: The mimic rule; None if the joint has a coordinate.
+        limit: The joint's limits, or None.
     """
 
     a: float
@@ -108,10 +99,12 @@ class DHRow:
                     f"{name} is not a finite number", where=where, found=str(getattr(self, name))
                 )
         if self.sense not in (1, -1):
-            raise InputError("the sense is +1 or -1", where=where, found=str(self.sense))
+            raise InputError("the sense must be +1 or -1", where=where, found=str(self.sense))
         if not self.kind.has_axis:
             raise InputError(
-                "a row is a revolute, continuous or prismatic joint", where=where, found=self.kind.value
+                "the joint of a row must be revolute, continuous or prismatic",
+                where=where,
+                found=self.kind.value,
             )
 
     @property
@@ -121,21 +114,21 @@ class DHRow:
 
     @property
     def foot(self) -> float:
-        """Metres: how far away four parameters would put the foot of this row's common normal.
+        """Distance of the foot of this row's common normal, for a row of four parameters (metres).
 
-        A Hayati row's x reaches the next axis at `a`, where that axis leans by `beta` along x and by `alpha`
-        across. The common normal stands across both; its foot lies at a sin(beta) / sin^2(tilt).
+        In a Hayati row, x reaches the next axis at the distance `a`. There the axis is tilted by `beta` along
+        x and by `alpha` across x. The foot of the common normal is at a sin(beta) / sin^2(tilt).
         """
         across, along = math.sin(self.alpha) * math.cos(self.beta), math.sin(self.beta)
         return abs(self.a * along) / (across**2 + along**2) if self.beta else 0.0
 
     @property
     def X(self) -> FloatArray:
-        """(4, 4) Tx(a) Rx(alpha) Ry(beta)."""
+        """The (4, 4) transform Tx(a) Rx(alpha) Ry(beta)."""
         return between_axes(self.a, self.alpha, self.beta)
 
     def S(self, value: ArrayLike = 0.0) -> FloatArray:
-        """(..., 4, 4) Rz(theta) Tz(d) with the joint at `value`, rad or m."""
+        """Return the (..., 4, 4) transform Rz(theta) Tz(d) with the joint at `value` (rad or m)."""
         moved = self.sense * np.asarray(value, dtype=np.float64)
         return (
             along_axis(self.theta + moved, self.d)
@@ -144,12 +137,12 @@ class DHRow:
         )
 
 
-#: How far from a multiple of 15 degrees people write one, as a share of 15 degrees.
+#: Largest rounding error of a handwritten multiple of 15 degrees, as a fraction of 15 degrees.
 _WRITTEN = 1e-3
 
 
 def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:
-    """(..., 4, 4) S = Rz(theta) Tz(d), radians and metres; the arguments are broadcast."""
+    """Return (..., 4, 4) S = Rz(theta) Tz(d), radians and metres; the arguments broadcast."""
     theta, d = np.broadcast_arrays(np.asarray(theta, np.float64), np.asarray(d, np.float64))
     S = np.zeros((*theta.shape, 4, 4))
     S[..., 0, 0] = S[..., 1, 1] = np.cos(theta)
@@ -161,7 +154,7 @@ def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:
 
 
 def between_axes(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
-    """(4, 4) X = Tx(a) Rx(alpha) Ry(beta), metres and radians."""
+    """Return the (4, 4) transform X = Tx(a) Rx(alpha) Ry(beta), metres and radians."""
     ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
     return np.array(
         [
@@ -174,7 +167,7 @@ def between_axes(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
 
 
 def as_step(T: FloatArray) -> tuple[float, float] | None:
-    """(a, alpha) where a pose is Tx(a) Rx(alpha) to rounding of its rotation, else None.
+    """Return (a, alpha) if a pose is Tx(a) Rx(alpha), up to rounding of the rotation; else None.
 
     Example:
         >>> as_step(between_axes(0.5, math.pi))
@@ -189,7 +182,7 @@ def as_step(T: FloatArray) -> tuple[float, float] | None:
 
 
 def wrapped(angle: float) -> float:
-    """The angle's representative in (-pi, pi], where a rounding error below -pi counts as pi.
+    """Return the equal angle in (-pi, pi]; -pi becomes pi, also within rounding.
 
     Example:
         >>> wrapped(-math.pi) == math.pi, wrapped(7.0) == 7.0 - 2 * math.pi
@@ -200,7 +193,7 @@ def wrapped(angle: float) -> float:
 
 
 def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
-    """Whether an angle is a multiple of 15 degrees, and not 0, as far as people write them: 1.571 is.
+    """Whether an angle looks like a handwritten multiple of 15 degrees other than 0, for example 1.571.
 
     >>> looks_round(1.571), looks_round(0.0), looks_round(0.25), looks_round(90.0, twelfth=15.0)
     (True, False, False, True)
@@ -209,21 +202,20 @@ def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
 
 
 def nearest_twelfth(angle: float) -> float:
-    """The multiple of pi/12 (15 degrees) nearest to an angle."""
+    """Return the multiple of pi/12 (15 degrees) nearest to an angle."""
     return round(angle * 12.0 / math.pi) * math.pi / 12.0
 
 
 @dataclass(frozen=True, slots=True)
 class SnapChange:
-    """One constant rotation that was made round.
+    """One snapped rotation.
 
     Attributes:
-        row: Index of the row in which it shows (0 is the first); -1 for the base, the number of rows for the
-            tool.
+        row: Index of the row that contains it, from 0; -1 for the base, the number of rows for the tool.
         what: The joint and the quantity.
-        angle: By how much everything beyond turned, radians.
-        lever: Metres: the tip is never farther from the pivot than this while sliding joints are at zero.
-        sliders: Names of the sliding joints beyond the pivot, whose travel lengthens the lever.
+        angle: Rotation of the rest of the chain (rad).
+        lever: Largest distance of the tip from the pivot with the prismatic joints at zero (metres).
+        sliders: Names of the prismatic joints after the pivot; their travel adds to the lever.
     """
 
     row: int
@@ -234,23 +226,23 @@ class SnapChange:
 
     @property
     def tip(self) -> float:
-        """Metres: how far this change moves the tip at most, with the sliding joints at zero."""
+        """Bound of the tip's displacement with the prismatic joints at zero (metres)."""
         return self.angle * self.lever
 
 
 @dataclass(frozen=True, slots=True)
 class SnapReport:
-    """All that was snapped, and how far the tip moves.
+    """All snapped rotations, and their effect on the tip.
 
     Attributes:
-        tolerance: Radians, as asked for.
-        changes: What was moved, base to tip.
-        metres: Guaranteed: the tip's position moves by no more, within the limits of sliding joints.
-        radians: Guaranteed: its orientation turns by no more.
-        per_metre: What each metre of travel of a sliding joint adds, for joints without limits too.
-        measured_metres: The largest displacement seen on samples.
-        measured_radians: The largest turn seen on them.
-        samples: How many.
+        tolerance: The requested tolerance (rad).
+        changes: The snapped rotations, base to tip.
+        metres: Guaranteed bound of the tip's displacement within the limits of prismatic joints.
+        radians: Guaranteed bound of the tip's rotation.
+        per_metre: Increase of the bound for each metre of travel of each prismatic joint (metres per metre).
+        measured_metres: Largest displacement on samples.
+        measured_radians: Largest rotation on samples.
+        samples: Number of samples.
     """
 
     tolerance: float
@@ -264,38 +256,38 @@ class SnapReport:
 
     @property
     def rows(self) -> tuple[int, ...]:
-        """Rows (from 0) that show a change, in order; -1 is the base, the number of rows the tool."""
+        """Sorted indices of the changed rows, from 0; -1 is the base, the number of rows is the tool."""
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """(...,) metres: the guarantee at given values (by joint name) of the sliding joints."""
+        """Return the (...,) guaranteed bound (metres) at these values of the prismatic joints, by name."""
         at_zero = sum(change.tip for change in self.changes)
         travel = [np.abs(values[name]) * rate for name, rate in self.per_metre.items()]
         return np.asarray(at_zero + sum(travel, np.zeros(())), dtype=np.float64)
 
 
-#: How far the rotation of a pose may be from one: people type seven digits.
+#: Tolerance of the rotation in a pose: handwritten numbers often have seven digits.
 _TYPED = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DHTable(Displayable):
-    """A Denavit-Hartenberg table: data, and the products of its own matrices.
+    """A Denavit-Hartenberg table, with the placements that its matrices give.
 
-    `urdfkin.load` makes a robot of it; `urdfkin.dh` has its motion and its other forms.
+    `urdfkin.load` makes a robot from it. `urdfkin.dh` computes its motion and exports it.
 
     Attributes:
         convention: Standard or modified.
-        rows: One for each moving joint, base to tip.
-        base: (4, 4) T_base_0, constant, metres.
-        tool: (4, 4) T_n_tip, constant, metres.
+        rows: One row for each moving joint, base to tip.
+        base: (4, 4) T_base_0, constant (metres).
+        tool: (4, 4) T_n_tip, constant (metres).
         robot: The robot's name.
-        base_frame: What the base is called.
-        tip_frame: What the tip is called.
-        snap: What was moved to make cells round, and how far that moves the tip; None for an exact table.
+        base_frame: Name of the base frame.
+        tip_frame: Name of the tip frame.
+        snap: The snapped angles and their effect on the tip; None for an exact table.
 
     Raises:
-        InputError: when two rows name one joint, or base or tool is no rigid transform.
+        InputError: two rows name the same joint, or base or tool is not a rigid transform.
     """
 
     convention: Convention
@@ -320,7 +312,7 @@ class DHTable(Displayable):
                     "two rows name the same joint", where=f"table of {self.robot}", found=repr(name)
                 )
 
-    # -- how it shows itself -------------------------------------------------------------------------
+    # -- display --------------------------------------------------------------------------------------
 
     def __repr__(self) -> str:
         ends = f"{self.base_frame} to {self.tip_frame}"
@@ -330,24 +322,24 @@ class DHTable(Displayable):
         return "\n".join(map(log_line, self._written("terminal", units_of()).split("\n")))
 
     def to_markdown(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
-        """The table in Markdown, for a README or an issue.
+        """Return the table in Markdown, for a README or an issue.
 
         Args:
-            angles: "radians" (pi as a fraction where that is exact) or "degrees".
+            angles: "radians" (exact multiples of pi/12 as fractions of pi) or "degrees".
             lengths: "metres" or "millimetres".
             digits: Significant digits.
 
         Raises:
-            InputError: no such unit.
+            InputError: an unknown unit.
         """
         return self._written("markdown", units_of(angles, lengths, digits))
 
     def to_latex(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
-        """The table in LaTeX, for a paper; it needs booktabs and amsmath. Arguments as `to_markdown`."""
+        """Return the table in LaTeX (amsmath, booktabs, graphicx); arguments as in `to_markdown`."""
         return self._written("latex", units_of(angles, lengths, digits))
 
     def to_html(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
-        """The table in HTML, to stand in a page. Arguments as `to_markdown`."""
+        """Return the table in HTML, for a web page; arguments as in `to_markdown`."""
         return self._written("html", units_of(angles, lengths, digits))
 
     def _written(self, form: str, units: Units) -> str:
@@ -366,31 +358,31 @@ class DHTable(Displayable):
 
     @cached_property
     def coupling(self) -> Coupling:
-        """How the table's coordinates move its joints."""
+        """The map from the table's coordinates to its joints' values."""
         return coupling_of([(row.joint, row.mimic, row.kind) for row in self.rows])
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """The table's coordinates: its independent joints in row order, leaders of followers included."""
+        """Names of the table's coordinates: independent joints in row order, mimicked joints included."""
         return self.coupling.names
 
     # -- sizes ---------------------------------------------------------------------------------------
 
     @property
     def has_hayati_rows(self) -> bool:
-        """Whether any row needs its fifth parameter, beta."""
+        """Whether any row has a fifth parameter, beta."""
         return any(row.beta != 0.0 for row in self.rows)
 
     @cached_property
     def span(self) -> float:
-        """Metres: the sum of all |a| and |d| and of the tool's length, without any motion."""
+        """Sum of all |a| and |d| and of the tool's length, with all joints at zero (metres)."""
         lengths = sum(abs(row.a) + abs(row.d) for row in self.rows)
         return lengths + math.hypot(*self.tool[:3, 3])
 
     def rounding(self, q: Given) -> FloatArray:
-        """(...,) metres: what rounding may do to `placement(q)`; divided by `span`, radians.
+        """Return the (...,) bound of the rounding of `placement(q)` in metres; divided by `span`, in radians.
 
-        What the rows round (`urdfkin.kinematics.roundings`), and their angles, times the lever arm.
+        It is the rounding of the rows (`urdfkin.kinematics.roundings`) and of their angles, times the lever.
         """
         values = np.abs(self.coupling.values(q))
         turns = np.array([row.kind.turns for row in self.rows], dtype=bool)
@@ -399,9 +391,9 @@ class DHTable(Displayable):
         return np.asarray(EPS * (of_rows(len(self.rows)) + angle) * lever)
 
     def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
-        """(...,) metres and (...,) radians: how far `placement(q)` may be from the URDF's.
+        """Return the (...,) bounds of the difference from the URDF's placement, in metres and in radians.
 
-        That is rounding for an exact table; what snapping declares is added.
+        For an exact table this is the bound of rounding. For a snapped table its snapping bound is added.
         """
         metres = self.rounding(q)
         radians = EPS * of_rows(len(self.rows)) + np.zeros_like(metres)
@@ -414,11 +406,11 @@ class DHTable(Displayable):
     # -- placement -----------------------------------------------------------------------------------
 
     def frames(self, q: Given | None = None) -> FloatArray:
-        """(..., n + 1, 4, 4) poses of the frames 0 ... n in the base frame.
+        """Return the (..., n + 1, 4, 4) poses of the frames 0 to n in the base frame.
 
         Args:
-            q: (..., coordinates) in the order of `joint_names`, or by name, as a mapping or text;
-                None is all zero.
+            q: (..., coordinates) in the order of `joint_names` (rad or m), or by name as a mapping or text.
+                None is the zero configuration.
 
         Raises:
             InputError: `q` has the wrong length.
@@ -433,7 +425,7 @@ class DHTable(Displayable):
         return poses
 
     def placement(self, q: Given) -> FloatArray:
-        """(..., 4, 4) T_base_tip: base, rows and tool multiplied.
+        """Return the (..., 4, 4) pose T_base_tip: the product of base, rows and tool.
 
         Args:
             q: (..., coordinates) in the order of `joint_names`, rad or m, or by name, as a mapping or text.
@@ -452,13 +444,13 @@ class DHTable(Displayable):
 
 
 def _rigid(T: ArrayLike, where: str) -> FloatArray:
-    """A read-only (4, 4) rigid transform; rejects what is none."""
+    """Return a read-only (4, 4) rigid transform; raise InputError for any other matrix."""
     pose = frozen(T)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise InputError(
-            "a pose is a (4, 4) array of finite numbers", where=where, found=f"shape {pose.shape}"
+            "a pose must be a (4, 4) array of finite numbers", where=where, found=f"shape {pose.shape}"
         )
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is no rotation
+    with np.errstate(over="ignore", invalid="ignore"):  # an overflow is rejected below
         off = np.abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max()
     if off > _TYPED or np.linalg.det(pose[:3, :3]) < 0.0 or pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
         raise InputError("a pose must be a rotation and a translation", where=where, found=str(pose.tolist()))

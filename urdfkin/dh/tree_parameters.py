@@ -1,19 +1,19 @@
-"""Khalil and Kleinfinger's parameters: one table for a whole tree.
+"""Compute Khalil and Kleinfinger's parameters: one table for a whole tree.
 
 W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots", ICRA 1986. Each
-link j has one frame, its z_j along the axis of the joint that carries it (proximal, as in the modified
-convention), and its pose in the frame of its antecedent i = a(j), the nearest link that moves, is
+link j has one frame. Its z_j is along the axis of the link's own joint (proximal, as in the modified
+convention). Its antecedent i = a(j) is the nearest moving link before it. The pose in the antecedent's frame
+is
 
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
-gamma and b are zero on the link's first moving child, whose common normal defines x_i: along a chain without
-branches the table is the modified one with a(i-1) = d and d(i) = r. sigma says how the joint moves: 0 turns
-(theta), 1 slides (r), 2 is fixed. Fixed frames take all six numbers, so every frame of the robot is exact.
-beta is not of the original: it is zero except between nearly parallel axes (Hayati), where four numbers
-would need offsets of kilometres.
+The common normal to the first moving child of link i defines x_i, so gamma and b of this child are zero.
+Along a chain without branches the table is the modified one, with a(i-1) = d and d(i) = r. sigma is the
+joint's kind: 0 revolute (theta), 1 prismatic (r), 2 fixed. A fixed joint uses all six numbers, so every frame
+of the robot is exact. beta is not part of the original notation. It is zero except between nearly parallel
+axes (Hayati), where the other numbers would need offsets of kilometres.
 
-
-Khalil and Kleinfinger's table as text, Markdown, comma-separated values and plain data.
+`write_tree` and `as_mapping` write the table as text, Markdown, CSV and plain data.
 """
 
 from __future__ import annotations
@@ -44,23 +44,23 @@ _SIGMA = {JointKind.REVOLUTE: 0, JointKind.CONTINUOUS: 0, JointKind.PRISMATIC: 1
 
 @dataclass(frozen=True, slots=True)
 class TreeRow:
-    """One joint and the link it carries; metres and radians.
+    """One joint and its child link, in metres and radians.
 
     Attributes:
-        joint: Its name.
-        link: The link's name.
+        joint: Name of the joint.
+        link: Name of the child link.
         antecedent: Index of the row of the antecedent link, from 0; -1 is the root.
-        sigma: 0 turns, 1 slides, 2 is fixed.
-        gamma: Turn about the antecedent's z.
-        b: Offset along it.
-        alpha: Turn about x, the common normal.
+        sigma: 0 revolute, 1 prismatic, 2 fixed.
+        gamma: Rotation about the antecedent's z.
+        b: Offset along the antecedent's z.
+        alpha: Rotation about x, the common normal.
         d: Length along x.
-        beta: Turn about y after alpha; 0 except between nearly parallel axes.
-        theta: Turn about the joint's own z; the joint's value is added if sigma is 0.
-        r: Offset along it; the joint's value is added if sigma is 1.
-        leader: Name of the joint that this one follows, or its own.
-        multiplier: The joint's value is multiplier * q_leader + offset.
-        offset: Likewise.
+        beta: Rotation about y after alpha; 0 except between nearly parallel axes.
+        theta: Rotation about the joint's own z; the joint's value is added if sigma is 0.
+        r: Offset along the joint's own z; the joint's value is added if sigma is 1.
+        leader: Name of the mimicked joint; of a joint that mimics no other, its own name.
+        multiplier: Factor of the mimic rule: the joint's value is multiplier * q_leader + offset.
+        offset: Offset of the mimic rule.
     """
 
     joint: str
@@ -86,12 +86,11 @@ class TreeParameters:
     Attributes:
         robot: The robot's name.
         root: The root link.
-        rows: One for each joint, fixed ones too, in the tree's order.
-        ways: (joints,) metres: the URDF's own way from the root to each joint, all offsets added up.
-        T_frame_link: (joints, 4, 4) pose of the URDF's link frame in the row's frame: a turn and a shift
-            that make z the joint's axis and x the common normal.
-        left_out: Radians: the tilts that are taken for rounding (`urdfkin.dh.noise`), added up on the way on
-            which they are most.
+        rows: One row for each joint, fixed joints included, in the tree's order.
+        ways: (joints,) path length from the root to each joint: the sum of the URDF's offsets (metres).
+        T_frame_link: (joints, 4, 4) pose of the URDF's link frame in the row's frame. The row's frame has z
+            along the joint's axis and x along the common normal.
+        left_out: Largest sum, over all paths, of the tilts that count as rounding (rad; `urdfkin.dh.noise`).
     """
 
     robot: str
@@ -103,20 +102,24 @@ class TreeParameters:
 
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
-        """Joints that move and follow nobody, in the tree's order: the columns of `q`."""
+        """Names of the moving joints that mimic no other joint, in the tree's order: the columns of `q`."""
         return tuple(row.joint for row in self.rows if row.sigma < 2 and row.leader == row.joint)
 
     @property
     def roundings(self) -> float:
-        """How many eps of the reach rounding may make: of the deepest link's rows, and of its own frame.
+        """Rounding of the deepest link's rows and of its own frame, in eps of the reach.
 
-        What Pinocchio rounds is not added: this is less than could conspire, and more than ever did.
+        Pinocchio's rounding is not added. The value is smaller than the worst case, and larger than every
+        measured error.
         """
         deepest = max((len(self._way(j)) for j in range(len(self.rows))), default=0)
         return of_rows(1 + deepest) + self.left_out / EPS
 
     def reach(self, q: FloatArray) -> FloatArray:
-        """(..., joints) metres: the way from the root to each link at `q`, the URDF's or the table's."""
+        """Return the (..., joints) path length from the root to each link at `q`, in metres.
+
+        It is the larger of the URDF's and the table's path length.
+        """
         values = np.abs(self._values(q))
         own = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
         own = own + np.where([row.sigma == 1 for row in self.rows], values, 0.0)
@@ -138,7 +141,7 @@ class TreeParameters:
         return way
 
     def _values(self, q: FloatArray) -> FloatArray:
-        """(..., joints) values of all joints; zero for fixed ones."""
+        """Return the (..., joints) values of all joints; zero for fixed joints."""
         column = {name: i for i, name in enumerate(self.coordinates)}
         values = np.zeros((*q.shape[:-1], len(self.rows)))
         for j, row in enumerate(self.rows):
@@ -147,10 +150,10 @@ class TreeParameters:
         return values
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """(..., joints, 4, 4) poses of every link's URDF frame in the root's.
+        """Return the (..., joints, 4, 4) poses of every link's URDF frame in the root frame.
 
         Args:
-            q: (..., coordinates) in the robot's order.
+            q: (..., coordinates) in the order of `coordinates`.
 
         Raises:
             InputError: the wrong number of coordinates.
@@ -171,14 +174,14 @@ class TreeParameters:
 
 
 def tree_parameters(tree: KinematicTree) -> TreeParameters:
-    """Khalil and Kleinfinger's parameters of a whole robot, exact to rounding.
+    """Return Khalil and Kleinfinger's parameters of a whole robot, exact to rounding.
 
     Args:
         tree: The robot.
 
     Raises:
         InputError: a planar or floating joint, which has no single axis.
-        RangeError: lengths whose squares leave the range of doubles.
+        RangeError: lengths with squares outside the range of doubles.
     """
     demand_squares(tree.joints)
     for joint in tree.joints:
@@ -190,7 +193,7 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
             )
     links = _links(tree)
     steps, own = _steps(tree, links)
-    ways = _ways(tree)
+    ways = _path_lengths(tree)
     rows = tuple(
         _row(tree, j, links[j].antecedent, steps[j], own, way=ways[j]) for j in range(len(tree.joints))
     )
@@ -204,11 +207,14 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
 
 @dataclass(frozen=True, slots=True)
 class _Link:
-    """Where a link's axis frame stands: the antecedent is the nearest link that moves (-1 the root).
+    """The axis frame of a link.
 
     Attributes:
-        noise: Of the pose in the antecedent.
-        left_out: Radians: tilts that are taken for rounding, from the root to here.
+        antecedent: Index of the nearest moving link before it; -1 is the root.
+        T_antecedent_axis: (4, 4) pose of the axis frame in the antecedent's axis frame.
+        T_link_axis: (4, 4) pose of the axis frame in the link's URDF frame.
+        noise: Noise of the pose in the antecedent.
+        left_out: Sum of the tilts from the root to this link that count as rounding (rad).
     """
 
     antecedent: int
@@ -219,29 +225,29 @@ class _Link:
 
 
 def _links(tree: KinematicTree) -> list[_Link]:
-    """For each joint: its axis frame (z the axis; the link's own frame if fixed) in the antecedent's."""
+    """Return the axis frame of each joint: z along the axis; the link's own frame for a fixed joint."""
     links = list[_Link]()
-    # Of each link: the moving link that carries it, its frame in that one's axis frame, and how many joints
-    # lie between the two.
-    carried = [(-1, np.eye(4), 0)]
-    for j, (joint, way) in enumerate(zip(tree.joints, _ways(tree), strict=True)):
-        antecedent, T, folded = carried[joint.parent]
+    # For each link: its nearest moving link, its frame in that link's axis frame, and the number of joints
+    # between the two links.
+    carriers = [(-1, np.eye(4), 0)]
+    for j, (joint, way) in enumerate(zip(tree.joints, _path_lengths(tree), strict=True)):
+        antecedent, T, folded = carriers[joint.parent]
         align = turned(joint)
         here = T @ joint.T_parent_joint @ align
         noise, tilt = noise_of(folded + 1, 0.0, way), tilt_of(here)
         left_out = links[antecedent].left_out if antecedent >= 0 else 0.0
         left_out += tilt if tilt <= noise.radians else 0.0
         links.append(_Link(antecedent, here, align, noise, left_out))
-        carried.append((j, align.T, 0) if joint.kind.has_axis else (antecedent, here, folded + 1))
+        carriers.append((j, align.T, 0) if joint.kind.has_axis else (antecedent, here, folded + 1))
     return links
 
 
 def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[int, tuple[float, float]]]:
-    """The step to every axis, and the turn and shift from a link's axis frame to its row's frame.
+    """Return the step to each axis, and the rotation and offset from each axis frame to its row's frame.
 
-    The first moving child of a link defines its x; a link without one keeps the x that makes theta zero.
+    The first moving child of a link defines its x. A link without a moving child has the x with theta = 0.
     """
-    ways = _ways(tree)
+    ways = _path_lengths(tree)
     steps, own = list[Step](), {-1: (0.0, 0.0)}
     for link, joint, way in zip(links, tree.joints, ways, strict=True):
         i = link.antecedent
@@ -265,7 +271,7 @@ def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[in
 def _row(
     tree: KinematicTree, j: int, i: int, step: Step, own: dict[int, tuple[float, float]], *, way: float
 ) -> TreeRow:
-    """The row of joint j with antecedent i."""
+    """Return the row of joint j with antecedent i."""
     joint = tree.joints[j]
     turn, shift = own.get(i, (0.0, 0.0))
     own_turn, own_shift = own.get(j, (0.0, 0.0))
@@ -288,8 +294,8 @@ def _row(
     )
 
 
-def _ways(tree: KinematicTree) -> list[float]:
-    """Metres from the root to each joint's origin, all offsets on the way added up."""
+def _path_lengths(tree: KinematicTree) -> list[float]:
+    """Return the path length from the root to each joint's origin: the sum of all offsets (metres)."""
     ways = [0.0]
     for joint in tree.joints:
         ways.append(ways[joint.parent] + math.hypot(*joint.T_parent_joint[:3, 3]))
@@ -300,7 +306,7 @@ FORMULA = "T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r), i
 
 
 def as_mapping(table: TreeParameters) -> dict[str, Any]:
-    """Plain data, metres and radians; rows are numbered from 1, the root is 0."""
+    """Return plain data in metres and radians; row numbers begin at 1, and 0 is the root."""
     return {
         "notation": "Khalil-Kleinfinger",
         "robot": table.robot,
@@ -311,12 +317,12 @@ def as_mapping(table: TreeParameters) -> dict[str, Any]:
 
 
 def write_tree(table: TreeParameters, form: str, units: Units) -> str:
-    """The table as "terminal", "markdown" or "csv"; csv is in metres and radians, with T_frame_link."""
+    """Return the table as "terminal", "markdown" or "csv"; csv has metres, radians and T_frame_link."""
     if form == "csv":
         return _csv(table)
     shown = markdown_code if form == "markdown" else str
     title = f"{shown(table.robot)}: Khalil-Kleinfinger parameters, {shown(table.root)} is frame 0"
-    body = [_heads(table, units), *(_cells(table, j, units, shown) for j in range(len(table.rows)))]
+    body = [_headings(table, units), *(_cells(table, j, units, shown) for j in range(len(table.rows)))]
     if form == "markdown":
         lines = ["| " + " | ".join(row) + " |" for row in body]
         rule = "| " + " | ".join(["---:"] * len(body[0])) + " |"
@@ -325,7 +331,7 @@ def write_tree(table: TreeParameters, form: str, units: Units) -> str:
 
 
 def _csv(table: TreeParameters) -> str:
-    """A line for each row: its numbers, then the three upper rows of T_frame_link, T11 to T34."""
+    """Write a line for each row: its numbers, then the three upper rows of T_frame_link, T11 to T34."""
     places = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
     lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *places]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3].tolist(), strict=True):
@@ -334,17 +340,17 @@ def _csv(table: TreeParameters) -> str:
     return csv_text(lines)
 
 
-def _heads(table: TreeParameters, units: Units) -> list[str]:
+def _headings(table: TreeParameters, units: Units) -> list[str]:
     angle, length = units.angle_name, units.length_name
     heads = ["j", "joint", "a(j)", "sigma", f"gamma [{angle}]", f"b [{length}]", f"alpha [{angle}]"]
     heads += [f"d [{length}]", f"theta [{angle}]", f"r [{length}]"]
-    return [*heads, f"beta [{angle}]"] if _bent(table) else heads
+    return [*heads, f"beta [{angle}]"] if _has_beta(table) else heads
 
 
 def _cells(table: TreeParameters, j: int, units: Units, shown: Callable[[str], str]) -> list[str]:
     row = table.rows[j]
     theta, r = units.angle(row.theta), units.length(row.r)
-    # A follower's own offset is part of its constant, as in the other tables.
+    # The offset of a mimic joint is part of its constant, as in the other tables.
     leader = shown(row.leader)
     own = f"q({leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({leader})"
     if row.sigma == 0:
@@ -353,8 +359,8 @@ def _cells(table: TreeParameters, j: int, units: Units, shown: Callable[[str], s
         r = added(own, units.length(row.r + row.offset))
     cells = [str(j + 1), shown(row.joint), str(row.antecedent + 1), str(row.sigma), units.angle(row.gamma)]
     cells += [units.length(row.b), units.angle(row.alpha), units.length(row.d), theta, r]
-    return [*cells, units.angle(row.beta)] if _bent(table) else cells
+    return [*cells, units.angle(row.beta)] if _has_beta(table) else cells
 
 
-def _bent(table: TreeParameters) -> bool:
+def _has_beta(table: TreeParameters) -> bool:
     return any(row.beta for row in table.rows)

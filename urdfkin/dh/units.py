@@ -1,6 +1,6 @@
-"""Numbers of a table as a person writes them: pi as a fraction where exact, degrees, millimetres.
+"""Convert a table's numbers from and to text: fractions of pi, degrees, millimetres.
 
-The table itself is always in metres and radians; units exist at the border only.
+A table itself is always in metres and radians. Other units exist only in its input and output.
 """
 
 from __future__ import annotations
@@ -18,33 +18,33 @@ from urdfkin.errors.validators import safe_repr
 
 
 class Angles(StrEnum):
-    """How angles are written."""
+    """Unit of angles in text."""
 
     RADIANS = "radians"
     DEGREES = "degrees"
 
 
 class Lengths(StrEnum):
-    """How lengths are written."""
+    """Unit of lengths in text."""
 
     METRES = "metres"
     MILLIMETRES = "millimetres"
 
 
-#: The four columns in the order that is usual here; Craig has alpha, a, d, theta, the Robotics Toolbox theta,
-#: d, a, alpha.
+#: Default order of the four columns. Craig's order is alpha, a, d, theta; the Robotics Toolbox's is theta, d,
+#: a, alpha.
 COLUMNS = ("a", "alpha", "d", "theta")
 
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """How a table is written: radians and metres unless said otherwise.
+    """Format of a table's numbers; radians and metres by default.
 
     Attributes:
-        angles: Radians, with pi as a fraction where that is exact, or degrees.
+        angles: Radians (exact multiples of pi/12 as fractions of pi) or degrees.
         lengths: Metres or millimetres.
         digits: Significant digits.
-        columns: The order of the columns in printed tables.
+        columns: Order of the columns in printed tables.
     """
 
     angles: Angles = Angles.RADIANS
@@ -59,20 +59,20 @@ class Units:
 
     @property
     def angle_name(self) -> str:
-        """The unit as a heading writes it."""
+        """Unit in a column's heading."""
         return "rad" if self.angles is Angles.RADIANS else "deg"
 
     @property
     def length_name(self) -> str:
-        """The unit as a heading writes it."""
+        """Unit in a column's heading."""
         return "m" if self.lengths is Lengths.METRES else "mm"
 
     def angle(self, radians: float, pi: str = "pi") -> str:
-        """An angle as text.
+        """Format an angle.
 
         Args:
             radians: The angle.
-            pi: How to write pi.
+            pi: Text for pi.
 
         Example:
             >>> Units().angle(-math.pi / 2), Units(Angles.DEGREES).angle(math.pi / 12)
@@ -86,7 +86,7 @@ class Units:
         return fraction_text(fraction, pi)
 
     def length(self, metres: float) -> str:
-        """A length as text.
+        """Format a length.
 
         Example:
             >>> Units(lengths=Lengths.MILLIMETRES).length(0.0825)
@@ -102,7 +102,7 @@ _SHORT = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"
 
 
 def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10) -> Units:
-    """Units by name, rad, deg, m and mm included; raises InputError for a name that is none."""
+    """Return units by name (also rad, deg, m and mm); raise InputError for an unknown name."""
     try:
         angles, lengths = (_SHORT.get(name, name) for name in (angles, lengths))
         return Units(Angles(angles), Lengths(lengths), digits)
@@ -111,12 +111,12 @@ def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10)
             "unknown unit",
             where="angles or lengths",
             found=f"{angles!r}, {lengths!r}",
-            remedy="say radians or degrees, metres or millimetres",
+            remedy="write radians or degrees, metres or millimetres",
         ) from None
 
 
 def pi_fraction(radians: float) -> Fraction | None:
-    """The multiple of pi that an angle is to the last bit, in twelfths; None for any other angle.
+    """Return an angle as a fraction of pi if it is exactly a multiple of pi/12; else None.
 
     Example:
         >>> pi_fraction(math.pi / 2), pi_fraction(1.5708)
@@ -127,7 +127,7 @@ def pi_fraction(radians: float) -> Fraction | None:
 
 
 def fraction_text(fraction: Fraction, pi: str = "pi") -> str:
-    """A multiple of pi as text: 0, pi, -pi/2, 5pi/12."""
+    """Format a multiple of pi: 0, pi, -pi/2, 5pi/12."""
     if fraction == 0:
         return "0"
     count = {1: "", -1: "-"}.get(fraction.numerator, str(fraction.numerator))
@@ -135,10 +135,10 @@ def fraction_text(fraction: Fraction, pi: str = "pi") -> str:
 
 
 def read_number(value: object, where: str) -> float:
-    """A number, or text that is one, or a multiple of pi such as "-pi/2" or "3*pi/4".
+    """Parse a number, a number in text, or a multiple of pi such as "-pi/2" or "3*pi/4".
 
     Raises:
-        InputError: anything else, with its place.
+        InputError: anything else; the message names `where`.
 
     Example:
         >>> read_number("-pi/2", "alpha") == -math.pi / 2
@@ -167,7 +167,7 @@ def _number(value: object) -> float:
 
 
 def cell_in_si(name: str, number: float, units: Units) -> float:
-    """A cell, by its name a length or an angle, in metres or radians; 90 degrees are pi/2 to the bit."""
+    """Convert the cell `name` to metres or radians; 90 degrees become exactly math.pi / 2."""
     if name in ("a", "d"):
         return number / 1000.0 if units.counts_millimetres else number
     return number if units.angles is Angles.RADIANS else in_radians(number)

@@ -1,4 +1,4 @@
-"""Does a URDF agree with the vendor's table?"""
+"""Compare a URDF with a published Denavit-Hartenberg table."""
 
 from urdfkin.dh.compare.agreement import TOLERANCE, compare
 from urdfkin.dh.compare.result import CellDifference, Comparison, Mistake, comparison_text

@@ -1,4 +1,4 @@
-"""Does a URDF agree with a published table? Cell by cell, and in millimetres at the tip."""
+"""Compare a URDF with a published table: cell by cell, and in millimetres at the tip."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from urdfkin.errors import InputError
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
 from urdfkin.model.tree import FloatArray, JointKind, Limit, is_bounded
 
-#: Metres at the tip up to which a table agrees: half as much again as rounding to 0.1 mm in a cell or two.
+#: Default tolerance at the tip (metres): 1.5 times the effect of rounding one or two cells to 0.1 mm.
 TOLERANCE = 2e-4
-#: How many configurations a fit is made on, how many it is judged on, and their seeds: never the same ones.
+#: Number of configurations of a fit, and of its check; different seeds give different configurations.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Of what the tip is off: cells that leave more explain nothing.
+#: Fraction of the tip error: if changed cells leave more, they do not explain it.
 _EXPLAINS = 0.5
-#: Of what the tip is off: a single mistake, undone, leaves no more.
+#: Fraction of the tip error that the correction of a single mistake may leave.
 _LEFT = 0.05
-#: Metres for each metre of reach: a cell that moved by less did not, a tenth of what `EXPLAINED` leaves.
+#: Smallest change of a cell, relative to the reach: a tenth of `EXPLAINED`.
 _MOVED = 1e-10
-#: Of the way along a robot's links: a tip that goes no farther stands still, and says nothing of how far.
-_STANDS = 1e-6
-#: Metres between which a slide without limits is tried.
+#: Fraction of the path length: with a smaller motion the tip is fixed, and its motion gives no reach.
+_FIXED_TIP = 1e-6
+#: Range of samples of a prismatic joint without limits (metres).
 _SLIDE = (-0.5, 0.5)
-#: Of each row, half a unit of the last digit with which its cells were written, metres and radians.
+#: For each row, half a unit of the last digit of each cell in the table's file (metres and radians).
 Digits = Sequence[Mapping[str, float]]
 
 
@@ -48,22 +48,25 @@ def compare(
     fit: bool = True,
     digits: Digits = (),
 ) -> Comparison:
-    """Hold a reference table against a path of a URDF.
+    """Compare a reference table with a path of a URDF.
 
     Args:
         chain: The path, base to tip; the table's ends may be other frames fixed to the same links.
-        reference: The table, either convention, one row for each moving joint, in the path's order.
-        tolerance: Metres at the tip.
-        fit: Whether base, tool, the zeros of the joints and the ways they count are fitted; False holds the
-            table to what it says.
-        digits: How exactly each cell is written (`urdfkin.dh.rows`).
+        reference: The table in either convention, with a row for each moving joint in the path's order.
+        tolerance: Tolerance at the tip (metres).
+        fit: Whether to fit base, tool, and the joints' zeros and senses; False uses the table as it is
+            written.
+        digits: Precision of each cell in the table's file (`urdfkin.dh.rows.last_digits`).
+
+    Returns:
+        The comparison, with the cells that differ, or the likely mistakes.
 
     Raises:
         InputError: the table has another number or other kinds of joints than the path.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, Convention.STANDARD)
-    tried, judged = _wanted(chain)
+    tried, judged = _target_poses(chain)
     written = as_written(standard)
     fitted = fitted_model(chain, standard, written, tried) if fit else written
     complete = fit_cells(fitted, tried, _cells_of(reference), free=fit)
@@ -77,8 +80,8 @@ def compare(
         fitted=fit,
         senses=tuple(int(s) * row.sense for s, row in zip(fitted.senses, standard.rows, strict=True)),
         offsets=_offsets(standard, fitted),
-        base=_taken_up(written.base, fitted.base),
-        tool=_taken_up(written.tool, fitted.tool),
+        base=_absorbed_offset(written.base, fitted.base),
+        tool=_absorbed_offset(written.tool, fitted.tool),
         differences=cells if residual <= max(_EXPLAINS * off["metres"], EXPLAINED * tried.scale) else (),
         instead=(),
         hidden=_hidden(reference, fitted, judged) if fit else (),
@@ -103,68 +106,70 @@ def compare(
 
 
 def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
-    """Metres and radians that a table's tip is off at most, with base, tool and offsets fitted in haste.
+    """Return the largest tip error on samples (metres, radians) after a fast fit of base, tool and offsets.
 
-    Few patterns of signs are tried, and none of the turns that nearly coinciding axes allow.
+    The fit tries only a few sign patterns, and no opposite rotations of nearly coinciding axes.
 
     Args:
         chain: The path.
         reference: The table.
-        enough: Metres; a fit that is better is not improved.
+        enough: Tip error at which the fit stops (metres).
 
     Raises:
         InputError: the table has another number or other kinds of joints than the path.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, Convention.STANDARD)
-    tried, judged = _wanted(chain)
+    tried, judged = _target_poses(chain)
     return judged.apart(fitted_model(chain, standard, as_written(standard), tried, enough, hasty=True))
 
 
 def _off(fitted: Model, written: Model, judged: TargetPoses) -> dict[str, float]:
-    """How far the tip is off, as fitted and as written."""
+    """Return the tip errors of the fitted table and of the table as it is written."""
     names = ("metres", "radians", "written_metres", "written_radians")
     return dict(zip(names, (*judged.apart(fitted), *judged.apart(written)), strict=True))
 
 
 def _reach(chain: FrameChain, wanted: FloatArray) -> float:
-    """Metres that a radian counts as much as: what the robot reaches.
+    """Return the robot's reach, which converts radians to metres.
 
-    A URDF that was written from a strict table may have offsets of kilometres that cancel: no way along its
-    links says how large it is, but where its tip comes does.
+    A URDF made from a strict table may have offsets of kilometres that cancel. The path length along its
+    links is then too large, so the reach is the spread of the tip's positions.
     """
     tips = wanted[:, :3, 3]
     across = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
-    return max(min(chain.reach, across) if across > _STANDS * chain.reach else chain.reach, LEAST_SIZE)
+    return max(min(chain.reach, across) if across > _FIXED_TIP * chain.reach else chain.reach, LEAST_SIZE)
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
-    """Raise InputError unless a table has as many joints as a path, of the same kinds, and at least one.
+    """Check that a table and a path have the same number and kinds of joints, and at least one.
 
-    RangeError where a length of either cannot be squared.
+    Raises:
+        InputError: the joints are different.
+        RangeError: the square of a length is outside the range of doubles.
     """
     theirs = [row.kind.turns for row in reference.rows]
     ours = [joint.kind.turns for joint in chain.joints]
     if theirs != ours or not ours:
         words = ["".join("R" if turns else "P" for turns in kinds) or "none" for kinds in (theirs, ours)]
         raise InputError(
-            "the table's joints are not the path's",
+            "the table and the path have different joints",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
             found=f"{words[0]} in the table, {words[1]} in the URDF",
-            remedy="choose base and tip so that exactly the table's joints lie between them",
+            remedy="choose base and tip with exactly the table's joints between them",
         )
     demand_squares_of(chain, reference)
 
 
-def _wanted(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
-    """What a fit is made on, and what it is judged on."""
+def _target_poses(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
+    """Return the samples of a fit, and the samples of its check."""
     values, poses = _samples(chain, FIT_SAMPLES, _FIT_SEED)
     scale = _reach(chain, poses)
     return TargetPoses(values, poses, scale), TargetPoses(*_samples(chain, CHECK_SAMPLES, _CHECK_SEED), scale)
 
 
 def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Values of all joints (count, n), each joint free, and the tip's poses there."""
+    """Return values of all joints (count, n) without mimic rules, and the tip's poses at them."""
     slides = _slides(chain)
     bounds = [slides.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     lower, upper = np.array(bounds).T
@@ -174,7 +179,7 @@ def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, Floa
 
 
 def _slides(chain: FrameChain) -> dict[str, tuple[float, float]]:
-    """Between what the values of sliding joints lie, metres."""
+    """Return the ranges of the prismatic joints (metres)."""
     return {joint.name: _slide(joint.limit) for joint in chain.joints if not joint.kind.turns}
 
 
@@ -183,7 +188,7 @@ def _slide(limit: Limit | None) -> tuple[float, float]:
 
 
 def _offsets(standard: DHTable, fitted: Model) -> tuple[float, ...]:
-    """What was added to each joint's variable."""
+    """Return the fitted offset of each joint's variable."""
     offsets = []
     for i, row in enumerate(standard.rows):
         k = fitted.own(i)
@@ -192,27 +197,27 @@ def _offsets(standard: DHTable, fitted: Model) -> tuple[float, ...]:
     return tuple(offsets)
 
 
-def _taken_up(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
+def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
     shift = float(np.linalg.norm(fitted[:3, 3] - written[:3, 3]))
     return AbsorbedOffset(shift, float(rotation_angle(written[:3, :3], fitted[:3, :3])))
 
 
 def _cell_at(reference: DHTable, i: int, cell: str) -> int:
-    """The row of the reference in which a cell of standard row i stands; the row count where it has none.
+    """Return the row of the reference that contains a cell of standard row i; the row count if none does.
 
-    In a modified table a, alpha and beta of a step stand in the next row.
+    In a modified table a, alpha and beta are in the next row.
     """
     return i + (reference.convention is Convention.MODIFIED and cell not in ("theta", "d"))
 
 
 def _cells_of(reference: DHTable) -> FloatArray:
-    """(n, 5) which cells of the standard rows are cells of the reference: 1 or 0."""
+    """Return an (n, 5) mask of the standard rows' cells: 1 for cells of the reference, else 0."""
     n = len(reference.rows)
     return np.array([[float(_cell_at(reference, i, cell) < n) for cell in CELLS] for i in range(n)])
 
 
 def _hidden(reference: DHTable, fitted: Model, judged: TargetPoses) -> tuple[tuple[int, str], ...]:
-    """Cells that base, tool and offsets stand in for; a beta of zero is none."""
+    """Return the cells that base, tool and offsets can replace, except for a beta of zero."""
     found = [
         (_cell_at(reference, i, CELLS[k]), CELLS[k])
         for i, k in hidden_cells(fitted, judged)
@@ -230,7 +235,7 @@ def _differences(
     digits: Digits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
-    """The cells that moved by more than rounding, each with its own effect on the tip, the largest first."""
+    """Return the cells that changed by more than rounding, the largest effect at the tip first."""
     twists, scale = columns(fitted, judged)[2], judged.scale
     linear = np.linalg.norm(twists.reshape(len(judged.values), 6, -1)[:, :3], axis=1).max(axis=0)
     found = []
@@ -257,7 +262,7 @@ def _instead(
     wanted: tuple[TargetPoses, TargetPoses],
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
-    """The cells that would have to change if nothing were fitted, where that is an explanation."""
+    """Return the cells that would have to change without a fit, if they explain the difference."""
     tried, judged = wanted
     complete = fit_cells(written, tried, _cells_of(reference), free=False)
     metres, radians = judged.apart(complete)
@@ -268,7 +273,7 @@ def _instead(
 
 
 def _fitted_table(chain: FrameChain, standard: DHTable, fitted: Model) -> DHTable:
-    """The reference as a table of the URDF's joints."""
+    """Return the fitted reference with the URDF's joints."""
     rows = []
     for i, (row, joint) in enumerate(zip(standard.rows, chain.joints, strict=True)):
         rows.append(

@@ -1,9 +1,9 @@
-"""Which way each joint and each common normal of a reference table points in the URDF.
+"""Find the senses and the directions of x with which a reference table fits the URDF.
 
-A table leaves freedoms that cannot matter: which way a joint counts, which way x points along a common
-normal, where theta is zero. They are discrete (signs) or follow from the signs (offsets of theta). A beam
-search goes along the chain, joint by joint, keeping the sign patterns whose cells so far come closest to
-the reference's; the continuous rest is `urdfkin.dh.compare.fit`.
+Three choices of a table do not change the robot: the sense of a joint, the direction of x along a common
+normal, and the zero of theta. The first two are signs, and the offsets of theta follow from them. A beam
+search extends sign patterns joint by joint and keeps those with the cells closest to the reference.
+`urdfkin.dh.compare.fit` and `urdfkin.dh.compare.freedoms` fit the continuous parameters.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from urdfkin.dh.table import DHRow, DHTable, along_axis
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Sign patterns that are handed out, and that are kept at each joint.
+#: Numbers of sign patterns: returned, and kept at each joint.
 PATTERNS, BEAM = 12, 128
-#: Each reversed joint costs this much (metres), so that equal fits keep the URDF's senses.
+#: Cost of each reversed joint (metres), so that the URDF's senses win between equal fits.
 REVERSAL = 1e-9
-#: What is left of a difference where an axis slides, and where it is drawn counts only between equals.
+#: Weight of a difference beside a prismatic axis: its line is free, so it decides only between equals.
 _SLIDING = 1e-3
-#: Metres: an offset between axes that is smaller counts as none, and leaves x free.
+#: Axes with a smaller distance (metres) count as coinciding, and leave x free.
 _NO_OFFSET = 1e-5
-#: Decimals of metres and radians to which patterns are alike.
+#: Decimals of metres and radians in the comparison of patterns.
 _ALIKE = 6
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -35,14 +35,14 @@ _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """A sign pattern and the frames that it gives.
+    """A sign pattern and its frames.
 
     Attributes:
-        senses: Of each joint: +1 or -1, the reference's variable against the URDF's coordinate.
-        offsets: Of each joint: what to add to the reference's theta (d of a sliding joint) at q = 0.
+        senses: +1 or -1 for each joint: the reference's variable relative to the URDF's coordinate.
+        offsets: Offset of each joint at q = 0, to add to the reference's theta (d of a prismatic joint).
         base: (4, 4) pose of the reference's frame 0 in the URDF's base.
         tool: (4, 4) pose of the URDF's tip in the reference's last frame.
-        cost: Metres: the sum of the cells' differences, angles times the reach.
+        cost: Sum of the cells' differences, with angles times the reach (metres).
     """
 
     senses: tuple[int, ...]
@@ -54,10 +54,17 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True)
 class _Partial:
-    """The chain up to one joint: its sense, and the way from its DH frame to its URDF frame.
+    """An alignment of the chain up to one joint.
 
-    Where the axes before the joint coincide, only the sum of their angles shows; `absorber` is the row whose
-    offset may still change (row 0's stands in the base), and the sign with which it turns the joint's x.
+    Attributes:
+        cost: Sum of the differences so far (metres).
+        senses: Senses of the joints up to this one.
+        offsets: Offsets of the joints before this one.
+        phi_in: Rotation from this joint's DH frame to its URDF frame (rad).
+        carry: Offset from this joint's DH frame to its URDF frame (metres).
+        base: (4, 4) contribution of the first row's offset to the base.
+        absorber: If the axes before the joint coincide, only the sum of their angles is defined. This is then
+            the row with a free offset (that of row 0 is in the base), and the sign of its effect on x.
     """
 
     cost: float
@@ -70,9 +77,10 @@ class _Partial:
 
 
 def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[Alignment]:
-    """The sign patterns closest to a standard reference table with as many joints of the same kinds.
+    """Return the sign patterns closest to a standard reference table with the same kinds of joints.
 
-    Sliding joints leave patterns that cells cannot tell apart; the fit can, so up to `count` are returned.
+    Prismatic joints leave patterns with equal cells. Only a fit can distinguish them, so up to `count`
+    patterns are returned.
     """
     reach = max(chain.reach, reference.span, LEAST_SIZE)
     n = len(reference.rows)
@@ -84,24 +92,24 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
             for sense in (1, -1)
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
-        partials = _unlike_each_other(sorted(longer, key=lambda partial: partial.cost))[:beam]
-    # Where axes nearly coincide, many patterns of x are nearly the same: the fit finds from one to another.
+        partials = _without_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam]
+    # If axes nearly coincide, many directions of x are nearly the same. The fit reaches one from another.
     by_senses: dict[tuple[int, ...], _Partial] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
     best = list(by_senses.values())[:count]
-    return [_closed(partial, chain, reference) for partial in best]
+    return [_close_chain(partial, chain, reference) for partial in best]
 
 
 def _first(sense: int) -> _Partial:
     return _Partial(REVERSAL * (sense < 0), (sense,), (), 0.0, 0.0, np.eye(4))
 
 
-def _unlike_each_other(partials: list[_Partial]) -> list[_Partial]:
-    """Of those that go on alike the first: coinciding axes have many, which would crowd others out."""
+def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
+    """Keep the first of several equivalent candidates; coinciding axes have many of them."""
     found: dict[tuple[object, ...], _Partial] = {}
     for one in partials:
-        # What an offset before it may still turn goes on alike whichever way x points.
+        # With a free offset before the joint, both directions of x are equivalent.
         circle = math.pi if one.absorber else 2.0 * math.pi
         ahead = round(one.phi_in % circle, _ALIKE), round(one.carry, _ALIKE)
         found.setdefault((one.senses, one.absorber, *ahead), one)
@@ -109,7 +117,7 @@ def _unlike_each_other(partials: list[_Partial]) -> list[_Partial]:
 
 
 def _pose(chain: FrameChain, k: int, before: int, after: int) -> FloatArray:
-    """The constant A_k with the z of the joints around it turned round where the sense is -1."""
+    """Return the constant A_k with the z axis of a neighbouring joint reversed if its sense is -1."""
     A = chain.constants[k]
     A = _HALF_TURN @ A if before < 0 else A
     return np.array(A @ _HALF_TURN if after < 0 else A)
@@ -118,13 +126,13 @@ def _pose(chain: FrameChain, k: int, before: int, after: int) -> FloatArray:
 def _extend(
     partial: _Partial, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_Partial]:
-    """Go on from joint i to joint i + 1 (from 0), with both directions of x."""
+    """Extend an alignment from joint i to joint i + 1 (from 0), with both directions of x."""
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     A = _pose(chain, i + 1, partial.senses[-1], sense)
     delta = row.d - partial.carry if turns[i] and i > 0 else 0.0
     found = []
     for step in _steps(A, row, delta, reach, row.theta - partial.phi_in, turns[i] and turns[i + 1]):
-        candidate = _absorbed(partial, step, row.theta) if i > 0 and not turns[i] else partial
+        candidate = _absorb(partial, step, row.theta) if i > 0 and not turns[i] else partial
         theta, d = candidate.phi_in + step.phi, candidate.carry + step.delta
         cost = candidate.cost + REVERSAL * (sense < 0)
         cost += reach * (_apart(step.alpha, row.alpha) + abs(step.beta - row.beta))
@@ -152,7 +160,7 @@ def _extend(
 
 
 def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, float] | None:
-    """The row before joint i + 1 whose offset turns its x and shows nowhere else, after a step."""
+    """Return the row before joint i + 1 with a free offset, and the sign of its effect on x, after a step."""
     if not step.free:
         return None
     sign = math.copysign(1.0, math.cos(step.alpha))
@@ -161,8 +169,8 @@ def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, 
     return None if partial.absorber is None else (partial.absorber[0], sign * partial.absorber[1])
 
 
-def _absorbed(partial: _Partial, step: Step, theta: float) -> _Partial:
-    """The chain with a sliding joint's theta as it is in the table, if an offset before it can do that."""
+def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
+    """Give a prismatic joint the table's theta, if a free offset before it can absorb the difference."""
     if partial.absorber is None:
         return partial
     excess = partial.phi_in + step.phi - theta
@@ -178,11 +186,12 @@ def _absorbed(partial: _Partial, step: Step, theta: float) -> _Partial:
 def _steps(
     A: FloatArray, row: DHRow, delta: float, reach: float, phi_free: float, placed: bool
 ) -> Iterator[Step]:
-    """A pair taken apart in the ways the reference's may be, with both directions of x.
+    """Yield the possible steps of a pair of axes, each with both directions of x.
 
-    Axes that are nearly parallel in both are cut by the normal plane too, at the reference's own d. An offset
-    of nearly nothing, or of an axis that slides and has no place (not `placed`), counts as none: x is free
-    there. Across both axes x needs no place, and is tried for sliding ones too.
+    If the axes are nearly parallel in the URDF and in the reference, a Hayati step at the reference's d is
+    tried too. There x is free if the distance is nearly zero, or if an axis is prismatic and has no fixed
+    line (not `placed`). A step along the common normal is tried for prismatic axes too, because it needs no
+    line.
     """
     steps = []
     sine = math.hypot(A[0, 2], A[1, 2])
@@ -194,7 +203,7 @@ def _steps(
         lifted[2, 3] -= delta
         if math.hypot(lifted[0, 3], lifted[1, 3]) < _NO_OFFSET or not placed:
             lifted[:2, 3] = 0.0
-        # Without a reach every foot is far, and a pair that is not exactly parallel is cut by the plane.
+        # With reach 0 every foot is far, so each pair that is not exactly parallel gets a Hayati step.
         cut = step_between(lifted, reach if sine < NEARLY_PARALLEL else 0.0, NearParallel.HAYATI, phi_free)
         steps.append(replace(cut, delta=cut.delta + delta))
     for step in steps:
@@ -202,8 +211,8 @@ def _steps(
         yield replace(step.turned(), free=step.free)
 
 
-def _closed(best: _Partial, chain: FrameChain, reference: DHTable) -> Alignment:
-    """Base and tool that make the ends meet."""
+def _close_chain(best: _Partial, chain: FrameChain, reference: DHTable) -> Alignment:
+    """Return the complete alignment, with the base and tool that close the chain."""
     n = len(reference.rows)
     last = reference.rows[-1]
     start = _pose(chain, 0, 1, best.senses[0]) @ best.base
@@ -215,5 +224,5 @@ def _closed(best: _Partial, chain: FrameChain, reference: DHTable) -> Alignment:
 
 
 def _apart(first: float, second: float) -> float:
-    """The angle between two directions, 0 to pi."""
+    """Return the angle between two directions, 0 to pi."""
     return abs(math.remainder(first - second, 2.0 * math.pi))

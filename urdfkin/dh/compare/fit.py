@@ -1,10 +1,10 @@
-"""How a reference table must change to be the URDF: the freedoms first, then as few cells as possible.
+"""Fit a reference table to the URDF: first its free parameters, then as few cells as possible.
 
-The tip's error is a twist at each of some sampled configurations, and every number of a table moves the tip
-by a twist: a turn about a line or a shift along one. Gauss-Newton solves for the numbers. Base, tool and
-joint offsets (the freedoms) are eliminated first and take all they can; what is left falls to the cells, and
-where several cells could take it (the offsets along parallel axes, say), a reweighted least-norm solution
-puts it into as few as possible.
+The tip's error at each sampled configuration is a twist. A change of any number of the table also moves the
+tip by a twist: a rotation about a line or a translation along one. Gauss-Newton solves for these numbers.
+Base, tool and joint offsets are the free parameters; they are eliminated first and absorb as much error as
+possible. The cells absorb the rest. If several cells can do so (for example offsets along parallel axes), a
+reweighted least-norm solution changes as few cells as possible.
 """
 
 from __future__ import annotations
@@ -20,34 +20,34 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 
-#: Cells in the order in which they act: theta, d, a, alpha, beta.
+#: Cells in the order of their transforms.
 CELLS = ("theta", "d", "a", "alpha", "beta")
-#: Radians, and metres for each metre of reach, that one step goes at most.
+#: Largest step: radians, and metres per metre of reach.
 LONGEST_STEP = 0.5
-#: Steps at most; by which share one must be better, and by how much all are off when nothing is left.
+#: Largest number of steps; smallest relative improvement; mean error that counts as zero.
 _ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
-#: Of the largest singular value: below it freedoms undo each other, and cells what other cells do.
+#: Relative size of singular values that count as zero: of free parameters, and of cells.
 _FREE, _CELLS = 1e-8, 1e-9
-#: Rounds in which cells are made few, and how small (of the reach) one stays within reach of the next.
+#: Iterations of the sparse solution, and its smallest weight relative to the reach.
 _SPARSER, _STAYS = 25, 1e-9
-#: How much more willingly the last cell changes than the first, of two equally good ones: one is to win.
+#: Tie-breaker: weight of the last cell relative to the first, so that one of two equal cells wins.
 _LAST_WINS = 1.2
-#: How willingly beta changes at first, and again in each round: only where alpha will not do.
+#: Weight of beta at first, and its factor in each iteration: beta changes only if alpha does not suffice.
 _BETA, _BETA_AGAIN = 0.3, 0.5
-#: Of a cell's effect: what freedoms that stand in for it may leave.
+#: Fraction of a cell's effect that free parameters may leave if they can replace it.
 _HIDDEN = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A standard table as numbers to be fitted.
+    """A standard table as numbers to fit.
 
     Attributes:
         cells: (n, 5) theta, d, a, alpha, beta of each row.
-        turns: (n,) which rows turn.
+        turns: (n,) 1 for revolute rows, 0 for prismatic ones.
         senses: (n,) +1 or -1.
-        base: (4, 4) and
-        tool: (4, 4): the ends.
+        base: (4, 4) T_base_0 (metres).
+        tool: (4, 4) T_n_tip (metres).
     """
 
     cells: FloatArray
@@ -58,13 +58,13 @@ class Model:
 
     @property
     def first(self) -> FloatArray:
-        """(4, 4) pose in the base of the frame about whose z the first turning joint turns, others at 0."""
+        """(4, 4) pose of the first revolute joint's frame relative to `base`, with all joints at zero."""
         turning = np.flatnonzero(self.turns)
         return self._rows(0, int(turning[0]) if turning.size else 0)
 
     @property
     def last(self) -> FloatArray:
-        """(4, 4) pose of the tip in the frame about whose z the last turning joint turned, others at 0."""
+        """(4, 4) pose of the tip in the last revolute joint's frame, with the later joints at zero."""
         turning, n = np.flatnonzero(self.turns), len(self.cells)
         k = int(turning[-1]) if turning.size else n - 1
         _, _, a, alpha, beta = self.cells[k]
@@ -72,7 +72,7 @@ class Model:
         return np.asarray(step @ self._rows(k + 1, n) @ self.tool)
 
     def own(self, i: int) -> int:
-        """Which cell of row i the joint's variable is added to."""
+        """Return the index of the cell with the joint's variable in row i."""
         return 0 if self.turns[i] else 1
 
     def _rows(self, begin: int, end: int) -> FloatArray:
@@ -82,7 +82,7 @@ class Model:
         return T
 
     def poses(self, values: FloatArray) -> FloatArray:
-        """(s, 4, 4) poses of the tip."""
+        """Return the (s, 4, 4) poses of the tip."""
         thetas, ds, *between = self.cells.T
         moved = self.senses * values
         joints = along_axis(thetas + self.turns * moved, ds + (1.0 - self.turns) * moved)
@@ -92,10 +92,10 @@ class Model:
         return T @ self.tool
 
     def walk(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Tip poses (s, 4, 4), then the lines and kinds of motion of every cell.
+        """Run the forward recursion for the tip's poses and the lines of motion of all cells.
 
         Returns:
-            poses; origins and axes (s, n, 5, 3) on and along which each cell acts.
+            The tip's poses (s, 4, 4), and the origins and axes (s, n, 5, 3) of each cell's motion.
         """
         samples, n = len(values), len(self.cells)
         origins, axes = np.empty((2, samples, n, 5, 3))
@@ -115,12 +115,12 @@ class Model:
 
 @dataclass(frozen=True, slots=True)
 class TargetPoses:
-    """Where a model's tip is to come.
+    """The target poses of a model's tip.
 
     Attributes:
         values: (s, n) the URDF's joint values.
-        poses: (s, 4, 4) its tip there.
-        scale: Metres that a radian counts as much as.
+        poses: (s, 4, 4) poses of its tip at these values.
+        scale: Length that converts radians to metres.
     """
 
     values: FloatArray
@@ -128,21 +128,22 @@ class TargetPoses:
     scale: float
 
     def apart(self, model: Model) -> tuple[float, float]:
-        """Metres and radians that a model's tip is off at the worst sample."""
+        """Return the largest tip error of a model on the samples (metres, radians)."""
         poses = model.poses(self.values)
         metres = np.linalg.norm(poses[:, :3, 3] - self.poses[:, :3, 3], axis=-1).max()
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def errors(self, poses: FloatArray) -> FloatArray:
-        """(6 s,) twists that would bring a model's poses to these, angles times `scale`."""
+        """Return the (6 s,) twists from a model's poses to the targets, angles times `scale`."""
         turn = log_rotation(self.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
 
 def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Tip poses and the twists (6 s, parameters) of freedoms and of cells, angles times the scale.
+    """Return the tip's poses, and the twists (6 s, parameters) of free parameters and of cells.
 
-    Freedoms are the base's six, the tool's six and each row's own variable; cells are (n, 5) in order.
+    The free parameters are six of the base, six of the tool, and each row's own variable. Cells are in the
+    order of (n, 5). Angles are multiplied by the scale.
     """
     scale = wanted.scale
     poses, origins, axes = model.walk(wanted.values)
@@ -150,7 +151,7 @@ def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, 
     turning = np.array([True, False, False, True, True])
     linear = np.where(turning[:, None], np.cross(axes, tip - origins), axes)
     angular = np.where(turning[:, None], axes, 0.0)
-    # Cells that are angles are counted in metres at the distance `scale`, like the twist's angular part.
+    # Angular cells are in metres at the distance `scale`, like the angular part of a twist.
     per_cell = np.where(turning, 1.0 / scale, 1.0)[:, None]
     cells = np.concatenate([linear * per_cell, scale * angular * per_cell], axis=-1)
     n = len(model.cells)
@@ -162,7 +163,7 @@ def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, 
 
 
 def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
-    """(6 s, 6) twists of shifting and turning everything from a frame on."""
+    """Return the (6 s, 6) twists of translations and rotations of the chain after a frame."""
     arm = poses[:, :3, 3] - at[:, :3, 3]
     out = np.zeros((len(poses), 6, 6))
     for k in range(3):
@@ -174,13 +175,13 @@ def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
 
 
 def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: bool) -> Model:
-    """The smallest and fewest changes of cells with which the table is the URDF.
+    """Fit the table to the URDF with the fewest and smallest changes of cells.
 
     Args:
         model: The table.
-        wanted: What the URDF's tip does.
-        cells_of: (n, 5) which cells may change: 1 or 0.
-        free: Whether base, tool and offsets may, too.
+        wanted: Target poses from the URDF.
+        cells_of: (n, 5) mask: 1 for cells that may change, else 0.
+        free: Whether base, tool and offsets may change too.
     """
     start, best, best_size, scale = model, model, np.inf, wanted.scale
     for _ in range(_ROUNDS):
@@ -194,22 +195,25 @@ def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: 
         cells = cells * cells_of.ravel()
         freedoms = freedoms if free else np.zeros_like(freedoms)
         change = _sparse(model, start, freedoms, cells, error, scale)
-        # Axes that nearly coincide let two offsets grow against each other for nothing: cut those off.
-        given = np.linalg.lstsq(freedoms, error - cells @ change, rcond=_FREE)[0]
-        shorten = min(1.0, LONGEST_STEP * scale / max(float(np.abs(given).max()), NOT_ZERO))
-        model = moved(model, np.asarray(given * shorten, np.float64), scale, change * shorten)
+        # For nearly coinciding axes, opposite offsets have almost no effect: rcond removes them.
+        offsets = np.linalg.lstsq(freedoms, error - cells @ change, rcond=_FREE)[0]
+        shorten = min(1.0, LONGEST_STEP * scale / max(float(np.abs(offsets).max()), NOT_ZERO))
+        model = moved(model, np.asarray(offsets * shorten, np.float64), scale, change * shorten)
     return best
 
 
 def _sparse(
     model: Model, start: Model, freedoms: FloatArray, cells: FloatArray, error: FloatArray, scale: float
 ) -> FloatArray:
-    """Changes of cells that take what the freedoms cannot, the sum with those so far having few entries."""
+    """Return the changes of cells for the error that the free parameters leave.
+
+    The total change since `start` has as few non-zero entries as possible.
+    """
     Q = _span(freedoms)
     cells_left = cells - Q @ (Q.T @ cells)
     in_metres = np.array([scale, 1.0, 1.0, scale, scale])
     so_far = ((model.cells - start.cells) * in_metres).ravel()
-    # The freedoms took each row's own variable; a cell that moves nothing else is not asked for anything.
+    # The free parameters include each row's own variable, so a cell with the same effect stays zero.
     target = error - Q @ (Q.T @ error) + cells_left @ so_far
     total = np.zeros(cells.shape[1])
     weights = np.linspace(1.0, _LAST_WINS, cells.shape[1])
@@ -224,12 +228,12 @@ def _sparse(
 
 
 def _span(freedoms: FloatArray) -> FloatArray:
-    """An orthonormal basis of what the freedoms can do; no column where there are none."""
+    """Return an orthonormal basis of the free parameters' twists; no column if there are none."""
     return np.linalg.qr(freedoms)[0] if freedoms.any() else np.zeros((len(freedoms), 0))
 
 
 def hidden_cells(model: Model, wanted: TargetPoses) -> list[tuple[int, int]]:
-    """(row, number of the cell) for which the freedoms can stand in, to a share of the cell's effect."""
+    """Return (row, cell index) of the cells that free parameters can replace, up to 1e-6 of the effect."""
     _, freedoms, cells = columns(model, wanted)
     Q = _span(freedoms)
     left = np.linalg.norm(cells - Q @ (Q.T @ cells), axis=0)
@@ -238,19 +242,19 @@ def hidden_cells(model: Model, wanted: TargetPoses) -> list[tuple[int, int]]:
 
 
 def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | None = None) -> Model:
-    """The model after small changes of its freedoms and cells, all counted in metres."""
+    """Return the model after small changes of its free parameters and cells, all in metres."""
     per_cell = np.array([1.0 / scale, 1.0, 1.0, 1.0 / scale, 1.0 / scale])
     cells = model.cells.copy() if change is None else model.cells + change.reshape(-1, 5) * per_cell
     for i, own in enumerate(free[12:]):
         k = model.own(i)
         cells[i, k] += own * per_cell[k]
-    # Base and tool are pushed in the axes about which the joints next to them turn: a turn that they share
-    # with these joints goes round in a circle then, and not off at a tangent.
-    base = _pushed(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
-    tool = np.linalg.inv(model.last) @ _pushed(np.eye(4), free[6:12], scale) @ model.last
+    # Base and tool move in the axes of the revolute joints next to them. A rotation that they share with
+    # such a joint is then exact, not only to first order.
+    base = _apply_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
+    tool = np.linalg.inv(model.last) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
 
 
-def _pushed(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
-    """T followed by a small shift and turn in its own axes."""
+def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
+    """Return T after a small translation and rotation in its own axes."""
     return T @ pose(exp_rotation(twist[3:] / scale), twist[:3])

@@ -1,9 +1,9 @@
-"""Base, tool and offsets with which a reference table comes closest to a URDF, its cells untouched.
+"""Fit base, tool and joint offsets of a reference table to a URDF, with its cells unchanged.
 
-Damped least squares (Levenberg, 1944; Marquardt, 1963) on the tip's twists. Two joints whose axes nearly
-coincide do nearly the same: their offsets may grow against each other along a valley that bends round, and
-whose floor falls by no more than the distance of the axes. So the damping is taken away as long as steps
-succeed, and where the descent ends, turns of such pairs against each other are tried from there.
+The method is damped least squares (Levenberg, 1944; Marquardt, 1963) on the tip's twists. Two joints with
+nearly coinciding axes have nearly the same effect. Opposite changes of their offsets follow a curved valley
+of the error, along which the error falls by at most the distance of the axes. The damping therefore decreases
+while steps succeed. At the end of a descent, opposite rotations of such pairs are tried as new starts.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from urdfkin.kinematics.roundings import EPS, of_a_fit
 from urdfkin.model.chain import FrameChain
 
 _ROUNDS = 60
-#: Of the largest singular value: where damping starts, and between what it stays.
+#: Damping relative to the largest singular value: at the start, least and most.
 _DAMPING, _LEAST, _MOST = 1e-3, 1e-14, 1e2
-#: What a success leaves of the damping, and how much more of it there is after a failure.
+#: Factors of the damping after a success and after a failure.
 _EASING, _HARDER = 0.03, 10.0
-#: A step that leaves more than this is slow; after so many of them in turn a descent ends.
+#: A step is slow if it leaves more than this fraction; a descent ends after this many slow steps.
 _SLOW, _PATIENCE = 0.99, 4
-#: Fit up to which nothing better is looked for, metres for each metre of reach.
+#: Mean error at which a fit ends, relative to the reach.
 _ROUNDING = 1e-13
-#: Patterns of signs that are fitted, and kept at each joint, where a size will do.
+#: Numbers of sign patterns in a fast fit: fitted, and kept at each joint.
 HASTY = (3, 16)
-#: Metres for each metre of reach: a fit that is off by less is at rounding, and nothing better is looked for.
+#: Tip error that counts as rounding, relative to the reach; the search ends there.
 _AT_ROUNDING = 1e-12
-#: Of what the tip is off: another pattern of signs than the written one must leave less.
+#: Fraction of the tip error below which another sign pattern replaces the written one.
 _TWICE_AS_GOOD = 0.5
-#: Turns that are tried of one offset against the next.
+#: Opposite rotations of two consecutive offsets that are tried (rad).
 _TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 
 
 def as_written(standard: DHTable) -> Model:
-    """The table as it is written, its variables the URDF's coordinates."""
+    """Return the table as it is written; its variables are the URDF's coordinates."""
     return Model(
         np.array([(row.theta, row.d, row.a, row.alpha, row.beta) for row in standard.rows]),
         np.array([float(row.kind.turns) for row in standard.rows]),
@@ -59,9 +59,9 @@ def fitted_model(
     *,
     hasty: bool = False,
 ) -> Model:
-    """Of the table as written and the likely sign patterns, the one whose freedoms fit best.
+    """Return the best fit of the table as it is written and of the likely sign patterns.
 
-    What is written has the first word: another pattern must be twice as good.
+    The written signs have priority: another pattern must halve the error.
     """
 
     def size(model: Model) -> float:
@@ -72,7 +72,7 @@ def fitted_model(
         return written
     best, best_size = written, size(written)
     for start in starts(chain, standard, written, *(HASTY if hasty else ())):
-        # Least squares make the sum small. The worst sample is what counts: there the start may be better.
+        # Least squares minimize the sum, but the worst sample decides. The start may be better there.
         model = min(fit_freedoms(start, wanted, turns=not hasty), start, key=size)
         needed = 1.0 if start is written else _TWICE_AS_GOOD
         if (its_size := size(model)) < needed * best_size:
@@ -83,7 +83,7 @@ def fitted_model(
 
 
 def ends_gathered(model: Model, written: Model) -> Model:
-    """The same with the first joint's offset in the base and the last one's in the tool, where it is seen."""
+    """Move the first joint's offset into the base and the last joint's offset into the tool."""
     cells, n = model.cells.copy(), len(model.cells)
     _, _, a, alpha, beta = cells[-1]
     step = between_axes(a, alpha, beta)
@@ -101,14 +101,14 @@ def ends_gathered(model: Model, written: Model) -> Model:
 
 
 def starts(chain: FrameChain, standard: DHTable, written: Model, *effort: int) -> Iterator[Model]:
-    """Where fits begin: what is written, then each likely pattern of signs."""
+    """Yield the starts of fits: the table as it is written, then each likely sign pattern."""
     yield written
     for aligned in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         yield _start(standard, aligned)
 
 
 def _start(standard: DHTable, aligned: Alignment) -> Model:
-    """The reference with the freedoms that an alignment found."""
+    """Return the reference with the senses, base, tool and offsets of an alignment."""
     start = replace(
         as_written(standard),
         senses=np.array(aligned.senses, dtype=np.float64),
@@ -121,19 +121,19 @@ def _start(standard: DHTable, aligned: Alignment) -> Model:
 
 
 def fit_freedoms(model: Model, wanted: TargetPoses, *, turns: bool, ends: bool = False) -> Model:
-    """The table's best fit.
+    """Fit base, tool and offsets.
 
     Args:
-        model: Where to begin.
-        wanted: What the URDF's tip does.
-        turns: Whether offsets of neighbours are turned against each other where a descent ends.
-        ends: Whether base and tool alone are fitted.
+        model: The start.
+        wanted: Target poses from the URDF.
+        turns: Whether to try opposite rotations of consecutive offsets at the end of a descent.
+        ends: Whether to fit only base and tool.
     """
     for _ in range(2 * len(model.cells)):
-        model, size = _descended(model, wanted, ends)
+        model, size = _descend(model, wanted, ends)
         if not turns or size <= _ROUNDING * wanted.scale * math.sqrt(6 * len(wanted.values)):
             break
-        turned = min(_turned(model), key=lambda one: _size(one, wanted), default=model)
+        turned = min(_opposite_rotations(model), key=lambda one: _size(one, wanted), default=model)
         if _size(turned, wanted) >= size:
             break
         model = turned
@@ -144,7 +144,7 @@ def _size(model: Model, wanted: TargetPoses) -> float:
     return float(np.linalg.norm(wanted.errors(model.poses(wanted.values))))
 
 
-def _descended(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, float]:
+def _descend(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, float]:
     size, damping, slow = _size(model, wanted), _DAMPING, 0
     for _ in range(_ROUNDS):
         poses, freedoms, _ = columns(model, wanted)
@@ -166,8 +166,8 @@ def _descended(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, fl
     return model, size
 
 
-def _turned(model: Model) -> list[Model]:
-    """The model with one offset turned and the next one turned back: little moves if the axes coincide."""
+def _opposite_rotations(model: Model) -> list[Model]:
+    """Return models with opposite rotations of two consecutive offsets, for nearly coinciding axes."""
     found = []
     for i in range(len(model.cells) - 1):
         sense = math.copysign(1.0, math.cos(float(model.cells[i, 3])))

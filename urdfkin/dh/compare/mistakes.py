@@ -1,8 +1,8 @@
-"""Single mistakes that explain a table: a wrong sign, a right angle too many, rows in the wrong order.
+"""Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
-Base, tool, zeros and senses absorb most wrong signs: such a table agrees once they are fitted. The table with
-the mistake undone needs less of them, usually nothing. So each single change is tried. Those after which the
-least has to be fitted are the likely mistakes.
+Base, tool, zeros and senses absorb most wrong signs: such a table agrees after a fit. The corrected table
+needs fewer fitted parameters, usually none. Each single change is therefore tried. The likely mistakes are
+the changes that leave the fewest fitted parameters.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 
-#: Radians: angles closer than this are the same one.
+#: Angles with a smaller difference (rad) are equal.
 _SAME_ANGLE = 1e-9
-#: Changes up to which zeros and senses are fitted after each one: those of tables of nine rows.
+#: Largest number of changes (tables of nine rows) after which zeros and senses are fitted too.
 _MOST_FITS = 100
 
 
 @dataclass(frozen=True, slots=True)
 class _Change:
-    """A table with one mistake undone; `cell` is None where rows changed places."""
+    """A table after one correction; `cell` is None if rows are exchanged."""
 
     kind: MistakeKind
     rows: tuple[int, ...]
@@ -45,13 +45,13 @@ class _Change:
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """The path that changed tables are compared with.
+    """A search for single mistakes in a table of a path.
 
     Attributes:
         chain: The path.
-        tried: The samples of fits.
-        judged: The samples on which a fit is judged.
-        tolerance: Metres at the tip up to which a table agrees.
+        tried: Samples of the fits.
+        judged: Samples of the checks.
+        tolerance: Tolerance at the tip (metres).
     """
 
     chain: FrameChain
@@ -60,15 +60,15 @@ class Search:
     tolerance: float
 
     def mistakes(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """The changes after which the least has to be fitted: all of the best ones, none if none is better.
+        """Return the changes that leave the fewest fitted parameters; none if no change is better.
 
-        A table that agrees with base, tool and zeros fitted has frames of its own, or a mistake: nothing
-        tells which. Only a change after which one end at most is fitted is a mistake there.
+        A table that agrees after a fit of base, tool and zeros has other frames, or a mistake. The fit cannot
+        distinguish the two. In this case a change is a mistake only if it leaves at most one end to fit.
 
         Args:
             reference: The table.
-            fit: Whether anything may be fitted after a change.
-            agrees: Whether the table agrees with its freedoms fitted.
+            fit: Whether parameters may be fitted after a change.
+            agrees: Whether the table agrees after a fit of base, tool, zeros and senses.
         """
         if self._agrees(_model(reference)):
             return ()
@@ -92,7 +92,7 @@ class Search:
         return ()
 
     def _needs_one_thing(self, table: DHTable) -> bool:
-        """Whether a table agrees with one end, one zero or one sense fitted."""
+        """Whether a table agrees after a fit of one end, one zero or one sense."""
         if self._with_one_end(table) is not None:
             return True
         model = self._with_zeros(table)
@@ -102,14 +102,14 @@ class Search:
         metres, radians = self.judged.apart(model)
         return metres <= self.tolerance and radians * self.judged.scale <= self.tolerance
 
-    # -- what is fitted, from nothing to everything ----------------------------------------------------
+    # -- fits, from no parameters to all parameters -----------------------------------------------------
 
     def _as_written(self, table: DHTable) -> Model | None:
         model = _model(table)
         return model if self._agrees(model) else None
 
     def _with_one_end(self, table: DHTable) -> Model | None:
-        """With the tool fitted, or else the base."""
+        """Fit the tool, or else the base; None if the table does not agree."""
         model = _model(table)
         poses, wanted = model.poses(self.tried.values), self.tried.poses
         tool = replace(model, tool=_mean(model.tool @ np.linalg.inv(poses) @ wanted))
@@ -117,7 +117,7 @@ class Search:
         return next((one for one in (tool, base) if self._agrees(one)), None)
 
     def _with_both_ends(self, table: DHTable) -> Model | None:
-        """With base and tool fitted, from the solution of A X = X B for the base."""
+        """Fit base and tool; the start of the base is a solution of A X = X B."""
         model = _model(table)
         poses, wanted = model.poses(self.tried.values), self.tried.poses
         A, B = wanted @ np.linalg.inv(wanted[0]), poses @ np.linalg.inv(poses[0])
@@ -128,7 +128,7 @@ class Search:
         return found if self._agrees(found) else None
 
     def _with_zeros(self, table: DHTable) -> Model | None:
-        """With base, tool, zeros and senses fitted: the fit with the fewest of them."""
+        """Fit base, tool, zeros and senses; return the fit that changes the fewest of them."""
         standard, written = to_convention(table, Convention.STANDARD), _model(table)
         models = [
             ends_gathered(fit_freedoms(start, self.tried, turns=False), written)
@@ -138,7 +138,7 @@ class Search:
         return min(agreeing, key=lambda model: self._fitted(written, model).count, default=None)
 
     def _fitted(self, written: Model, model: Model) -> Fitted:
-        """Which freedoms a model has that differ from what is written, beyond how well it fits."""
+        """Return the free parameters that differ from the written ones by more than the fit's resolution."""
         metres, radians = self.judged.apart(model)
         fine = resolution(metres / self.judged.scale, radians)
         own = [model.own(i) for i in range(len(model.cells))]
@@ -172,7 +172,7 @@ def _model(table: DHTable) -> Model:
 
 
 def _changes(reference: DHTable) -> Iterator[_Change]:
-    """Every table that differs from the reference by one mistake."""
+    """Yield every table that differs from the reference by one mistake."""
     for i, row in enumerate(reference.rows):
         for cell in ("a", "alpha", "d", "theta"):
             value = getattr(row, cell)
@@ -180,7 +180,9 @@ def _changes(reference: DHTable) -> Iterator[_Change]:
                 yield _Change(MistakeKind.SIGN, (i,), cell, _with_cell(reference, i, cell, -value))
         for turn in (-0.5 * math.pi, 0.5 * math.pi):
             value = math.remainder(row.alpha + turn, 2.0 * math.pi)
-            if abs(math.remainder(value + row.alpha, 2.0 * math.pi)) > _SAME_ANGLE:  # else it is the sign
+            if (
+                abs(math.remainder(value + row.alpha, 2.0 * math.pi)) > _SAME_ANGLE
+            ):  # else the change is a sign
                 table = _with_cell(reference, i, "alpha", value)
                 yield _Change(MistakeKind.RIGHT_ANGLE, (i,), "alpha", table)
     orders = list[tuple[MistakeKind, tuple[int, ...], list[DHRow]]]()
@@ -188,7 +190,7 @@ def _changes(reference: DHTable) -> Iterator[_Change]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    if len(reference.rows) > 3:  # three rows reversed are two exchanged
+    if len(reference.rows) > 3:  # for three rows this is an exchange of two
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))
     for kind, places, rows in orders:
@@ -208,14 +210,14 @@ def _with_cell(table: DHTable, i: int, cell: str, value: float) -> DHTable:
 
 
 def _mean(poses: FloatArray) -> FloatArray:
-    """(4, 4) the pose in the middle of some that are nearly the same; the first one where they are not."""
+    """Return the (4, 4) mean of nearly equal poses; the first pose if they are not nearly equal."""
     middle = poses.mean(axis=0)
     R = polar_factor(middle[:3, :3])
     return pose(R, middle[:3, 3]) if np.linalg.det(R) > 0.0 else np.array(poses[0])
 
 
 def _hand_eye(A: FloatArray, B: FloatArray) -> FloatArray:
-    """(4, 4) X with A X = X B for all poses (s, 4, 4), nearly: Park and Martin (1994)."""
+    """Solve A X = X B for X (4, 4) in least squares over poses (s, 4, 4): Park and Martin (1994)."""
     turns = log_rotation(A[:, :3, :3]).T @ log_rotation(B[:, :3, :3])
     U, _, Vt = np.linalg.svd(turns)
     R = U @ np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))]) @ Vt

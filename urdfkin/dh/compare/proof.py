@@ -1,8 +1,7 @@
-"""How far a table's tip is off at most, in every configuration: proven as `urdfkin same` proves it.
+"""Prove a bound of a table's tip error for every configuration, by the method of `urdfkin same`.
 
-The path and the table become two mechanisms with the same joints. `urdfkin.model.mechanisms` lays them on
-each other as they are written, joint by joint; what is left is passed through support functions from the tip
-to the base.
+The path and the table become two mechanisms with the same joints. `urdfkin.model.mechanisms` matches them
+joint by joint, as they are written. Support functions carry the differences from the tip to the base.
 """
 
 from __future__ import annotations
@@ -27,12 +26,12 @@ from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit, build_tre
 def max_tip_error_bound(
     path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]
 ) -> tuple[float, float]:
-    """(m, rad) that the tip of a table of a path's joints is off at most, without what counts as rounding.
+    """Return a bound of the tip error of a table (metres, radians), without rounding.
 
     Args:
-        path: The path, each joint free.
-        table: The table, whose variables are the path's coordinates, senses and zeros in it.
-        slides: Between what the values of sliding joints lie.
+        path: The path; its mimic rules are ignored.
+        table: The table. Its variables are the path's coordinates; it contains senses and zeros.
+        slides: Ranges of the prismatic joints (metres).
     """
     mechanisms = Mechanism(_free(path, table, slides)), Mechanism(free_tree(table))
     found = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
@@ -43,7 +42,7 @@ def max_tip_error_bound(
 
 
 def _free(path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]) -> KinematicTree:
-    """A path as a tree whose links are called as the table's, followers set free."""
+    """Return a path as a tree with the names of the table's links, without mimic rules."""
     names, z = link_names(table), np.array([0.0, 0.0, 1.0])
     joints = list[tuple[Joint, str, str]]()
     for i, joint in enumerate(path.joints):

@@ -1,6 +1,6 @@
-"""What a comparison found: cells, what was fitted, and how far the tip is off.
+"""Store the result of a comparison, and write it as text.
 
-A comparison in words: the verdict, what was fitted, the cells that differ.
+The result has the tip error, the fitted parameters and the cells that differ.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from urdfkin.errors import Question
 from urdfkin.errors.escape import printable
 from urdfkin.kinematics.roundings import EPS, of_a_fit
 
-#: Metres for each metre of reach, and radians, that changed cells may leave and explain all of a difference:
-#: far above what a fit rounds, far below the last digit of any sheet.
+#: Largest remaining error (metres per metre of reach, rad) if changed cells explain the whole difference: far
+#: above the rounding of a fit, far below the last digit of any data sheet.
 EXPLAINED = 1e-9
-#: Radians, or of the reach: fitted numbers are shown no finer, however well the table fits.
+#: Finest resolution of printed fitted numbers (rad, or relative to the reach).
 _FINEST = 1e-12
-#: By how much more than half a digit a half may be, a decimal that was read as a double and subtracted.
+#: Slack of half a digit for the rounding of decimals to doubles.
 _HALF = 1.0 + 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class CellDifference:
-    """One cell that is not the URDF's.
+    """One cell that differs from the URDF.
 
     Attributes:
         row: Index of the row in the reference table, from 0.
         joint: Name of the joint in the URDF.
         cell: "a", "alpha", "d", "theta" or "beta".
-        reference: The table's value, metres or radians.
-        urdf: What it would have to be.
-        tip: Metres: how far this cell alone moves the tip, at the worst of the samples.
-        last_digit: Half a unit of the last digit that the table's file gives, metres or radians; 0 where the
-            value was written exactly, or how it was written is not known.
+        reference: The table's value (metres or radians).
+        urdf: The URDF's value (metres or radians).
+        tip: Displacement of the tip by this difference alone, at the worst sample (metres).
+        last_digit: Half a unit of the last digit in the table's file (metres or radians); 0 if the value is
+            exact, or if its text is unknown.
     """
 
     row: int
@@ -53,25 +53,25 @@ class CellDifference:
 
     @property
     def difference(self) -> float:
-        """URDF less reference, metres or radians."""
+        """The URDF's value minus the reference's, metres or radians."""
         return self.urdf - self.reference
 
     @property
     def is_rounding(self) -> bool:
-        """Whether the table could not have said it better with the digits that it gives."""
+        """Whether the difference is within half a unit of the table's last digit."""
         return abs(self.difference) <= self.last_digit * _HALF
 
 
 @dataclass(frozen=True, slots=True)
 class AbsorbedOffset:
-    """What fitting gave to one end of a table, away from what is written: metres and radians."""
+    """Change of a table's base or tool by the fit, in metres and radians."""
 
     metres: float
     radians: float
 
 
 class MistakeKind(StrEnum):
-    """How a table was mistyped."""
+    """Kind of a mistake in a table."""
 
     SIGN = "sign"
     RIGHT_ANGLE = "right angle"
@@ -81,13 +81,13 @@ class MistakeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """What has to be fitted for a table to agree.
+    """Free parameters that a fit must change for a table to agree.
 
     Attributes:
-        base: Whether the base is.
-        tool: Whether the tool is.
-        zeros: How many joints have another zero.
-        reversed: How many joints count the other way.
+        base: Whether the base changes.
+        tool: Whether the tool changes.
+        zeros: Number of joints with another zero.
+        reversed: Number of reversed joints.
     """
 
     base: bool = False
@@ -97,7 +97,7 @@ class Fitted:
 
     @property
     def count(self) -> int:
-        """How much that is: each end and each joint's zero and sense is one."""
+        """Number of changes; each end, each zero and each sense counts as one."""
         return self.base + self.tool + self.zeros + self.reversed
 
     def __str__(self) -> str:
@@ -109,16 +109,16 @@ class Fitted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mistake:
-    """One change of a table after which less has to be fitted.
+    """A likely mistake: a change of the table that leaves fewer fitted parameters.
 
     Attributes:
-        kind: How the table was mistyped.
-        rows: Indices of the rows that change, from 0.
-        cell: The cell that changes; None where rows change places.
+        kind: Kind of the mistake.
+        rows: Indices of the changed rows, from 0.
+        cell: The changed cell; None if rows change places.
         table: The table after the change.
-        fitted: What still has to be fitted.
-        metres: How far the tip is then off at the worst of the samples.
-        radians: Likewise its orientation.
+        fitted: The parameters that still need a fit.
+        metres: Position error of the tip after the change, at the worst sample.
+        radians: Orientation error of the tip after the change, at the worst sample.
     """
 
     kind: MistakeKind
@@ -132,33 +132,33 @@ class Mistake:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """What a comparison found.
+    """Result of a comparison of a table with a URDF.
 
     Attributes:
-        reference: The table, its joints named as in the URDF, with base, tool, senses and offsets fitted:
-            its `placement` takes the URDF's coordinates.
-        reach: Metres: the robot's, by which rounding and angles are measured.
-        fitted: Whether base, tool, senses and offsets were free.
-        senses: Of each joint: the table's variable is sense * q + offset.
-        offsets: Likewise, radians or metres.
-        base: What fitting gave to the base.
-        tool: What it gave to the tool.
-        metres: How far the tip is off at the worst of the samples, with what was fitted.
-        radians: Likewise its orientation.
-        most_metres: How far the tip is off at most at any values of the joints, proven, with what was fitted
-            and without what counts as rounding (`urdfkin.dh.compare.proof`).
-        most_radians: Likewise its orientation.
-        written_metres: Likewise the tip's distance with the table exactly as it is written.
-        written_radians: Likewise its orientation.
-        differences: The cells that differ, the largest effect at the tip first; the cell of the single
-            mistake where there is one.
-        instead: The cells that would have to change if nothing were fitted; none if that does not explain
-            the URDF, or nothing but the cells of `differences` is to be explained.
-        hidden: (row, cell) that base, tool and offsets stand in for: no sample can tell these.
-        mistakes: Single changes of the table after which the least has to be fitted, less than without them.
-        residual: Metres left when the cells are the URDF's: rounding, unless no cells explain the URDF.
-        tolerance: Metres up to which the two are said to agree.
-        samples: How many configurations were tried.
+        reference: The table with the URDF's joint names and with fitted base, tool, senses and offsets. Its
+            `placement` takes the URDF's coordinates.
+        reach: Reach of the robot (metres): the scale of rounding and of angles.
+        fitted: Whether base, tool, senses and offsets were fitted.
+        senses: Sense of each joint: the table's variable is sense * q + offset.
+        offsets: Offset of each joint (radians or metres).
+        base: Change of the base by the fit.
+        tool: Change of the tool by the fit.
+        metres: Position error of the fitted table's tip at the worst sample.
+        radians: Orientation error of the fitted table's tip at the worst sample.
+        most_metres: Proven bound of the fitted table's position error at any joint values, without rounding
+            (`urdfkin.dh.compare.proof`).
+        most_radians: Proven bound of its orientation error.
+        written_metres: Position error at the worst sample of the table as it is written.
+        written_radians: Orientation error at the worst sample of the table as it is written.
+        differences: The cells that differ, the largest effect at the tip first; with a single mistake, its
+            cell.
+        instead: The cells that would have to change without a fit. Empty if they do not explain the URDF, or
+            if there are too many of them.
+        hidden: (row, cell) of cells that base, tool and offsets can replace; samples cannot determine them.
+        mistakes: Single changes of the table that leave the fewest fitted parameters.
+        residual: Error that remains with the URDF's cells (metres): rounding, if the cells explain the URDF.
+        tolerance: Tolerance at the tip (metres).
+        samples: Number of configurations in the check.
     """
 
     reference: DHTable
@@ -184,47 +184,47 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the tip is never off by more than the tolerance, nor by its turn times the reach."""
+        """Whether position error and rotation error times reach are within the tolerance on all samples."""
         return self.metres <= self.tolerance and self.radians * self.reach <= self.tolerance
 
     @property
     def passes(self) -> bool:
-        """Whether the table agrees and no single change of it would leave less to be fitted."""
+        """Whether the table agrees, and has no likely mistake."""
         return self.agrees and not self.mistakes
 
     @property
     def rounding(self) -> float:
-        """Radians, and metres for each metre of the robot's reach, that count as rounding."""
+        """Error that counts as rounding: radians, and metres per metre of reach."""
         return EPS * of_a_fit(len(self.reference.rows))
 
     @property
     def exact(self) -> bool:
-        """Whether rounding explains all of the difference, in every configuration: proven."""
+        """Whether the difference is proven to be rounding in every configuration."""
         return self.most_metres <= self.rounding * self.reach and self.most_radians <= self.rounding
 
     @property
     def as_written(self) -> bool:
-        """Whether the table is the URDF's as it is written, base, tool and offsets too, to rounding."""
+        """Whether the table as it is written, with its base, tool and zeros, agrees up to rounding."""
         return self.written_metres <= self.rounding * self.reach and self.written_radians <= self.rounding
 
 
 def resolution(share: float, radians: float) -> float:
-    """A power of ten below which fitted numbers only reflect how well a table fits.
+    """Return the resolution of fitted numbers: a power of ten, at least twice the tip error.
 
     Args:
-        share: How far the tip is off, metres for each metre of reach.
-        radians: How far it is turned.
+        share: Position error of the tip, metres per metre of reach.
+        radians: Orientation error of the tip.
     """
     return float(10.0 ** math.ceil(math.log10(2.0 * max(share, radians, _FINEST))))
 
 
 def comparison_text(found: Comparison, units: Units) -> str:
-    """Lines for a terminal, the last one ended."""
+    """Return a comparison as text: the verdict, the fitted parameters and the cells that differ."""
     lines = [*_verdict(found), *(_mistakes(found, units) if found.mistakes else _cells(found, units))]
     if found.residual > EXPLAINED * found.reach and not found.mistakes:
-        lines.append(f"No change of cells explains the URDF: {found.residual * 1e3:.3g} mm are left.")
+        lines.append(f"No change of cells explains the difference: {found.residual * 1e3:.3g} mm remain.")
         if not found.fitted:
-            lines.append("Its frames may stand elsewhere: without --no-fit, base and tool are fitted.")
+            lines.append("The table may have other frames. Omit --no-fit to fit base and tool.")
     if found.agrees or not found.mistakes:
         lines += _fitted(found, units)
     if not found.agrees:
@@ -233,7 +233,7 @@ def comparison_text(found: Comparison, units: Units) -> str:
 
 
 def _fitted(found: Comparison, units: Units) -> list[str]:
-    """Variables, base and tool as they were fitted, where they are not the identity."""
+    """Return lines with the fitted variables, base and tool that are not the identity."""
     lines = list[str]()
     table, fine = found.reference, resolution(found.metres / found.reach, found.radians)
     moved = [
@@ -251,7 +251,7 @@ def _fitted(found: Comparison, units: Units) -> list[str]:
 
 
 def _verdict(found: Comparison) -> list[str]:
-    """What the table is, with what was fitted and without."""
+    """Return lines with the verdict, with and without the fit."""
     table = found.reference
     path = f"{table.robot}, {table.base_frame} to {table.tip_frame}"
     agrees = "agrees only" if found.mistakes else "agrees exactly" if found.exact else "agrees"
@@ -267,9 +267,9 @@ def _verdict(found: Comparison) -> list[str]:
         ]
     fine = resolution(found.metres / found.reach, found.radians)
     ends = [
-        f"{what} {taken.metres * 1e3:.3g} mm and {taken.radians:.3g} rad"
-        for what, taken in (("the base", found.base), ("the tool", found.tool))
-        if _is_taken(taken, found)
+        f"{what} by {change.metres * 1e3:.3g} mm and {change.radians:.3g} rad"
+        for what, change in (("the base", found.base), ("the tool", found.tool))
+        if _is_moved(change, found)
     ]
     zeros = sum(abs(offset) > fine for offset in found.offsets)
     if zeros:
@@ -277,18 +277,20 @@ def _verdict(found: Comparison) -> list[str]:
     reversed_ = sum(sense < 0 for sense in found.senses)
     if reversed_:
         ends.append(
-            f"the way {reversed_} joint{'s' if reversed_ > 1 else ''} count{'s' * (reversed_ == 1)} (below)"
+            f"the senses of {reversed_} joints (below)" if reversed_ > 1 else "the sense of 1 joint (below)"
         )
-    once = " once base, tool and joint offsets are fitted" if found.agrees and ends else ""
-    fitted = "" if found.agrees else "; base, tool and joint offsets fitted"
+    once = " after a fit of base, tool and joint offsets" if found.agrees and ends else ""
+    fitted = "" if found.agrees else "; after a fit of base, tool and joint offsets"
     lines = [f"The table {verdict}{once}: {path}: {off}", f"({proof}{fitted})."]
-    lines.append(f"As it is written {_off(found.written_metres, found.written_radians)}.")
+    lines.append(f"As it is written: {_off(found.written_metres, found.written_radians)}.")
     if ends:
-        lines.append(f"Fitting gave {', '.join(ends)}; --no-fit keeps to what is written.")
+        lines.append(
+            f"The fit changed {', '.join(ends)}. Use --no-fit to compare the table as it is written."
+        )
         moved = [max(end.metres / found.reach, end.radians) > fine for end in (found.base, found.tool)]
         if found.agrees and not found.mistakes and (all(moved) or zeros or reversed_):
             lines.append(
-                "A wrong sign can hide behind these. Write base, tool and zeros into the table to find it."
+                "These changes can hide a wrong sign. Write base, tool and zeros into the table to find it."
             )
     return lines
 
@@ -298,7 +300,7 @@ def _off(metres: float, radians: float) -> str:
 
 
 def _proven(found: Comparison) -> str:
-    """What is proven, in words."""
+    """Return the proven bound as text."""
     if found.exact:
         return "rounding alone"
     if math.isinf(found.most_metres):
@@ -306,26 +308,26 @@ def _proven(found: Comparison) -> str:
     return f"{found.most_metres * 1e3:.3g} mm and {found.most_radians:.3g} rad"
 
 
-def _is_taken(taken: AbsorbedOffset, found: Comparison) -> bool:
-    return taken.metres > found.rounding * found.reach or taken.radians > found.rounding
+def _is_moved(change: AbsorbedOffset, found: Comparison) -> bool:
+    return change.metres > found.rounding * found.reach or change.radians > found.rounding
 
 
 def _mistakes(found: Comparison, units: Units) -> list[str]:
-    """The single changes after which the least has to be fitted."""
+    """Return lines with the likely mistakes."""
     first = found.mistakes[0]
-    left = "as written" if not first.fitted.count else f"with these fitted alone: {first.fitted}"
+    left = "as written" if not first.fitted.count else f"after a fit of only {first.fitted}"
     count = "One change makes" if len(found.mistakes) == 1 else "Each of these changes makes"
     lines = ["", f"{count} the table right {left}:"]
     for one in found.mistakes:
         off = _off(one.metres, one.radians)
         lines.append(f"  {_change(one, found.reference, units)}; {off}")
     if found.agrees:
-        lines.append("Correct the table. If base, tool and zeros are meant, write them into it.")
+        lines.append("Correct the table. If its base, tool and zeros are intended, write them into it.")
     return lines
 
 
 def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
-    """A change in words."""
+    """Describe a change of the table."""
     if mistake.cell is None:
         if mistake.kind is MistakeKind.REVERSED:
             return "the rows in reverse order"
@@ -340,7 +342,7 @@ def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
 
 
 def _cells(found: Comparison, units: Units) -> list[str]:
-    """The cells that differ, those that nobody can tell, and those that could be meant instead."""
+    """Return lines with the cells that differ, those not compared, and the changes without a fit."""
     unit = f"({units.length_name}, {units.angle_name})"
     lines = []
     if found.differences:
@@ -348,14 +350,14 @@ def _cells(found: Comparison, units: Units) -> list[str]:
         rounded = sum(one.is_rounding for one in found.differences)
         if rounded:
             all_ = "All" if rounded == len(found.differences) else f"{rounded} of {len(found.differences)}"
-            lines.append(f"{all_} within the last digit that the table gives (*).")
+            lines.append(f"{all_} within the last digit of the table (*).")
     elif found.as_written:
-        lines.append("Every cell is the URDF's.")
+        lines.append("Every cell agrees with the URDF.")
     elif found.exact:
-        lines.append("No cell differs that can be told from what was fitted.")
+        lines.append("No cell differs, except those that the fit can replace.")
     if found.hidden and not found.as_written:
         cells = ", ".join(f"{cell}{row + 1}" for row, cell in found.hidden)
-        lines.append(f"Base, tool and offsets stand in for {cells}: these were not compared.")
+        lines.append(f"Not compared, because base, tool and offsets can replace them: {cells}.")
     if {(one.row, one.cell) for one in found.instead} - {(one.row, one.cell) for one in found.differences}:
         lines += ["", f"Without fitting, these cells would have to change {unit}:"]
         lines += _table(found.instead, units)
@@ -373,7 +375,7 @@ def _table(cells: Sequence[CellDifference], units: Units) -> list[str]:
 
 
 def shown_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """An offset to the resolution, as a fraction of pi where it is one to that resolution."""
+    """Format an offset at the resolution; as a fraction of pi if it is one at this resolution."""
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:

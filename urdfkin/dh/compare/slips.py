@@ -1,8 +1,8 @@
-"""What a table that does not fit would have to be read as to fit: the slip is named, not only its size.
+"""Find the convention, units or columns with which a table that disagrees would agree with a URDF.
 
-Of all readings (`urdfkin.dh.hypotheses`) those are tried whose shape is the URDF's: how far consecutive axes
-are apart, at which angle, and the offsets between the feet of their common normals. These do not change with
-signs, zeros, base and tool, and cost nothing to compute; a few readings that come close are then fitted.
+Every reading of the table (`urdfkin.dh.hypotheses`) has a shape: distances and angles of consecutive axes,
+and the offsets between the feet of their common normals. The shape does not depend on signs, zeros, base and
+tool, and is fast to compute. The few readings with a shape closest to the URDF's are fitted.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from urdfkin.errors import InputError, Question, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Readings that are fitted; radians of tilt below which axes are parallel; what one slip more must be worth.
+#: Number of readings to fit; tilt of parallel axes (rad); relative cost of one more difference.
 _TRIED, _PARALLEL, _WORTH = 3, 2e-2, 0.1
-#: A reading explains a table if it leaves no more than this of what the table is off as it is read.
+#: Largest fraction of the original tip error that a reading may leave.
 _EXPLAINS = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class CommonMistake:
-    """A reading in which a table fits.
+    """A reading in which a table agrees.
 
     Attributes:
-        reading: How to read it.
-        said: How it says that it is to be read.
-        metres: How far the tip is then off at the worst of the samples, base, tool and offsets fitted.
-        radians: Likewise its orientation.
+        reading: The reading.
+        said: The reading that the table names.
+        metres: Position error of the tip at the worst sample, after a fit of base, tool and offsets.
+        radians: Orientation error of the tip at the worst sample.
     """
 
     reading: ConventionHypothesis
@@ -55,7 +55,7 @@ class CommonMistake:
         )
 
     def as_mapping(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {
             "convention": str(self.reading.convention),
             "lengths": str(self.reading.lengths),
@@ -69,19 +69,19 @@ class CommonMistake:
 def diagnose(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, off: float = math.inf
 ) -> CommonMistake | None:
-    """The slip that explains why a table does not fit, or None.
+    """Return the reading in which a table agrees, or None.
 
     Args:
         chain: The path of the URDF.
-        data: The table's plain data, as `urdfkin.dh.parse_table.mapping_from_text` reads them.
-        tolerance: Metres at the tip up to which a table agrees.
-        off: Metres that the tip is off as the table is read; what leaves most of that explains nothing.
+        data: The table's plain data from `urdfkin.dh.parse_table.mapping_from_text`.
+        tolerance: Tolerance at the tip (metres).
+        off: Tip error of the table as it is read (metres); the result must leave at most 5 % of it.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     own = shape(derive(chain, Choices(last=Last.FLANGE)), chain.reach)
     try:
         said = as_said(data)
-    except InputError:  # what it says is no convention or no unit: that is the slip
+    except InputError:  # an invalid convention or unit: another error reports it
         return None
     close = list[tuple[float, int, ConventionHypothesis, DHTable]]()
     for reading, table in other_readings(data):
@@ -97,7 +97,7 @@ def diagnose(
     for _, slips, reading, table in close[:_TRIED]:
         try:
             metres, radians = best_fit(chain, table, tolerance)
-        except RangeError:  # lengths that only this reading makes so large
+        except RangeError:  # this reading makes a length too large
             continue
         off_here = metres + radians * chain.reach
         if off_here <= max(tolerance, min(_EXPLAINS * off, _EXPLAINS * chain.reach)):
@@ -110,25 +110,25 @@ def diagnose(
 def convention_that_fits(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
 ) -> Convention:
-    """The convention of a table that names none: the one in which it fits a path.
+    """Return the convention with which a table without a named convention agrees with a path.
 
     Args:
         chain: The path of the URDF.
         data: The table's plain data.
-        tolerance: Metres at the tip up to which a table agrees.
+        tolerance: Tolerance at the tip (metres).
         where: The table's file.
 
     Raises:
-        InputError: both conventions fit equally well, or none does in any unit.
+        InputError: both conventions agree equally well, or neither does with any units.
     """
     found = list[tuple[Convention, Comparison]]()
-    refused = list[InputError]()
+    errors = list[InputError]()
     for convention in Convention:
         try:
             table = table_from_mapping({**data, "convention": convention})
             found.append((convention, compare(chain, table, tolerance)))
         except InputError as error:
-            refused.append(error)
+            errors.append(error)
     written = [one for one, how in found if how.agrees and how.written_metres <= tolerance]
     passing = [one for one, how in found if how.passes]
     agreeing = [one for one, how in found if how.agrees]
@@ -138,23 +138,25 @@ def convention_that_fits(
         return best[0]
     if not best and (slip := diagnose(chain, data, tolerance)) and slip.reading.convention:
         return slip.reading.convention
-    if refused and not found:
-        raise refused[0]
+    if errors and not found:
+        raise errors[0]
     raise InputError(
-        f"the table does not say its convention, and {'both conventions fit' if best else 'neither fits'}",
+        f"the table does not name its convention, and {'both conventions fit' if best else 'neither fits'}",
         where=where,
-        found=f"off by {' and '.join(f'{how.metres * 1e3:.3g} mm as {one}' for one, how in found)}",
-        remedy="write convention = 'standard' or 'modified', in a sheet a line `convention: standard`",
+        found=f"tip errors {' and '.join(f'{how.metres * 1e3:.3g} mm as {one}' for one, how in found)}",
+        remedy="write convention = 'standard' or 'modified' (in text: a line `convention: standard`)",
         question=Question.WHICH_DH_CONVENTION,
     )
 
 
 def shape(table: DHTable, scale: float) -> FloatArray:
-    """What signs, zeros, base and tool leave of a table: metres, and radians times `scale`.
+    """Return numbers of a table that do not depend on signs, zeros, base and tool.
 
-    For each pair of axes their distance and the angle between their lines; for each joint between pairs that
-    are not parallel the offset along it, gathered along parallel axes. A sliding axis has no place: distances
-    from it and offsets beside it say nothing, nor do offsets along the first axis, which the base takes up.
+    They are in metres, and in radians times `scale`. For each pair of axes they are the distance and the
+    angle of their lines. For each joint between two pairs of axes that are not parallel, they include the
+    offset along it; offsets along parallel axes are summed. The line of a prismatic axis is free, so
+    distances from it and offsets beside it are zero. Offsets along the first axis are also left out, because
+    the base absorbs them.
     """
     rows = to_convention(table, Convention.STANDARD).rows
     numbers, offset, known = list[float](), 0.0, False

@@ -1,4 +1,4 @@
-"""A table in every form that people ask for: to read, to print, to keep, to run. One file a form."""
+"""Export a table as text, data or code."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from urdfkin.errors import UnknownNameError
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-#: Format name -> (module that holds `write_NAME`, one-line summary).
+#: Format name -> (module with `write_NAME`, one-line summary).
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": ("urdfkin.dh.export.text", "aligned text"),
     "markdown": ("urdfkin.dh.export.text", "a Markdown table"),
@@ -33,16 +33,16 @@ FORMATS: dict[str, tuple[str, str]] = {
 
 
 def export(table: DHTable, format: str, units: Units | None = None) -> str:
-    """The table as text.
+    """Return the table in a format.
 
     Args:
         table: Any table.
         format: A name in `FORMATS`.
-        units: For the forms that are read by people; files and code are in metres and radians.
+        units: Number format of printed tables; data and code are in metres and radians.
 
     Raises:
-        UnknownNameError: no such format.
-        InputError: the form cannot hold this table (a follower in roboticstoolbox).
+        UnknownNameError: an unknown format.
+        InputError: the format cannot express this table (a mimic joint in roboticstoolbox).
     """
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)

@@ -1,10 +1,7 @@
-"""A table as plain data, in the form that `urdfkin.dh.rows.table_from_mapping` reads; numbers to the bit.
+"""Write a table as plain data, JSON, TOML and CSV.
 
-The table as JSON, read back by `urdfkin.dh.read_table` to the bit.
-
-The table as TOML, read back by `urdfkin.dh.read_table` to the bit; the form of the shipped references.
-
-The table as comma-separated values, for spreadsheets; read back by `urdfkin.dh.read_table` to the bit.
+`urdfkin.dh.rows.table_from_mapping` reads the plain data; `urdfkin.dh.read_table` reads the files. All
+numbers are the same after reading, to the last bit. The reference tables in urdfkin are TOML files.
 """
 
 from __future__ import annotations
@@ -23,7 +20,7 @@ from urdfkin.errors.escape import csv_cell, escape
 
 
 def to_mapping(table: DHTable) -> dict[str, Any]:
-    """Strings, numbers, lists and mappings only; metres and radians. What was snapped is told in `snap`."""
+    """Return strings, numbers, lists and mappings, in metres and radians; `snap` reports the snapping."""
     data: dict[str, Any] = {
         "convention": str(table.convention),
         "angles": "radians",
@@ -68,20 +65,20 @@ def _row(row: DHRow) -> dict[str, Any]:
         data["mimic"] = asdict(row.mimic)
     if row.limit is not None:
         names = ("lower", "upper", "velocity", "effort")
-        # Infinity has no place in JSON; a bound that is not written is infinite.
+        # JSON has no infinity; a missing limit is infinite.
         limits = {name: getattr(row.limit, name) for name in names}
         data["limit"] = {name: value for name, value in limits.items() if math.isfinite(value)}
     return data
 
 
 def write_json(table: DHTable, units: Units) -> str:
-    """JSON in metres and radians, whatever the units for people are."""
+    """Return the table in JSON, in metres and radians."""
     del units
     return json.dumps(to_mapping(table), indent=2, allow_nan=False) + "\n"
 
 
 def write_toml(table: DHTable, units: Units) -> str:
-    """TOML in metres and radians, one row a line."""
+    """Return the table in TOML, in metres and radians, with one line for each row."""
     del units
     data = to_mapping(table)
     rows = data.pop("rows")
@@ -95,7 +92,7 @@ def _value(value: Any) -> str:
         return "{" + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(_value(item) for item in value) + "]"
-    # A TOML basic string takes JSON's escapes, but no pairs of surrogates, and both write numbers alike.
+    # JSON's numbers and escapes are valid in TOML, except for surrogate pairs.
     text = json.dumps(value, ensure_ascii=False, allow_nan=False)
     return "".join(c if c.isprintable() else escape(c) for c in text)
 
@@ -107,7 +104,7 @@ COLUMNS = (
 
 
 def write_csv(table: DHTable, units: Units) -> str:
-    """Comment lines `# key: value` for what is said once, then a line of column names, then the rows."""
+    """Return the table in CSV: comment lines `# key: value`, a line of column names, then the rows."""
     del units
     data = to_mapping(table)
     rows = data.pop("rows")

@@ -1,7 +1,7 @@
-"""A table as a sequence of elementary transforms (Haviland and Corke), each a turn or a shift, or a joint.
+"""Export a table as a sequence of elementary transforms (Haviland and Corke) in Python for roboticstoolbox.
 
-The fifth parameter of a Hayati row is one transform more. As Python code for roboticstoolbox, whose numerical
-solvers take it.
+Each elementary transform is a rotation, a translation or a joint. The fifth parameter of a Hayati row is one
+more transform. The numerical solvers of roboticstoolbox accept such a sequence.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from urdfkin.model.tree import FloatArray
 
 
 def write_ets(table: DHTable, units: Units) -> str:
-    """A module with `ets`, and `robot`, a Robot made of it.
+    """Return a module with `ets`, and `robot`, a Robot of these transforms.
 
     Raises:
-        InputError: a follower.
+        InputError: a mimic joint.
     """
     del units
     demand_free(table, "a sequence of elementary transforms")
@@ -32,20 +32,24 @@ def write_ets(table: DHTable, units: Units) -> str:
 
 
 def joint(row: DHRow) -> list[str]:
-    """How roboticstoolbox is told of a joint's sense and limits."""
+    """Return roboticstoolbox's arguments for a joint's sense and limits."""
     limits = bounds(row)
     return ["flip=True"] * (row.sense < 0) + ([f"qlim=[{limits}]"] if limits else [])
 
 
 def _row(row: DHRow, convention: Convention) -> list[str]:
     moves = ", ".join(joint(row))
-    along = [*_some("Rz", row.theta), *([f"ET.Rz({moves})"] * row.kind.turns), *_some("tz", row.d)]
+    along = [
+        *_unless_zero("Rz", row.theta),
+        *([f"ET.Rz({moves})"] * row.kind.turns),
+        *_unless_zero("tz", row.d),
+    ]
     along += [f"ET.tz({moves})"] * (not row.kind.turns)
-    across = [*_some("tx", row.a), *_some("Rx", row.alpha), *_some("Ry", row.beta)]
+    across = [*_unless_zero("tx", row.a), *_unless_zero("Rx", row.alpha), *_unless_zero("Ry", row.beta)]
     return along + across if convention is Convention.STANDARD else across + along
 
 
-def _some(name: str, value: float) -> list[str]:
+def _unless_zero(name: str, value: float) -> list[str]:
     return [f"ET.{name}({value!r})"] if value else []
 
 

@@ -1,10 +1,7 @@
-"""What the code writers share: exact numbers, identifiers, one header comment, the rows as numbers.
+"""Export a table as code for numbers: Python with NumPy, C99, and MATLAB (also Octave).
 
-Python code on NumPy alone: the rows as an array and a function of ten lines.
-
-C99 code without dependencies: constant rows and one function.
-
-MATLAB code of plain matrices; runs in Octave as well.
+The code contains the rows as constants and one function. It needs no other library. Numbers are exact to the
+last bit. The other code formats use the functions for identifiers, headers and numbers.
 """
 
 from __future__ import annotations
@@ -21,7 +18,7 @@ from urdfkin.model.tree import FloatArray
 
 
 def identifier(name: str) -> str:
-    """A name that C, Python and MATLAB all accept.
+    """Return a valid name in C, Python and MATLAB.
 
     Example:
         >>> identifier("ur5 robot"), identifier("2dof"), identifier("for")
@@ -34,13 +31,13 @@ def identifier(name: str) -> str:
 
 
 def docstring(table: DHTable) -> list[str]:
-    """The same as the docstring of a Python module, with a blank line."""
+    """Return `header` as a Python module's docstring, with a blank line."""
     first, *others = (f"{line}." for line in header(table))
     return ['"""' + first, "", *others, '"""', ""]
 
 
 def header(table: DHTable) -> list[str]:
-    """What a reader of the code must know, without comment marks; names cannot end a comment early."""
+    """Return the header's lines without comment marks; names in it cannot end a comment."""
     lines = [
         f"{table.robot}: {table.base_frame} to {table.tip_frame}",
         f"{table.convention} Denavit-Hartenberg parameters, metres and radians",
@@ -48,37 +45,37 @@ def header(table: DHTable) -> list[str]:
         f"q = ({', '.join(table.joint_names)})",
     ]
     if table.snap is not None and table.snap.changes:
-        lines.append(f"angles snapped: the tip moves at most {table.snap.metres:.3g} m")
+        lines.append(f"angles snapped: the tip moves by at most {table.snap.metres:.3g} m")
     return [plain(line) for line in lines]
 
 
 def plain(text: str) -> str:
-    """Printable ASCII without the marks that could end a comment or a string."""
+    """Replace all characters but printable ASCII, and those that could end a comment or a string."""
     return re.sub(r"[^ -~]|[\"'\\*%]", "_", text)
 
 
 def numbers(values: FloatArray | list[float]) -> str:
-    """Numbers that read back to the same bits."""
+    """Format numbers so that they parse to the same bits."""
     return ", ".join(repr(float(value)) for value in values)
 
 
 def row_numbers(table: DHTable) -> list[list[float]]:
-    """a, alpha, d, theta, beta, 1 for turning and 0 for sliding, sense."""
+    """Return a, alpha, d, theta, beta, 1 for revolute or 0 for prismatic, and sense of each row."""
     return [[*row.cells, float(row.kind.turns), float(row.sense)] for row in table.rows]
 
 
 def demand_free(table: DHTable, what: str) -> None:
-    """Refuse a table with followers where `what` knows none."""
+    """Raise InputError for a table with mimic joints, which the format `what` does not support."""
     if any(row.mimic is not None for row in table.rows):
         raise InputError(
-            f"{what} has no joint that follows another",
+            f"{what} does not support mimic joints",
             where=f"table of {table.robot}",
-            remedy="load with mimic off, or use a form in plain code, such as numpy or matlab",
+            remedy="load the robot with mimic off, or use another format, such as numpy or matlab",
         )
 
 
 def bounds(row: DHRow) -> str:
-    """Lower and upper, with a comma between them; "" where a side is open."""
+    """Return the lower and upper limit separated by a comma; "" if one of them is infinite."""
     limit = row.limit
     if limit is None or not (math.isfinite(limit.lower) and math.isfinite(limit.upper)):
         return ""
@@ -88,7 +85,7 @@ def bounds(row: DHRow) -> str:
 _NUMPY_BODY = '''
 
 def placement(q):
-    """(..., 4, 4) pose of the tip in the base for q (..., {n}), rad and m."""
+    """Return the (..., 4, 4) pose of the tip in the base for q (..., {n}), rad and m."""
     q = np.asarray(q, dtype=float) @ COUPLING.T + COUPLING_OFFSET
     T = np.broadcast_to(BASE, (*q.shape[:-1], 4, 4))
     for i, (a, alpha, d, theta, beta, turns, sense) in enumerate(ROWS):
@@ -100,7 +97,7 @@ def placement(q):
 
 
 def along_axis(theta, d):
-    """Rz(theta) Tz(d)."""
+    """Return Rz(theta) Tz(d)."""
     S = np.zeros((*theta.shape, 4, 4))
     S[..., 0, 0] = S[..., 1, 1] = np.cos(theta)
     S[..., 1, 0] = np.sin(theta)
@@ -111,14 +108,14 @@ def along_axis(theta, d):
 
 
 def between_axes(a, alpha, beta):
-    """Tx(a) Rx(alpha) Ry(beta)."""
+    """Return Tx(a) Rx(alpha) Ry(beta)."""
     ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
     return np.array([[cb, 0, sb, a], [sa * sb, ca, -sa * cb, 0], [-ca * sb, sa, ca * cb, 0], [0, 0, 0, 1.0]])
 '''
 
 
 def write_numpy(table: DHTable, units: Units) -> str:
-    """A module with `placement(q)`."""
+    """Return a module with `placement(q)`."""
     del units
     coupling = table.coupling
     lines = [
@@ -130,7 +127,7 @@ def write_numpy(table: DHTable, units: Units) -> str:
         "import numpy as np",
         "",
     ]
-    lines += ["# a, alpha, d, theta, beta, 1 for turning and 0 for sliding, sense", "ROWS = np.array("]
+    lines += ["# a, alpha, d, theta, beta, 1 for revolute and 0 for prismatic, sense", "ROWS = np.array("]
     lines += [
         "    [",
         *(f"        [{numbers(row)}]," for row in row_numbers(table)),
@@ -187,7 +184,7 @@ void {name}_placement(const double *q, double T[16])
 
 
 def write_c(table: DHTable, units: Units) -> str:
-    """A translation unit with `ROBOT_placement`."""
+    """Return a translation unit with `ROBOT_placement`."""
     del units
     name, n, rows = identifier(table.robot), len(table.joint_names), row_numbers(table)
     lines = [
@@ -195,8 +192,8 @@ def write_c(table: DHTable, units: Units) -> str:
         "#include <math.h>",
         "",
     ]
-    # C has no empty arrays: a table without rows keeps one that the loop never reaches.
-    lines += ["/* a, alpha, d, theta, beta, 1 for turning and 0 for sliding, sense */"]
+    # C has no empty arrays: a table without rows has one unused row.
+    lines += ["/* a, alpha, d, theta, beta, 1 for revolute and 0 for prismatic, sense */"]
     lines += [f"static const double {name}_rows[{max(len(rows), 1)}][7] = {{"]
     lines += [f"    {{{numbers(row)}}}," for row in rows or [[0.0] * 7]]
     lines += ["};", f"static const double {name}_coupling[{max(len(rows), 1)}][{max(n, 1)}] = {{"]
@@ -236,11 +233,11 @@ end
 
 
 def write_matlab(table: DHTable, units: Units) -> str:
-    """A function file `ROBOT_placement.m`."""
+    """Return a function file `ROBOT_placement.m`."""
     del units
     lines = [f"function T = {identifier(table.robot)}_placement(q)"]
     lines += [f"% {line}" for line in header(table)]
-    lines += ["% columns: a, alpha, d, theta, beta, 1 for turning and 0 for sliding, sense"]
+    lines += ["% columns: a, alpha, d, theta, beta, 1 for revolute and 0 for prismatic, sense"]
     lines += matrix("rows", row_numbers(table), 7)
     lines += matrix("coupling", table.coupling.matrix.tolist(), len(table.joint_names))
     lines += [f"values = coupling * q(:) + [{'; '.join(numbers([x]) for x in table.coupling.offset)}];"]
@@ -250,13 +247,13 @@ def write_matlab(table: DHTable, units: Units) -> str:
 
 
 def frames(table: DHTable) -> str:
-    """The end of a loop over rows, from a, alpha, d, theta and beta to T."""
+    """Return the end of a loop over rows, which computes T from a, alpha, d, theta and beta."""
     product = "S * (X * Y)" if table.convention is Convention.STANDARD else "(X * Y) * S"
     return _FRAMES.format(product=product)
 
 
 def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> list[str]:
-    """Lines that assign a matrix, also one without rows."""
+    """Return the lines that assign a matrix, also one without rows."""
     if not len(rows):
         return [f"{name} = zeros(0, {columns});"]
     return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]

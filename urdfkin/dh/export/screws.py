@@ -1,4 +1,4 @@
-"""A product of exponentials as text, LaTeX, TOML, JSON and code; these last are exact to the last bit."""
+"""Export a product of exponentials as text, LaTeX, TOML, JSON and code; data and code are exact."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] 
 
 
 def write_screws(screws: ProductOfExponentials, form: str, digits: int = 10) -> str:
-    """One of the forms "terminal", "latex", "toml", "json", "numpy" and "matlab"."""
+    """Return the screws as "terminal", "latex", "toml", "json", "numpy" or "matlab"."""
     return _FORMS[form](screws, digits)
 
 
@@ -31,7 +31,7 @@ def _terminal(screws: ProductOfExponentials, digits: int) -> str:
             for i, (joint, row) in enumerate(zip(screws.joints, rows, strict=True), 1)
         ]
         lines += ["", what, *aligned(body)]
-    lines += ["", "M, the tip with every joint at zero (metres):"]
+    lines += ["", "M, the tip in the zero configuration (metres):"]
     lines += ["  " + line for line in pose_lines(screws.M, digits)]
     return "\n".join(map(printable, lines)) + "\n"
 
@@ -69,7 +69,7 @@ def _numpy(screws: ProductOfExponentials, _digits: int) -> str:
         lines += [
             "",
             "# EAIK's HPRobot(H, P), ik-geo: p = P0 + R(h1, q1) (P1 + R(h2, q2) (P2 + ...)).",
-            "# They are asked for the rotation R @ R6T.T, where R is the tip's.",
+            "# Give them the rotation R @ R6T.T, where R is the rotation of the tip.",
         ]
         for name, rows in (("H", H), ("P", P)):
             lines += _array(name, rows, ").reshape(-1, 3)")
@@ -83,7 +83,7 @@ def _array(name: str, rows: FloatArray, end: str) -> list[str]:
 
 def _matlab(screws: ProductOfExponentials, _digits: int) -> str:
     lines = [f"function [M, Slist, Blist] = {identifier(screws.robot)}_screws()"]
-    lines += [f"% {plain(screws.robot)}: screws are columns (w; v), metres, as Modern Robotics has them"]
+    lines += [f"% {plain(screws.robot)}: screws are columns (w; v), metres, as in Modern Robotics"]
     lines += matrix("M", screws.M, 4)
     for name, rows in (("Slist", screws.space), ("Blist", screws.body)):
         lines += [*matrix(name, rows, 6), f"{name} = {name}';"]

@@ -1,10 +1,8 @@
-"""What the forms in symbols share: rows as a person writes them, and how exactly numbers are written.
+"""Export a table as code for symbols: Python with SymPy or CasADi, and MATLAB's Symbolic Math Toolbox.
 
-Python code for SymPy: pi/2 stays pi/2 and 0.425 is 17/40, so that what algebra makes of it is exact.
-
-Python code for CasADi: the pose as an expression of SX, MX or DM, for functions and their derivatives.
-
-MATLAB code for its Symbolic Math Toolbox; runs in Octave with the package symbolic as well.
+- SymPy: pi/2 stays pi/2, and 0.425 becomes 17/40, so that the algebra is exact.
+- CasADi: the pose is an expression of SX, MX or DM, for functions and their derivatives.
+- MATLAB: the code also runs in Octave with the package symbolic.
 """
 
 from __future__ import annotations
@@ -19,11 +17,11 @@ from urdfkin.dh.table import Convention, DHTable
 from urdfkin.dh.units import Units, fraction_text, pi_fraction
 from urdfkin.model.tree import FloatArray
 
-#: No decimal that somebody wrote is a fraction with larger numbers.
+#: Largest denominator and largest integer of a handwritten number; other numbers are decimals.
 _LONGEST = 10**9
 _BODY = '''
 def step(a, alpha, d, theta, beta=0):
-    """{formula}."""
+    """Return {formula}."""
     ct, st, ca, sa, cb, sb = cos(theta), sin(theta), cos(alpha), sin(alpha), cos(beta), sin(beta)
     S = matrix([[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]])
     X = matrix([[cb, 0, sb, a], [sa * sb, ca, -sa * cb, 0], [-ca * sb, sa, ca * cb, 0], [0, 0, 0, 1]])
@@ -31,7 +29,7 @@ def step(a, alpha, d, theta, beta=0):
 
 
 def placement(q):
-    """Pose of the tip in the base, 4 x 4, for {n} {kind}, rad and m."""
+    """Return the 4 x 4 pose of the tip in the base for {n} {kind}, rad and m."""
     T = BASE
     for row in rows(q):
         T = T @ step(*row)
@@ -40,70 +38,70 @@ def placement(q):
 
 
 class Doubles(Units):
-    """Numbers to the last bit, in metres and radians."""
+    """Exact decimal numbers in metres and radians."""
 
     def length(self, metres: float) -> str:
-        """A length, or any number."""
+        """Format a length or another number."""
         return repr(metres) if metres else "0"
 
     def angle(self, radians: float, pi: str = "pi") -> str:
-        """An angle."""
+        """Format an angle."""
         return self.length(radians)
 
 
 class Fractions(Doubles):
-    """Multiples of pi, and fractions: 0.425 is 17/40. Other angles, and what was computed, are decimals."""
+    """Exact multiples of pi and fractions (0.425 is 17/40); other angles and long numbers are decimals."""
 
     def length(self, metres: float) -> str:
-        """A length, or any number."""
+        """Format a length or another number."""
         sign, x = "-" if metres < 0.0 else "", Fraction(repr(abs(metres)))
         if x.denominator == 1 and x < _LONGEST:
             return f"{sign}{x}"
         return sign + (self.ratio(x) if x.denominator <= _LONGEST else self.decimal(abs(metres)))
 
     def angle(self, radians: float, pi: str = "pi") -> str:
-        """An angle."""
+        """Format an angle."""
         if (fraction := pi_fraction(radians)) is not None:
             return re.sub(r"(\d)(?=[a-z])", r"\1*", fraction_text(fraction, pi))
         return ("-" if radians < 0.0 else "") + self.decimal(abs(radians))
 
     def ratio(self, x: Fraction) -> str:
-        """A fraction that somebody may have written as a decimal."""
+        """Format a fraction with a handwritten decimal value."""
         return f"Rational({x.numerator}, {x.denominator})"
 
     def decimal(self, x: float) -> str:
-        """Any other number."""
+        """Format any other number."""
         return repr(x)
 
 
 def columns(table: DHTable) -> str:
-    """What a row holds."""
+    """Return the names of a row's cells."""
     return "a, alpha, d, theta" + (", beta" if table.has_hayati_rows else "")
 
 
 def rows(table: DHTable, number: Doubles, **style: Any) -> list[str]:
-    """The cells of each row, with commas between them."""
+    """Return the cells of each row, separated by commas."""
     return [", ".join(cells(table, row, number, number=number.length, **style)) for row in table.rows]
 
 
 def matrix(T: FloatArray, number: Doubles) -> list[str]:
-    """A pose, row by row."""
+    """Return the rows of a pose as text."""
     return [", ".join(map(number.length, row)) for row in T.tolist()]
 
 
 def module(table: DHTable, number: Doubles, imports: str, kind: str, split: str = "q") -> str:
-    """Python with `rows(q)` and `placement(q)`.
+    """Return Python code with `rows(q)` and `placement(q)`.
 
     Args:
         table: Any table.
-        number: How numbers are written.
-        imports: What brings cos, sin and matrix.
-        kind: What q is made of.
-        split: Its numbers, one by one.
+        number: Number format.
+        imports: Code that imports cos, sin and matrix.
+        kind: Description of q's elements.
+        split: Expression for the list of q's elements.
     """
     head, names = header(table), [f"q{i}" for i in range(1, len(table.joint_names) + 1)]
     lines = ['"""' + head[0] + ".", "", *(f"{line}." for line in head[1:]), '"""', "", imports]
-    lines += ["", "", "def rows(q):", f'    """{columns(table)} of each row."""']
+    lines += ["", "", "def rows(q):", f'    """Return {columns(table)} of each row."""']
     lines += [f"    [{', '.join(names)}] = {split}", "    return ["]
     lines += [f"        ({row})," for row in rows(table, number, times=" * ")] + ["    ]", "", ""]
     for what, T in (("BASE", table.base), ("TOOL", table.tool)):
@@ -118,7 +116,7 @@ _SYMPY_IMPORTS = "from sympy import Matrix as matrix\nfrom sympy import Rational
 
 
 def write_sympy(table: DHTable, units: Units) -> str:
-    """A module with `placement(q)`, for `q = symbols("q1:7")` or numbers."""
+    """Return a module with `placement(q)`, for `q = symbols("q1:7")` or numbers."""
     del units
     return module(table, Fractions(), _SYMPY_IMPORTS, "symbols or numbers")
 
@@ -127,12 +125,12 @@ _CASADI_IMPORTS = '''from casadi import cos, horzcat, sin, vertcat, vertsplit
 
 
 def matrix(rows):
-    """Row by row."""
+    """Make a matrix from its rows."""
     return vertcat(*(horzcat(*row) for row in rows))'''
 
 
 def write_casadi(table: DHTable, units: Units) -> str:
-    """A module with `placement(q)`, for a column `q = SX.sym("q", 6)`."""
+    """Return a module with `placement(q)`, for a column `q = SX.sym("q", 6)`."""
     del units
     return module(table, Doubles(), _CASADI_IMPORTS, "numbers of a column SX, MX or DM", "vertsplit(q)")
 
@@ -146,7 +144,10 @@ class _Matlab(Fractions):
 
 
 def write_matlab_symbolic(table: DHTable, units: Units) -> str:
-    """A function file `ROBOT_symbolic.m`: `[T, q] = ROBOT_symbolic()`; `matlabFunction(T, 'Vars', {q})`."""
+    """Return a function file `ROBOT_symbolic.m` for MATLAB.
+
+    Use it as `[T, q] = ROBOT_symbolic()`, then `matlabFunction(T, 'Vars', {q})`.
+    """
     del units
     number, n = _Matlab(), len(table.joint_names)
     lines = [f"function [T, q] = {identifier(table.robot)}_symbolic()"]

@@ -1,15 +1,8 @@
-"""What the written forms share: headings, cells with their variable, transforms, the formula.
+"""Export a table as text: for a terminal, in Markdown, in HTML and in LaTeX.
 
-Nothing here knows a format; each form passes its own way to write pi, products and names.
-
-
-The table as aligned text, with its convention, formula, base and tool said.
-
-The table in Markdown, for a README or an issue.
-
-The table in HTML, to stand in a page or a notebook's cell.
-
-The table for a paper: booktabs, the convention in the caption, pi as a fraction, as wide as fits.
+All formats contain the convention, the formula, base and tool. LaTeX uses booktabs, has the convention in the
+caption, and fits the table to the width of the text. The functions for headings, cells, formulas and poses do
+not depend on a format. Each format passes its own notation for pi, products and names.
 """
 
 from __future__ import annotations
@@ -36,12 +29,12 @@ HAYATI_FORMULA = {
     Convention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Ry(beta(i-1)) Rz(theta) Tz(d)",
 }
 
-#: Of a bound's last digit: what is beyond it by no more is rounding, and not rounded up.
+#: Factor before rounding up: an excess of 1e-12 beyond a digit is rounding error.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
 
 def formula(table: DHTable) -> str:
-    """The product that a row stands for."""
+    """Return the product that a row means."""
     return (HAYATI_FORMULA if table.has_hayati_rows else FORMULA)[table.convention]
 
 
@@ -52,7 +45,7 @@ def variable(
     name: str = "q{}",
     number: Callable[[float], str] = "{:.10g}".format,
 ) -> str:
-    """The joint's value in terms of the table's coordinates: q1, -q2, 2 q1 + 0.1."""
+    """Return the joint's variable, with sense and multiplier: q1, -q2, 2 q1."""
     leader = row.mimic.leader if row.mimic else row.joint
     q = name.format(table.joint_names.index(leader) + 1)
     multiplier = row.sense * (row.mimic.multiplier if row.mimic else 1.0)
@@ -60,27 +53,27 @@ def variable(
 
 
 def coordinate_names(table: DHTable, shown: Callable[[str], str] = str) -> str:
-    """Which coordinate is whose, where that is not row by row."""
+    """Return the joint of each coordinate as text; "" if the coordinates are the rows' joints in order."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
     return "with " + ", ".join(f"q{i} = {shown(name)}" for i, name in enumerate(table.joint_names, 1))
 
 
 def constant_of(row: DHRow) -> float:
-    """What is added to the variable: the cell and the follower's own offset."""
+    """Return the constant beside the variable: the cell plus the offset of a mimic rule."""
     cell = row.theta if row.kind.turns else row.d
     return cell + row.sense * row.mimic.offset if row.mimic else cell
 
 
 def added(variable: str, constant: str) -> str:
-    """`variable + constant` without zero terms and double signs."""
+    """Format `variable + constant` without zero terms and double signs."""
     if constant == "0":
         return variable
     return f"{variable} - {constant[1:]}" if constant.startswith("-") else f"{variable} + {constant}"
 
 
 def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
-    """a, alpha, d, theta and, if any row needs it, beta, with the variable where it belongs."""
+    """Return a, alpha, d, theta as text with the variable; also beta if any row needs it."""
     moves = variable(table, row, **style)
     theta, d = units.angle(row.theta, pi), units.length(row.d)
     if row.kind.turns:
@@ -93,7 +86,7 @@ def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any
 
 
 def headings(table: DHTable, units: Units) -> list[str]:
-    """Names of the columns of `cells`, with units."""
+    """Return the headings of the columns of `cells`, with units."""
     at = "(i-1)" if table.convention is Convention.MODIFIED else ""
     angle, length = units.angle_name, units.length_name
     named = {
@@ -107,19 +100,19 @@ def headings(table: DHTable, units: Units) -> list[str]:
 
 
 def is_identity(T: FloatArray) -> bool:
-    """Whether a pose is the identity to the bit."""
+    """Whether a pose is exactly the identity."""
     return bool(np.array_equal(T, np.eye(4)))
 
 
 def pose_lines(T: FloatArray, digits: int = 10) -> list[str]:
-    """The three upper rows of a pose, aligned, in metres."""
+    """Return the three upper rows of a pose in metres, with aligned columns."""
     texts = [[f"{x + 0.0:.{digits}g}" for x in row] for row in T[:3]]
     widths = [max(len(row[i]) for row in texts) for i in range(4)]
     return ["  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in texts]
 
 
 def at_most(value: float) -> str:
-    """A bound with three digits, rounded up so that it stays one.
+    """Format a bound with three digits, rounded up so that it remains a bound.
 
     Example:
         >>> at_most(7.5912e-06), at_most(0.0)
@@ -132,36 +125,36 @@ def at_most(value: float) -> str:
 
 
 def snap_lines(table: DHTable, bullet: str = "  ") -> list[str]:
-    """What was snapped, in sentences, then a line for each change."""
+    """Return the effect of snapping as text, then a line for each change."""
     snap = table.snap
     if snap is None:
         return []
     if not snap.changes:
-        return [f"Snapped within {snap.tolerance:.3g} rad: nothing had to move."]
+        return [f"Snapped within {snap.tolerance:.3g} rad: no angle changed."]
     metres, radians = at_most(snap.metres), at_most(snap.radians)
     measured = f"{snap.measured_metres:.2e} m and {snap.measured_radians:.2e} rad"
     lines = [
         f"Snapped within {snap.tolerance:.3g} rad: the tip moves by at most {metres} m and turns by at most",
-        f"{radians} rad, guaranteed within the limits of sliding joints",
+        f"{radians} rad, guaranteed within the limits of prismatic joints",
         f"({measured} measured on {snap.samples} samples).",
     ]
     for change in snap.changes:
         n = len(table.rows)
         row = "base" if change.row < 0 else "tool" if change.row >= n else f"row {change.row + 1}"
-        moved = f"turned {change.angle:.2e} rad, tip at most {at_most(change.tip)} m"
+        moved = f"turned by {change.angle:.2e} rad, tip moves by at most {at_most(change.tip)} m"
         lines.append(f"{bullet}{row}: {change.what}, {moved}")
     return lines
 
 
 def write_terminal(table: DHTable, units: Units) -> str:
-    """Lines for a terminal, the last one ended."""
+    """Return the table for a terminal."""
     title = f"{table.robot}: {table.base_frame} to {table.tip_frame}"
     lines = [f"{title}, {table.convention} Denavit-Hartenberg parameters", formula(table), ""]
     body = [["i", "joint", *headings(table, units)]]
     body += [[str(i), row.joint, *cells(table, row, units)] for i, row in enumerate(table.rows, 1)]
     lines += aligned(body)
     if not table.rows:
-        lines.append("(nothing moves between the two frames)")
+        lines.append("(no joint between the two frames moves)")
     if names := coordinate_names(table):
         lines += ["", names]
     for what, T in (("base", table.base), ("tool", table.tool)):
@@ -176,7 +169,7 @@ def write_terminal(table: DHTable, units: Units) -> str:
 
 
 def aligned(body: list[list[str]]) -> list[str]:
-    """Columns side by side with a rule under the headings: names to the left, numbers to the right."""
+    """Align columns under headings with a rule: the second column to the left, the others to the right."""
     body = [[printable(text) for text in row] for row in body]
     widths = [max(len(row[i]) for row in body) for i in range(len(body[0]))]
     lines = []
@@ -190,7 +183,7 @@ def aligned(body: list[list[str]]) -> list[str]:
 
 
 def write_markdown(table: DHTable, units: Units) -> str:
-    """A heading line, the table, base and tool, and what was snapped."""
+    """Return a heading line, the table, base and tool, and the effect of snapping, in Markdown."""
     body = [["i", "joint", *headings(table, units)]]
     body += [
         [str(i), markdown_code(row.joint), *cells(table, row, units)] for i, row in enumerate(table.rows, 1)
@@ -208,8 +201,8 @@ def write_markdown(table: DHTable, units: Units) -> str:
         else:
             lines += ["", f"{what} (metres):", "", "```", *pose_lines(T, units.digits), "```"]
     if table.snap is not None:
-        said = snap_lines(table, "- ")  # joints are named in it
-        lines += ["", *(f"- {markdown_text(s[2:])}" if s.startswith("- ") else s for s in said)]
+        report = snap_lines(table, "- ")  # escaped, because it has names of joints
+        lines += ["", *(f"- {markdown_text(s[2:])}" if s.startswith("- ") else s for s in report)]
     return "\n".join(lines) + "\n"
 
 
@@ -218,7 +211,7 @@ def _line(texts: list[str]) -> str:
 
 
 def write_html(table: DHTable, units: Units) -> str:
-    """A title, the formula, the table, base and tool, and what was snapped."""
+    """Return a title, the formula, the table, base and tool, and the effect of snapping, in HTML."""
     heads = ["i", "joint", *headings(table, units)]
     rows = [
         (str(i), row.joint, *cells(table, row, units, pi="\u03c0")) for i, row in enumerate(table.rows, 1)
@@ -244,7 +237,7 @@ _FORMULA = {
 
 
 def write_latex(table: DHTable, units: Units) -> str:
-    """A table environment that needs the packages amsmath, booktabs and graphicx."""
+    """Return a LaTeX table environment; it needs the packages amsmath, booktabs and graphicx."""
     modified = table.convention is Convention.MODIFIED
     at = "_{i-1}" if modified else "_i"
     angle = "rad" if units.angles is Angles.RADIANS else r"$^\circ$"
@@ -300,20 +293,20 @@ def _caption(table: DHTable) -> str:
 
 
 def fitted(lines: list[str]) -> list[str]:
-    """What is wider than the page's text made as wide as that, and nothing else changed."""
+    """Reduce LaTeX lines to the width of the text if they are wider."""
     size = r"\ifdim\width>\linewidth\linewidth\else\width\fi"
     return [rf"  \resizebox{{{size}}}{{!}}{{%", *(f"    {line}" for line in lines), "  }"]
 
 
 def pose(what: str, T: FloatArray) -> list[str]:
-    """A line of its own with a pose, in metres."""
+    """Return LaTeX lines with a pose, in metres."""
     rows = (" & ".join(_plain(f"{x + 0.0:.6g}") for x in row) for row in T)
     matrix = r"\begin{bmatrix}" + r" \\ ".join(rows) + r"\end{bmatrix}"
     return [r"  \par\medskip", *fitted([rf"{what} (m): ${matrix}$"])]
 
 
 def maths(text: str) -> str:
-    """A cell in math mode, a/b as it stands and 1e-6 as a power."""
+    """Write a cell in math mode: 1e-6 as a power of ten, a/b unchanged."""
     return f"${_plain(text)}$"
 
 

@@ -1,17 +1,15 @@
-"""Python code for roboticstoolbox: a `DHRobot` of Revolute and Prismatic links, DH or MDH, with their limits.
+"""Export a table for two toolboxes: roboticstoolbox (Python) and MATLAB's Robotics System Toolbox.
 
-A DHRobot has no fifth parameter, and one joint at least. A table with Hayati rows, or with none, is a `Robot`
-of elementary transforms.
+For roboticstoolbox the code makes a `DHRobot` of Revolute and Prismatic links (DH or MDH) with their limits.
+A DHRobot has no fifth parameter, and has at least one joint. A table with Hayati rows, or without rows,
+therefore becomes a `Robot` of elementary transforms.
 
+For the Robotics System Toolbox the code makes a `rigidBodyTree`. The toolbox's "dh" and "mdh" transforms
+ignore theta of a revolute joint and d of a prismatic one, so they would lose offsets. They also have no
+Hayati rows. The code therefore sets each joint's frame by a matrix of the table, and the joint's axis is z.
 
-MATLAB code for the Robotics System Toolbox: a `rigidBodyTree`.
-
-The toolbox's own "dh" and "mdh" fixed transforms ignore theta of a revolute joint and d of a prismatic one,
-so that offsets would be lost, and know no Hayati row. The joints are therefore placed by the matrices of
-the table's own frames, and turn about z.
-
-What is written runs in Octave on classes that stand in for the toolbox's (`scripts/forms/octave`); nobody has
-run it in MATLAB yet.
+The MATLAB code is tested in Octave with substitutes for the toolbox's classes (`scripts/forms/octave`). It
+has not been tested in MATLAB.
 """
 
 from __future__ import annotations
@@ -33,10 +31,10 @@ from urdfkin.dh.units import Units
 
 
 def write_roboticstoolbox(table: DHTable, units: Units) -> str:
-    """A module with `robot`, a DHRobot, or a Robot where that cannot hold the table.
+    """Return a module with `robot`: a DHRobot, or a Robot if a DHRobot cannot express the table.
 
     Raises:
-        InputError: a follower, which neither of them can hold.
+        InputError: a mimic joint, which neither class supports.
     """
     if table.has_hayati_rows or not table.rows:
         return ets.write_ets(table, units)
@@ -62,7 +60,7 @@ def _link(row: DHRow, convention: Convention) -> str:
 
 
 def write_matlab_rst(table: DHTable, units: Units) -> str:
-    """A function file `ROBOT_tree.m` that returns a rigidBodyTree."""
+    """Return a function file `ROBOT_tree.m`; its function returns a rigidBodyTree."""
     del units
     demand_free(table, "rigidBodyTree")
     poses = frame_poses(table)
