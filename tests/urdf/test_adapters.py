@@ -148,7 +148,7 @@ def test_a_quaternion_that_yourdfpy_dropped_is_no_secret(tmp_path: Path) -> None
         "<yourdfpy>:1:1: URDF512 note: yourdfpy drops quat_xyzw and keeps no text: had the file"
         in findings[0]
     )
-    assert "drops quat_xyzw: its file was not seen" in reading
+    assert "drops quat_xyzw; the file was not read" in reading
 
 
 def test_a_yourdfpy_robot_in_two_pieces_is_refused() -> None:
