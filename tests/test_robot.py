@@ -298,7 +298,7 @@ def test_a_base_that_is_none_is_refused() -> None:
     ):
         with pytest.raises(InputError, match=message):
             BaseMotion(**words)
-    with pytest.raises(InputError, match="base is a BaseMotion or None: found dict"):
+    with pytest.raises(InputError, match="base must be a BaseMotion or None: found dict"):
         urdfkin.load("ur5").placement(np.zeros(6), "tool0", base={})  # type: ignore[arg-type]
 
 
