@@ -109,7 +109,7 @@ class MujocoOracle:
             moving = [joint.name for joint in joints if joint.kind != "fixed"]
             rules = rules_of_text(text, set(moving)) if mimic else {}
         except (ValueError, KeyError, ExpatError) as error:
-            raise OracleError("the oracle's reader cannot read the text", where=tree.name, found=str(error)) from error
+            raise OracleError("the oracle cannot read the text", where=tree.name, found=str(error)) from error
         self._children = {joint.name: joint.child for joint in joints}
         carrier = [_Joint("", "floating", "", self._links[0])] if moving_base else []
         self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if carrier else []), *self._links])}
@@ -244,7 +244,7 @@ class MujocoOracle:
         Raises:
             OracleError: always.
         """
-        raise OracleError("MuJoCo computes no Hessian", where=self._name, remedy="load the robot with oracle='pinocchio'")
+        raise OracleError("MuJoCo computes no Hessian", where=self._name, remedy="use oracle='pinocchio'")
 
     def accelerations(
         self,
@@ -255,7 +255,7 @@ class MujocoOracle:
         reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """Return classical accelerations (n, frames, 6) by `mj_objectAcceleration`, with gravity set to zero."""
+        """Return classical accelerations (n, frames, 6) by `mj_objectAcceleration` without gravity."""
         poses, velocity, acceleration = self._moved(q, v, a, frames, base)
         if Reference.of(reference) is not Reference.WORLD:
             return _referred(reference, poses, acceleration)
@@ -315,13 +315,13 @@ class MujocoOracle:
         return out
 
     def joint_jacobians(self, q: FloatArray, among: slice, reference: Reference | str) -> FloatArray:
-        """(n, joints, 6, nv): of the bodies that a run of the moving joints carry, in the tree's order."""
+        """Return Jacobians (n, joints, 6, nv) of a slice of the moving joints, in tree order."""
         return self.jacobians(q, self._moving[among], reference)
 
     def joint_jacobian_rates(
         self, q: FloatArray, v: FloatArray, among: slice, reference: Reference | str
     ) -> FloatArray:
-        """(n, joints, 6, nv), likewise."""
+        """Return J-dot (n, joints, 6, nv) of a slice of the moving joints, in tree order."""
         return self.jacobian_rates(q, v, self._moving[among], reference)
 
     def _moved(
@@ -332,7 +332,7 @@ class MujocoOracle:
         frames: Sequence[str],
         base: BaseNumbers | None,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return placements, velocities and classical accelerations (n, frames, ...) in LOCAL_WORLD_ALIGNED."""
+        """Return placements, velocities, classical accelerations (n, frames, ...) in LOCAL_WORLD_ALIGNED."""
         velocity, acceleration = np.empty((2, len(q), len(frames), 6))
 
         def read(data: Any, body: int, at: tuple[int, int]) -> None:
@@ -464,7 +464,7 @@ class MujocoOracle:
         return S_rate
 
     def _turn(self, place: _Place, q: FloatArray) -> tuple[FloatArray, int]:
-        """Return the rotation (n, slides, slides) from a planar or floating joint's axes to its slides' axes."""
+        """Return the rotation (n, slides, slides) from a joint's own axes to those of its slides."""
         own = q[:, place.q : place.q + 7]
         if place.kind == "floating":
             unit = own[:, 3:] / np.linalg.norm(own[:, 3:], axis=1, keepdims=True)

@@ -191,5 +191,5 @@ class OracleQuery:
         """
         own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
         if result.shape != (*self.shape, *several, *own):
-            raise OracleError("the batch shape of a result does not match the arguments", found=str(result.shape))
+            raise OracleError("a result's batch shape does not match the arguments", found=str(result.shape))
         return result.reshape(self.n, len(self.frames), *own)

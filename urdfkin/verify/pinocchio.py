@@ -356,7 +356,7 @@ class Oracle:
     # -- layout --------------------------------------------------------------------------------------
 
     def configurations(self, q: FloatArray, base: BaseNumbers | None = None) -> FloatArray:
-        """Return Pinocchio's configurations for urdfkin's `q`; a moving base becomes the free-flyer's part."""
+        """Return Pinocchio's configurations for `q`; the free-flyer receives the moving base."""
         full = self._layout.configurations(q)
         if self._moving_base:
             full[:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if base is None else free_flyer(base)
@@ -370,7 +370,7 @@ class Oracle:
         return full
 
     def second_rates(self, a: FloatArray, base: BaseNumbers | None = None) -> FloatArray:
-        """Return Pinocchio's joint accelerations; those of a free-flyer are spatial, in the base's own axes."""
+        """Return Pinocchio's joint accelerations; a free-flyer's are spatial, in the base's own axes."""
         full = self._layout.rates(a)
         if self._moving_base and base is not None:
             full[:, :6] = free_flyer_second_rates(base)

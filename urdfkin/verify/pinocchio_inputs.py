@@ -140,7 +140,7 @@ class Layout:
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
     def _rates(self) -> tuple[Places, FloatArray]:
-        """Return index in v and factor in G of each of Pinocchio's joint velocities; factor 0 for the base."""
+        """Return index in v and factor in G of each Pinocchio joint velocity; factor 0 for the base."""
         index, factor = np.zeros(self._model.nv, dtype=np.int64), np.zeros(self._model.nv)
         for place in self._places:
             for c in range(place.sizes[1]):
@@ -176,7 +176,7 @@ class Layout:
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """Return J_full G: columns of mimic joints are added to the mimicked joints'; the base's are omitted."""
+        """Return J_full G: add the columns of mimic to mimicked joints, and omit those of the base."""
         if self._same_v:
             return full
         return coupled(full, np.array(self.rate_columns, dtype=np.int64), self._index, self._factor, self.nv)

@@ -82,7 +82,7 @@ class TableCheck:
 
     @property
     def agrees(self) -> bool:
-        """True if rounding, including that of the table's own lengths, and snapping explain the differences."""
+        """True if rounding (also of the table's own lengths) and snapping explain the differences."""
         return self.within or self.loss is not None
 
     def __str__(self) -> str:

@@ -250,7 +250,7 @@ class Verifier:
         check = check_table(self.oracle(), self.tree, table, drawn)
         if not check.agrees:
             raise TableError(
-                f"the {table.convention} table of {table.base_frame} to {table.tip_frame} disagrees with Pinocchio",
+                f"the {table.convention} table of {table.base_frame} to {table.tip_frame} disagrees",
                 where=f"{self.tree.name}, Pinocchio {version()}",
                 found=str(check),
                 remedy="please report this as an error of urdfkin, with the URDF",
@@ -288,7 +288,9 @@ class Verifier:
         tilt = max(sum(tree.joints[i].tilt for i in tree.path(leaf)) for leaf in tree.leaves())
         if units > parameters.roundings + of_joints(0, tilt):
             raise TableError(
-                f"the tree parameters of {tree.name} disagree with Pinocchio", where=f"Pinocchio {version()}", found=line
+                f"the tree parameters of {tree.name} disagree with Pinocchio",
+                where=f"Pinocchio {version()}",
+                found=line,
             )
         return line
 
@@ -314,7 +316,9 @@ def urdfkins(quantity: Quantity, x: Part) -> FloatArray:
     return quantity.ours(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 
-@np.errstate(over="ignore", under="ignore", invalid="ignore")  # a value that is not finite counts as a disagreement
+@np.errstate(
+    over="ignore", under="ignore", invalid="ignore"
+)  # a value that is not finite counts as a disagreement
 def theirs_of(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
     """Return an oracle's results (n, frames, ...) for the user's arguments."""
     return quantity.theirs(oracle, asked.inputs, asked.frames, asked.reference, asked.base)
