@@ -244,10 +244,10 @@ def test_a_number_that_is_not_finite_is_found_and_its_joint_named(panda: Robot, 
 
 
 def test_batches_that_do_not_fit_are_refused_with_their_shapes(panda: Robot) -> None:
-    with pytest.raises(InputError, match=r"do not fit: found \(2,\), \(3,\)"):
+    with pytest.raises(InputError, match=r"do not broadcast: found \(2,\), \(3,\)"):
         panda.velocity(np.zeros((2, 8)), np.zeros((3, 8)), "panda_hand")
     base = BaseMotion(velocity=np.zeros((4, 6)))
-    with pytest.raises(InputError, match=r"do not fit: found \(2,\), \(4,\)"):
+    with pytest.raises(InputError, match=r"do not broadcast: found \(2,\), \(4,\)"):
         panda.placement(np.zeros((2, 8)), "panda_hand", base=base)
 
 

@@ -143,8 +143,8 @@ class Robot(Displayable):
 
     def __getstate__(self) -> dict[str, Any]:
         # Compiled trees are cheap to rebuild. A copy gets a verifier of its own.
-        made: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_compiled": {}}
-        return {**self.__dict__, "verifier": copy(self.verifier), **made}
+        empty: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_compiled": {}}
+        return {**self.__dict__, "verifier": copy(self.verifier), **empty}
 
     def __repr__(self) -> str:
         return log_line(f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>")

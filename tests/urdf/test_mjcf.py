@@ -383,9 +383,7 @@ def test_a_body_that_cannot_be_aligned_is_listed_and_the_certificate_says_what_w
         robot = urdfkin.load(free_body('alignfree="true"', inside='<geom type="mesh" mesh="m"/>', more=mesh))
     robot.placement(robot.neutral(), "camera")
     said = robot.certificate().reading
-    assert (
-        "without shapes and inertias: with them the file does not compile: Error: Error opening" in said
-    )
+    assert "without shapes and inertias: with them the file does not compile: Error: Error opening" in said
 
 
 def test_a_free_body_that_others_are_fused_into_is_refused_where_it_is_aligned() -> None:
@@ -477,7 +475,7 @@ def test_a_slip_in_a_mimic_rule_is_found_by_mujocos_own_equality(
 
 
 @pytest.mark.parametrize(
-    ("active", "said"), [("false", "mimic joint b: .* does not hold it"), ("true", "equality 0: .* holds it")]
+    ("active", "said"), [("false", "mimic joint b: .* does not have it"), ("true", "equality 0: .* has it")]
 )
 def test_a_rule_that_mujoco_does_not_hold_and_one_that_was_dropped_are_found(
     active: str, said: str, monkeypatch: pytest.MonkeyPatch

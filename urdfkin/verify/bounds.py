@@ -444,10 +444,10 @@ def nearest_singularity(plan: CompiledTree) -> float:
 
 def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     """Return two (frames, nv): the sum of |multiplier| of each column's revolute and prismatic joints."""
-    made: tuple[FloatArray, FloatArray] | None = plan.made.get("column weights")
-    if made is None:
-        made = plan.made["column weights"] = _column_weights(plan)
-    return made
+    weights: tuple[FloatArray, FloatArray] | None = plan.made.get("column weights")
+    if weights is None:
+        weights = plan.made["column weights"] = _column_weights(plan)
+    return weights
 
 
 def _column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:

@@ -132,7 +132,7 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether every number lies within its bound."""
+        """True if every number is within its bound."""
         return self.share <= 1.0
 
 

@@ -39,7 +39,7 @@ _SAMPLES = 8
 #: Time limit for reading, seconds.
 PATIENCE = 60.0
 #: Longest quotation of a MuJoCo error in a certificate, characters.
-_SAID = 300
+_QUOTED = 300
 #: Largest answer of the process, bytes.
 MOST = 400_000_000
 
@@ -102,13 +102,13 @@ def read_mjcf(
             found=ending,
             remedy="check it for very large numbers, for example in <replicate>",
         )
-    said = [answer["not_whole"] for answer in answers if "not_whole" in answer]
+    reasons = [answer["not_whole"] for answer in answers if "not_whole" in answer]
     return MjcfReading(
         read[-1]["urdf"],
         tuple(Listed(*one) for one in read[-1]["listed"]),
         path,
         read[-1],
-        None if read[-1]["whole"] else printable((said or [ending])[0])[:_SAID],
+        None if read[-1]["whole"] else printable((reasons or [ending])[0])[:_QUOTED],
         next((answer["pinocchio"] for answer in answers if "pinocchio" in answer), None),
     )
 
@@ -170,27 +170,27 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
             f"{tree.name}, {frames[f]}", f"{share[k, f]:.3g} times the bound of rounding, MuJoCo {version()}"
         )
     coupled = _demand_the_rules(tree.name, answer)
-    said = (
+    line = (
         f"compared with MuJoCo {version()}: {len(frames)} bodies and sites of the MJCF agree in {len(q)}"
         f" configurations ({share.max(initial=0.0):.1%} of the bound)"
     )
     if coupled is not None:
-        said += f", and {len(answer['rules'])} mimic rules agree ({coupled:.1%})"
+        line += f", and {len(answer['rules'])} mimic rules agree ({coupled:.1%})"
     if read.not_whole is not None:
-        said += f", without shapes and inertias: with them the file does not compile: {read.not_whole}"
-    return f"{said}; {_pinocchios(read, ours, bound)}"
+        line += f", without shapes and inertias: with them the file does not compile: {read.not_whole}"
+    return f"{line}; {_pinocchios(read, ours, bound)}"
 
 
 def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
     """Check the mimic rules with MuJoCo's equalities; return the worst ratio to the bound, or None."""
-    rules = {int(i): str(follower) for i, follower in answer["rules"]}
+    rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpacked(answer["residuals"]), unpacked(answer["rule_sizes"])
-    held = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())
-    if odd := held.symmetric_difference(rules.keys() | set(answer["apart"])):
-        first = min(odd)
+    active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())
+    if different := active.symmetric_difference(rules.keys() | set(answer["apart"])):
+        first = min(different)
         what = f"mimic joint {rules[first]}" if first in rules else f"equality {first}"
         raise _error(
-            f"{name}, {what}", f"MuJoCo {version()} {'has' if first in held else 'does not have'} it"
+            f"{name}, {what}", f"MuJoCo {version()} {'has' if first in active else 'does not have'} it"
         )
     if not rules:
         return None

@@ -46,7 +46,7 @@ def serve() -> None:
     """Read a request from standard input and write the answers to standard output."""
     request = json.load(sys.stdin)
     try:
-        library().set_mju_user_warning(lambda said: None)  # else MuJoCo writes a log file
+        library().set_mju_user_warning(lambda message: None)  # else MuJoCo writes a log file
         if request["path"] is not None and request["samples"]:
             with suppress(InstallationError):
                 pinocchio()
@@ -59,8 +59,8 @@ def serve() -> None:
         words = {key: getattr(error, key) for key in ("what", "where", "remedy")}
         _say({"error": words | {"found": _plain(error.found)}})
     except Exception as error:
-        said = f"{type(error).__name__}: {error}"
-        _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": said[:2000]}})
+        message = f"{type(error).__name__}: {error}"
+        _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": message[:2000]}})
     os._exit(0)  # skip the exit handlers of libraries
 
 

@@ -153,18 +153,18 @@ class MujocoOracle:
     def _joint(self, i: int, joint: _Joint) -> Element:
         """Return a joint element for MuJoCo with the original text of origin and axis only."""
         kind = "fixed" if joint.kind in _PARTS else joint.kind
-        made = Element("joint", name=f"j{i}", type="continuous" if kind == "revolute" else kind)
-        SubElement(made, "parent", link=self._bodies[joint.parent])
-        SubElement(made, "child", link=self._bodies[joint.child])
+        element = Element("joint", name=f"j{i}", type="continuous" if kind == "revolute" else kind)
+        SubElement(element, "parent", link=self._bodies[joint.parent])
+        SubElement(element, "child", link=self._bodies[joint.child])
         for tag, names in (("origin", ("xyz", "rpy")), ("axis", ("xyz",))):
             found = None if joint.element is None else joint.element.find(tag)
             if found is not None and found.get("quat_xyzw") is not None:
                 raise OracleError("MuJoCo does not know quat_xyzw", where=f"joint {joint.name}")
             if found is not None and (tag == "origin" or kind != "fixed"):
-                SubElement(made, tag, {name: x for name in names if (x := found.get(name)) is not None})
+                SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
         if kind == "prismatic":  # required by MuJoCo, not used by its kinematics
-            SubElement(made, "limit", lower="-1", upper="1")
-        return made
+            SubElement(element, "limit", lower="-1", upper="1")
+        return element
 
     def _laid_out(self, joints: Sequence[_Joint], rules: Mapping[str, Mimic]) -> Iterator[_Place]:
         """Yield the indices of each moving joint in urdfkin's layout and in MuJoCo's."""

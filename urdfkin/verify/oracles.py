@@ -1,7 +1,7 @@
 """The oracles: Pinocchio, the default, and MuJoCo.
 
->>> WITNESSES["mujoco"].title
-'MuJoCo'
+>>> witness_of("pinocchio").title
+'Pinocchio'
 """
 
 from __future__ import annotations
@@ -77,10 +77,10 @@ def witness_of(name: object) -> Witness:
         UnknownNameError: there is no such oracle.
         InputError: it is not installed.
     """
-    asked = as_str(name, "oracle")
-    oracle = next((one for one in WITNESSES.values() if one.name == asked), None)
+    wanted = as_str(name, "oracle")
+    oracle = next((one for one in WITNESSES.values() if one.name == wanted), None)
     if oracle is None:
-        raise UnknownNameError("oracle", asked, WITNESSES)
+        raise UnknownNameError("oracle", wanted, WITNESSES)
     if oracle is not PINOCCHIO:
         oracle.version()  # raises now, not at the first check
     return oracle

@@ -41,7 +41,7 @@ SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
 Against = Callable[..., "tuple[FloatArray, Bound]"]
 
 
-def asked(name: str) -> Callable[..., Any]:
+def oracle_method(name: str) -> Callable[..., Any]:
     """Return a function that calls the method `name` of an oracle."""
 
     def ask(oracle: Any, *arguments: Any) -> Any:
@@ -180,7 +180,7 @@ PLACEMENT = Quantity(
     shape=(4, 4),
     equations=("7.77",),
     compute=lazy_import("urdfkin.compiled.evaluate:placements"),
-    ask=asked("placements"),
+    ask=oracle_method("placements"),
     scale=lazy_import("urdfkin.verify.bounds:placement_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:placement_values"),
     factors=1,
@@ -206,7 +206,7 @@ VELOCITY = Quantity(
     shape=(6,),
     equations=("7.127", "7.128"),
     compute=lazy_import("urdfkin.compiled.evaluate:velocities"),
-    ask=asked("velocities"),
+    ask=oracle_method("velocities"),
     scale=lazy_import("urdfkin.verify.bounds:velocity_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:velocity_values"),
     factors=2,
@@ -224,7 +224,7 @@ JACOBIAN = Quantity(
     shape=(6, "nv"),
     equations=("7.85",),
     compute=lazy_import("urdfkin.compiled.evaluate:jacobians"),
-    ask=asked("jacobians"),
+    ask=oracle_method("jacobians"),
     scale=lazy_import("urdfkin.verify.bounds:jacobian_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:jacobian_values"),
     factors=2,
@@ -241,7 +241,7 @@ JACOBIAN_RATE = Quantity(
     shape=(6, "nv"),
     equations=("7.126",),
     compute=lazy_import("urdfkin.compiled.evaluate:jacobian_rates"),
-    ask=asked("jacobian_rates"),
+    ask=oracle_method("jacobian_rates"),
     scale=lazy_import("urdfkin.verify.bounds:jacobian_rate_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:jacobian_rate_values"),
     factors=3,
@@ -260,7 +260,7 @@ HESSIAN = Quantity(
     shape=(6, "nv", "nv"),
     equations=("7.85", "7.126"),
     compute=lazy_import("urdfkin.compiled.evaluate:hessians"),
-    ask=asked("hessians"),
+    ask=oracle_method("hessians"),
     scale=lazy_import("urdfkin.verify.bounds:hessian_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:hessian_values"),
     factors=3,
@@ -279,7 +279,7 @@ ACCELERATION = Quantity(
     shape=(6,),
     equations=("7.129", "7.130"),
     compute=lazy_import("urdfkin.compiled.evaluate:accelerations"),
-    ask=asked("accelerations"),
+    ask=oracle_method("accelerations"),
     scale=lazy_import("urdfkin.verify.bounds:acceleration_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:acceleration_values"),
     factors=3,
@@ -327,17 +327,23 @@ IMU = replace(
     command="",
 )
 JOINT_JACOBIAN = replace(
-    JACOBIAN, name="joint jacobian", title="joint Jacobian", ask=asked("joint_jacobians"), of="joints"
+    JACOBIAN, name="joint jacobian", title="joint Jacobian", ask=oracle_method("joint_jacobians"), of="joints"
 )
 JOINT_JACOBIAN_RATE = replace(
     JACOBIAN_RATE,
     name="joint jacobian rate",
     title="joint Jacobian rate",
-    ask=asked("joint_jacobian_rates"),
+    ask=oracle_method("joint_jacobian_rates"),
     of="joints",
 )
 SCREWS = replace(
-    JACOBIAN, name="screws", title="data.J", shape=(6,), ask=asked("screws"), of="columns", head="data.J"
+    JACOBIAN,
+    name="screws",
+    title="data.J",
+    shape=(6,),
+    ask=oracle_method("screws"),
+    of="columns",
+    head="data.J",
 )
 
 #: All quantities by name, in the order of certificates and reports.
