@@ -1,7 +1,7 @@
-"""Write docs/conventions.md: what urdfkin, Pinocchio and MuJoCo call by the same name, found by asking them.
+"""Write docs/conventions.md: the conventions of urdfkin, Pinocchio and MuJoCo, determined by experiment.
 
-Nothing here is remembered. Each row puts several readings of a number beside what a library hands out, on a
-robot and a motion drawn at random, and names the one that it is; a test holds the page to it.
+For each row, the script compares a library's result with several candidate definitions, on a random robot and
+motion, and writes the one that matches. A test checks that the page is current.
 
     python scripts/make_conventions.py
 """
@@ -38,7 +38,7 @@ def _joint(name: str, kind: str, parent: str, child: str, more: str = "") -> str
 
 
 def _robot(*joints: str) -> str:
-    """Links `base`, `l1`, `l2`, ...; MuJoCo keeps each apart, and gives none of them weight."""
+    """Return a robot with links `base`, `l1`, `l2`, `l3`; MuJoCo does not merge them."""
     links = "".join(f'<link name="{name}">{_BODY}</link>' for name in ("base", *(f"l{i}" for i in (1, 2, 3))))
     compiler = '<mujoco><compiler fusestatic="false"/></mujoco>'
     return f'<robot name="r">{compiler}{links}{"".join(joints)}</robot>'
@@ -48,13 +48,13 @@ def _axis(xyz: str) -> str:
     return f'<axis xyz="{xyz}"/>'
 
 
-#: An arm whose joints stand in the file against the alphabet.
+#: An arm with joints in reverse alphabetical order in the file.
 ARM = _robot(
     _joint("c", "revolute", "base", "l1", _axis("0 0 1")),
     _joint("b", "revolute", "l1", "l2", _axis("0 1 0")),
     _joint("a", "revolute", "l2", "l3", _axis("0.6 0 0.8")),
 )
-#: Two limbs on one base, and another on the first: whose coordinates come first?
+#: Two limbs on one base, and a third on the first, to find the order of coordinates.
 LIMBS = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
@@ -68,16 +68,16 @@ FOLLOWS = _robot(
     _joint("b", "revolute", "l1", "l2", '<mimic joint="a" multiplier="0.5" offset="0.1"/>'),
     _joint("c", "revolute", "l2", "l3"),
 )
-#: Two kinds of joint, one behind the other.
+#: A continuous mimic joint after a revolute joint.
 UNLIKE = _robot(
     _joint("a", "revolute", "base", "l1"),
     _joint("b", "continuous", "l1", "l2", '<mimic joint="a"/>'),
     _joint("c", "revolute", "l2", "l3"),
 )
 LIBRARIES = ("urdfkin", "pinocchio", "mujoco")
-#: What kinematics does not need.
+#: Robots without masses and with negative masses.
 LIGHT, NEGATIVE = ARM.replace(_BODY, ""), ARM.replace('value="1"', 'value="-1"')
-#: For MuJoCo a free joint stands on the world.
+#: MuJoCo's free joint connects a body to the world only.
 FREE = (
     '<mujoco><worldbody><body name="l1" pos="0 0 0"><freejoint name="f"/>'
     '<inertial pos="0.1 0.2 0.3" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>'
@@ -88,26 +88,29 @@ FREE_URDF = '<robot name="r"><link name="base"/><link name="l1"/>' + (
 
 _HEAD = """# Conventions
 
-The same word, three libraries. Nothing below is quoted from a manual: `scripts/make_conventions.py`
-moves a robot, finds its velocity and acceleration by differences of its placements, and tells which of
-several readings each library's number is; a test holds this page to it. So do the checks: with `urdfkin
-validate --oracle mujoco` the three agree to rounding once these readings are made alike
-(`urdfkin/verify/pinocchio.py`, `urdfkin/verify/mujoco.py`).
+urdfkin, Pinocchio and MuJoCo use the same words with different definitions. This table was measured, not
+copied from manuals. `scripts/make_conventions.py` moves a robot and computes its velocity and acceleration by
+finite differences of placements. It then finds the definition that matches each library's result. A test
+checks that this page is current.
+
+`urdfkin validate --oracle mujoco` compares all three libraries. After conversion to the same conventions
+(`urdfkin/verify/pinocchio.py`, `urdfkin/verify/mujoco.py`) they agree to rounding.
 
 """
 _FOOT = """
-Followers differ most, so urdfkin couples them itself before it asks either of the two. Kinematics uses
-no mass, so it gives each link one before MuJoCo reads it; `URDF702` tells what no body can have.
+The libraries differ most in mimic joints, so urdfkin couples them itself before it calls the other two.
+Kinematics needs no mass, so urdfkin gives each link a mass before MuJoCo reads the text. `URDF702` reports an
+impossible mass or inertia.
 """
 
 Readings = Mapping[str, FloatArray]
 
 
 def which(found: FloatArray, readings: Readings) -> str:
-    """The reading that a number is; all others have to be clearly something else.
+    """Return the name of the only definition that matches a result.
 
     Raises:
-        ValueError: none is, or more than one.
+        ValueError: no definition matches, or several do.
     """
     named = [
         name for name, x in readings.items() if found.shape == x.shape and np.allclose(found, x, 1e-6, 1e-6)
@@ -119,7 +122,7 @@ def which(found: FloatArray, readings: Readings) -> str:
 
 @dataclass(frozen=True)
 class Row:
-    """A question, and what each library's own call answers."""
+    """A row of the table: a convention and the answer of each library."""
 
     question: str
     urdfkin: str
@@ -131,7 +134,7 @@ class Asked:
     """One motion of one robot, by each library's own calls, and by difference quotients."""
 
     def __init__(self, seed: int = 0) -> None:
-        import mujoco  # noqa: PLC0415  everything here needs it, and nothing else does
+        import mujoco  # noqa: PLC0415  an optional dependency
         import pinocchio as pin  # noqa: PLC0415
 
         self.mj, self.pin, rng = mujoco, pin, np.random.default_rng(seed)
@@ -152,14 +155,14 @@ class Asked:
         mujoco.mj_rnePostConstraint(self.mj_model, self.mj_data)
         self.body = self.mj_model.body("l3").id
 
-    # What a number might be, from placements at times around 0 alone: no library's word is taken.
+    # Candidate definitions, computed from placements at times around 0 only.
 
     def path(self, t: float) -> FloatArray:
-        """T_world_frame at a time, q(t) = q + v t + a t^2 / 2."""
+        """Return T_world_frame at time t, for q(t) = q + v t + a t^2 / 2."""
         return self.robot.placement(self.q + self.v * t + self.a * t * t / 2.0, "l3")
 
     def motion(self) -> tuple[FloatArray, ...]:
-        """R, p, velocity, w, acceleration and alpha of the frame's origin, in world axes."""
+        """Return R, p, velocity, w, acceleration and alpha of the frame's origin, in world axes."""
         h = 1e-3
         ps = {i: self.path(i * h)[:3, 3] for i in (-2, -1, 0, 1, 2)}
         Rs = {i: self.path(i * h)[:3, :3] for i in (-2, -1, 0, 1, 2)}
@@ -177,12 +180,12 @@ class Asked:
         return R, ps[0], first(ps), axial(R_rate @ R.T), second(ps), axial(second(Rs) @ R.T)
 
     def velocity_readings(self) -> dict[str, FloatArray]:
-        """Orders of halves, axes and points of a velocity."""
+        """Return candidate velocities: two orders, three combinations of axes and point."""
         R, p, v, w, _, _ = self.motion()
         points = {
             "of the frame's origin, in world axes": (v, w),
             "of the frame's origin, in its own axes": (R.T @ v, R.T @ w),
-            "of the point at the world's origin, in world axes": (v - np.cross(w, p), w),
+            "of the body point at the world origin, in world axes": (v - np.cross(w, p), w),
         }
         found = {}
         for name, (linear, angular) in points.items():
@@ -191,38 +194,38 @@ class Asked:
         return found
 
     def acceleration_readings(self, *, flipped: bool) -> dict[str, FloatArray]:
-        """Classical and spatial accelerations, with gravity and without, in world axes."""
+        """Return candidate accelerations in world axes: classical or spatial, with or without gravity."""
         _, _, v, w, a, alpha = self.motion()
         up = np.array([0.0, 0.0, 9.81])
         linear = {
-            "classical: the second derivative of the origin's place": a,
-            "spatial: less than the classical by w x v": a - np.cross(w, v),
-            "classical, with gravity as if all were accelerated upwards": a + up,
-            "spatial, with gravity as if all were accelerated upwards": a - np.cross(w, v) + up,
+            "classical: the second derivative of the origin's position": a,
+            "spatial: the classical acceleration minus w x v": a - np.cross(w, v),
+            "classical, plus 9.81 m/s^2 upwards for gravity": a + up,
+            "spatial, plus 9.81 m/s^2 upwards for gravity": a - np.cross(w, v) + up,
         }
         return {name: np.concatenate((alpha, x) if flipped else (x, alpha)) for name, x in linear.items()}
 
     def pinocchios_jacobian(self) -> FloatArray:
-        """(6, 3) in LOCAL_WORLD_ALIGNED."""
+        """Return Pinocchio's Jacobian (6, 3) in LOCAL_WORLD_ALIGNED."""
         aligned = self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         J: FloatArray = self.pin.getFrameJacobian(self.model, self.data, self.frame, aligned)
         return J
 
     def mj_columns(self) -> FloatArray:
-        """(6, 3) `jacp` above `jacr`, at the body's origin."""
+        """Return MuJoCo's `jacp` above `jacr` (6, 3), at the body's origin."""
         linear, angular = np.zeros((3, 3)), np.zeros((3, 3))
         self.mj.mj_jac(self.mj_model, self.mj_data, linear, angular, self.mj_data.xpos[self.body], self.body)
         return np.vstack((linear, angular))
 
     def mujocos(self, function: Callable[..., None], local: int) -> FloatArray:
-        """(6,) as MuJoCo hands it out."""
+        """Return a six-vector (6,) in MuJoCo's own order."""
         six = np.empty(6)
         function(self.mj_model, self.mj_data, self.mj.mjtObj.mjOBJ_XBODY, self.body, six, local)
         return six
 
 
 def rows() -> list[Row]:
-    """Every question, asked."""
+    """Return all rows of the table."""
     return [*_six_vectors(), *_accelerations(), *_layout(), *_free()]
 
 
@@ -235,7 +238,7 @@ def _six_vectors() -> list[Row]:
             f"velocity, `{name}`",
             which(asked.robot.velocity(asked.q, asked.v, "l3", name), readings),
             which(pin.getFrameVelocity(asked.model, asked.data, asked.frame, reference).vector, readings),
-            "there is none"
+            "not available"
             if local is None
             else which(asked.mujocos(asked.mj.mj_objectVelocity, local), readings)
             + f" (`flg_local={local}`)",
@@ -250,14 +253,14 @@ def _six_vectors() -> list[Row]:
     return [
         *found,
         Row(
-            "rows of a Jacobian, as J v tells",
+            "rows of a Jacobian, from J v",
             which(asked.robot.jacobian(asked.q, "l3") @ asked.v, readings),
             which(asked.pinocchios_jacobian() @ asked.v, readings),
             f"`mj_jac`, `jacp` above `jacr`: {which(columns, readings)}",
         ),
         Row(
-            "velocity that is kept in its workspace",
-            "none is kept",
+            "velocity stored in the data structure",
+            "none",
             f"`data.v`: {which(asked.data.v[asked.model.frames[asked.frame].parentJoint].vector, readings)}",
             f"`cvel`: {which(np.array(asked.mj_data.cvel[asked.body]), _about(asked))}",
         ),
@@ -265,11 +268,11 @@ def _six_vectors() -> list[Row]:
 
 
 def _about(asked: Asked) -> dict[str, FloatArray]:
-    """A velocity about other points than the frame's."""
+    """Return candidate velocities at other points."""
     _, p, v, w, _, _ = asked.motion()
     com = asked.mj_data.subtree_com[asked.mj_model.body_rootid[asked.body]]
     return {
-        "[angular; linear] of the point at the whole tree's centre of mass, in world axes": np.concatenate(
+        "[angular; linear] of the body point at the tree's centre of mass, in world axes": np.concatenate(
             (w, v + np.cross(w, com - p))
         ),
         "[angular; linear] of the frame's origin, in world axes": np.concatenate((w, v)),
@@ -298,8 +301,8 @@ def _accelerations() -> list[Row]:
 def _order(names: list[str]) -> str:
     orders = {
         "depth first, sibling joints by name": ["a", "z", "k"],
-        "depth first, as the file has them": ["z", "k", "a"],
-        "as the file has them": ["z", "a", "k"],
+        "depth first, in file order": ["z", "k", "a"],
+        "in file order": ["z", "a", "k"],
         "by name": ["a", "k", "z"],
     }
     return next(name for name, order in orders.items() if order == names)
@@ -336,20 +339,20 @@ def _layout() -> list[Row]:
         ),
         Row(
             "a joint with `<mimic>`",
-            f"follows: {urdfkin.load(FOLLOWS).nq} coordinates of 3 joints",
-            f"moves freely, {free.nq} coordinates; follows with `mimic=True`, {coupled.nq}",
-            f"moves freely, {follows.nq} coordinates; {follows.neq} constraint that only the dynamics feels"
+            f"coupled: {urdfkin.load(FOLLOWS).nq} coordinates for 3 joints",
+            f"independent, {free.nq} coordinates; coupled with `mimic=True`, {coupled.nq}",
+            f"independent, {follows.nq} coordinates; {follows.neq} constraint, in the dynamics only"
             if lags
-            else "follows",
+            else "coupled",
         ),
-        Row("a continuous joint with `<mimic>` behind a revolute one", *map(_reads(UNLIKE), LIBRARIES)),
+        Row("a continuous joint with `<mimic>` of a revolute joint", *map(_reads(UNLIKE), LIBRARIES)),
         Row("a moving link without `<inertial>`", *map(_reads(LIGHT), LIBRARIES)),
-        Row("one of negative mass", *map(_reads(NEGATIVE), LIBRARIES)),
+        Row("a link with negative mass", *map(_reads(NEGATIVE), LIBRARIES)),
     ]
 
 
 def _reads(text: str) -> Callable[[str], str]:
-    """Whether each library takes a text."""
+    """Return a function that tries whether a library reads a text."""
     import mujoco  # noqa: PLC0415
     import pinocchio as pin  # noqa: PLC0415
 
@@ -377,7 +380,7 @@ def _reads(text: str) -> Callable[[str], str]:
 
 
 def _free() -> list[Row]:
-    """A body that moves freely: which number is what, and in whose axes its rates are."""
+    """Return the rows about a free body: order of q, and axes of v."""
     import mujoco  # noqa: PLC0415
     import pinocchio as pin  # noqa: PLC0415
 
@@ -423,9 +426,9 @@ def _free() -> list[Row]:
     frame = model.getFrameId("l1")
     theirs = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).vector
     return [
-        Row("q of a body that moves freely", *written),
+        Row("q of a free body", *written),
         Row(
-            "its rates",
+            "v of a free body",
             which(robot.velocity(q, rates, "l1"), axes),
             which(theirs, axes),
             which(np.roll(six, 3), axes),
@@ -434,7 +437,7 @@ def _free() -> list[Row]:
 
 
 def page() -> str:
-    """The page."""
+    """Return the text of the page."""
     import mujoco  # noqa: PLC0415
     import pinocchio as pin  # noqa: PLC0415
 

@@ -32,8 +32,8 @@ def said_of(path: Path) -> str:
     shapes, _, said = certificate.reading.partition("Pinocchio's MJCF reader")
     whole = ", without its shapes" if "does not compile" in shapes else ""
     for words in (
-        "places the bodies likewise",
-        "stands alone",
+        "agrees on the bodies",
+        "disagrees",
         "does not accept",
         "other joints",
         "no such body",

@@ -47,7 +47,7 @@ def test_a_chain_deeper_than_any_stack_is_verified(where: str) -> None:
 def test_too_many_rates_for_the_memory_are_computed_and_say_why_they_are_not_verified() -> None:
     tree = chain(500, JointKind.CONTINUOUS)
     robot = urdfkin.load(to_urdf(tree))
-    with pytest.warns(NotVerifiedWarning, match="500, which would take 8 GB"):
+    with pytest.warns(NotVerifiedWarning, match="500, which needs 8 GB"):
         J = robot.jacobian(robot.neutral(), "l500")
     assert J.shape == (6, 500)
     assert not robot.certificate().verified

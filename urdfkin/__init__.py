@@ -1,4 +1,4 @@
-"""Textbook kinematics from any URDF, every number checked against Pinocchio.
+"""Robot kinematics from any URDF, with the textbook's equations; every result is checked with Pinocchio.
 
 >>> import urdfkin
 >>> robot = urdfkin.load("ur5")
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from urdfkin.verify.tables import TableError
     from urdfkin.verify.verifier import NotVerifiedWarning
 
-# Loaded when first asked for: `import urdfkin` needs no numpy, no Pinocchio and no compiler.
+# Imported at first use, so that `import urdfkin` loads neither NumPy nor Pinocchio nor a compiler.
 _HOMES = {
     "BaseMotion": "urdfkin.model.base_motion",
     "Certificate": "urdfkin.verify.certificate",
@@ -62,7 +62,7 @@ _HOMES = {
     "validate": "urdfkin.validation.campaign",
 }
 
-# What an object is asked to show and a higher room draws: no room imports what stands above it.
+# Methods of earlier packages call these functions of later packages. They cannot import them.
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
 register_hook("a report as a page", lazy_import("urdfkin.report.html:as_html"))
 register_hook("a report as a comment", lazy_import("urdfkin.report.markdown:as_markdown"))

@@ -1,10 +1,10 @@
-"""`python -m urdfkin` is the `urdfkin` command."""
+"""Run the `urdfkin` command as `python -m urdfkin`."""
 
 import os
 import sys
 
-# Python has put the current folder first on its path. From here on nothing is imported from there, unless
-# urdfkin itself was. Not by pathlib, which might be the first such import.
+# Python puts the current folder first on sys.path. Remove it, unless urdfkin itself is in that folder.
+# Do not use pathlib here: the current folder may contain a module of that name.
 _home = os.path.realpath(f"{__file__}/../..")
 if not sys.flags.safe_path and os.path.realpath(sys.path[0]) != _home:
     del sys.path[0]

@@ -1,4 +1,4 @@
-"""`load`: from any source to a robot, through the checks."""
+"""`load`: make a robot from a file, a text, a table or another library's object, and check the input."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ from urdfkin.verify.oracles import WitnessName, witness_of
 from urdfkin.verify.sampling import Verify, checked_choice
 from urdfkin.verify.table_check import check_table_source
 
-#: What concerns those who write a URDF, and nobody whose URDF was made of something else.
+#: Findings for the author of a URDF file; not reported for a URDF that urdfkin generates.
 _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
 class How(TypedDict):
-    """What a robot is loaded with, whatever it is made of: arguments of `load`."""
+    """The arguments of `load` that apply to every kind of source."""
 
     verify: Verify
     mimic: bool | None
@@ -63,34 +63,41 @@ def load(
     xacro_args: Mapping[str, object] | None = None,
     oracle: WitnessName = "pinocchio",
 ) -> Robot:
-    """A robot from a URDF, an MJCF file or a table, checked before it is read.
+    """Return a robot from a URDF, an MJCF file, a table or an object of another library.
+
+    The input is checked first. These sources are accepted:
+
+    - a path: .urdf, .xacro, or .xml for MJCF (`docs/mjcf.md`)
+    - a name of the catalogue; `urdfkin robots` lists them
+    - URDF or MJCF as text, bytes or an open file; `-` is standard input
+    - a `DHTable`, or a file with one (.toml, .json, .csv, .tsv, .md, .tex, .txt); its base frame becomes the
+      root link, its tip the leaf link
+    - a product of exponentials (`urdfkin.dh.screws`), or a file with M and screws
+    - a `pinocchio.Model` or RobotWrapper, a `yourdfpy.URDF`, an ElementTree of Python or lxml
+    - a module of robot_descriptions, or its name, such as "panda_description", if that package is installed
 
     Args:
-        source: A path (.urdf, .xacro, or .xml for MJCF, see `docs/mjcf.md`), a name of the catalogue
-            (`urdfkin robots` lists them), URDF or MJCF as text, bytes, an open file, or `-` for standard
-            input; or a Denavit-Hartenberg table, as it is or as a file (.toml, .json, .csv, .tsv, .md, .tex,
-            .txt): its base frame is the root, its tip the leaf; or a product of exponentials
-            (`urdfkin.dh.screws`), as it is or as a file with M and screws; or what another library holds: a
-            `pinocchio.Model` (or RobotWrapper), a `yourdfpy.URDF`, an ElementTree of Python's or of lxml's, a
-            module of robot_descriptions or, where that package is installed, its name, such as
-            "panda_description".
-        verify: Whether every result is held against Pinocchio's; "sample" has 100 configurations of each
-            call checked.
-        mimic: Whether mimic joints follow their leaders, as the URDF says; False lets each move freely.
-            None: True, except for the robots whose catalogue entry says that theirs cannot work.
-        root_joint: `"floating"` or `"planar"` hangs the root link from a moving joint.
+        source: One of the sources above.
+        verify: True: compare every result with Pinocchio. "sample": compare 100 configurations of each call.
+            False: no comparison.
+        mimic: True: mimic joints follow the mimicked joints, as the URDF states. False: each mimic joint
+            moves freely. None: True, except for catalogue robots with unusable mimic rules.
+        root_joint: "floating" or "planar" connects the root link to the world by that joint. None: fixed.
         xacro_args: Arguments for a .xacro file, which is expanded first (needs the extra `xacro`).
-        oracle: Who checks quantities: "pinocchio", or "mujoco" (needs the extra `mujoco`).
+        oracle: Oracle that checks quantities, "pinocchio" or "mujoco" (needs the extra `mujoco`).
 
     Returns:
-        The robot. Its findings are warned of (`UrdfWarning`), except for robots of the catalogue.
+        The robot. Each warning about the file is issued as an `UrdfWarning`, except for catalogue robots.
 
     Raises:
-        UrdfError: the file has errors; `findings` tells which and where.
-        SourceError: it cannot be read.
-        UnknownNameError: no file and no robot of that name; the nearest names are offered.
-        TableError: the URDF that was made of a table is not the table's.
+        UrdfError: the file has errors; `findings` lists them with their positions.
+        SourceError: the source cannot be read.
+        UnknownNameError: no file and no robot has that name; the message lists the nearest names.
+        TableError: the URDF made from a table gives other placements than the table.
 
+    >>> arm = load("planar_two_link")
+    >>> arm.placement([0.0, 0.0], "tip")[:3, 3].tolist()
+    [0.9, 0.0, 0.0]
     >>> robot = load("panda")
     >>> height = robot.placement(robot.neutral(), "panda_hand")[2, 3]
     >>> robot.nq, round(float(height), 4)
@@ -115,7 +122,7 @@ def load(
         lost = lost_quaternions(without_rotation(source), written[1])
         robot = robot_of(Text(written[0].encode(), written[1], written[1]), **how, listed=lost)
         if lost:
-            robot.verifier.reading = "from yourdfpy's object, which drops quat_xyzw: its file was not seen"
+            robot.verifier.reading = "from a yourdfpy object, which drops quat_xyzw; the file was not read"
         return robot
     text = read_source(cast("Source", source), xacro_args=xacro_args)
     if (source == "-" or hasattr(source, "read")) and is_mjcf(text.data):
@@ -175,10 +182,10 @@ def _load_mjcf(
 
 
 def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
-    """What its digest is of.
+    """Return the bytes of an MJCF source, for its digest.
 
     Raises:
-        SourceError: it cannot be read, or is too large.
+        SourceError: the file cannot be read or is too large.
     """
     if isinstance(source, bytes):
         return source
@@ -215,17 +222,20 @@ def robot_of(
     made: bool = False,
     table: bool = False,
 ) -> Robot:
-    """As `load`, of a text that was read already.
+    """Return the robot of a URDF text that is already in memory.
 
     Args:
-        text: The text.
-        verify: As in `load`, and so the next three.
-        mimic: See there.
-        root_joint: See there.
-        oracle: See there.
-        listed: What was said of the text that this one was made of.
-        made: Whether it was made of something else, so that nobody has it as a file.
-        table: Whether that is a table.
+        text: The URDF text.
+        verify: As in `load`.
+        mimic: As in `load`.
+        root_joint: As in `load`.
+        oracle: As in `load`.
+        listed: Findings about the original source, if the text was generated from it.
+        made: The text was generated and does not exist as a file.
+        table: The original source is a table.
+
+    Raises:
+        UrdfError: the text has errors.
     """
     witness_of(oracle)
     other = None if oracle == "pinocchio" else oracle
@@ -261,7 +271,7 @@ def robot_of(
 
 
 def _unverifiable(findings: tuple[Finding, ...]) -> str | None:
-    """Why Pinocchio cannot check the robot, if a finding says that it cannot."""
+    """Return the reason why Pinocchio cannot check the robot, from the findings; None if it can."""
     for finding in findings:
         if finding.oracle is PinocchioReading.REFUSES:
             return f"Pinocchio refuses the file ({finding.code}, line {finding.line}: {finding.message})"

@@ -1,6 +1,7 @@
-"""The face of the library: a robot that computes with the text's recursion and has each result checked.
+"""The class `Robot`: kinematics of a loaded robot, with every result checked against Pinocchio.
 
-`verify=True`, the default, holds every result against Pinocchio's before it is handed out.
+Equation numbers refer to chapter 7 of the textbook that `docs/equations.md` names. With `verify=True`, the
+default, a method compares its result with Pinocchio's before it returns.
 """
 
 from __future__ import annotations
@@ -75,28 +76,43 @@ if TYPE_CHECKING:
     from urdfkin.verify.exact.enclosure import Enclosures
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: m/s^2, as Pinocchio and MuJoCo have it.
+#: m/s^2, in world axes; the default of Pinocchio and MuJoCo.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-#: Methods and attributes of a robot that are for the package's own parts.
+#: Members for internal use, hidden from name completion.
 _INSIDE = {"plan", "verifier"}
-#: More than these no array can hold, on any machine.
+#: Largest number of float64 values that an array can address.
 _MOST_NUMBERS = (2**63 - 1) // 8
 
 
 class Robot(Displayable):
-    """A robot that was loaded; make one with `urdfkin.load`.
+    """A loaded robot and its kinematics; make one with `urdfkin.load`.
 
-    Configurations `q` are (..., nq), rates `v` and `a` (..., nv), with any leading batch shape; the three
-    broadcast against each other. Joint order and rates are Pinocchio's. Each may also be given by name, as a
-    mapping `{"elbow": 0.5, "wrist": "30deg"}` whose values may be batches, or as text `"elbow=0.5, wrist=2"`,
-    `"ready"`, `"ready, elbow=0.5"` with a pose out of `poses`; a name that is missing is an error.
+    A configuration `q` has shape (..., nq). Joint velocities `v` and joint accelerations `a` have shape
+    (..., nv). Leading batch axes are free, and the three broadcast against each other. The order of joints
+    and the meaning of `v` are Pinocchio's.
+
+    Each of `q`, `v` and `a` may be given in one of four forms:
+
+    - numbers in order: `[0.5, 2.0]`
+    - a mapping: `{"elbow": 0.5, "wrist": "30deg"}`; its values may be batches
+    - a text with names: `"elbow=0.5, wrist=2"`
+    - a pose of `poses`, with or without changes: `"ready"`, `"ready, elbow=0.5"`
+
+    A missing name is an error.
 
     Attributes:
         tree: Links and joints.
-        verifier: What checks its results: the text that Pinocchio reads, and what was found so far.
-        findings: What there was to say about the URDF; no errors.
-        base_frame: The catalogue's base for chains; for other robots the root link.
+        verifier: The verifier of its results, with the URDF text that Pinocchio reads and the record so far.
+        findings: Warnings and notes about the URDF; a robot with errors does not load.
+        base_frame: Default base of chains: the catalogue's base, or the root link of other robots.
+
+    >>> import urdfkin
+    >>> arm = urdfkin.load("planar_two_link")
+    >>> arm
+    <Robot planar_two_link: nq 2, nv 2, 4 links>
+    >>> arm.placement("joint_1=0, joint_2=90deg", "tip")[:3, 3].round(6).tolist()  # lengths 0.5 m, 0.4 m
+    [0.5, 0.4, 0.0]
     """
 
     def __init__(
@@ -126,15 +142,15 @@ class Robot(Displayable):
         self._compiled: dict[object, CompiledFrame] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Compiled plans are cheap to rebuild where they are needed; a copy has an account of its own.
-        made: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_compiled": {}}
-        return {**self.__dict__, "verifier": copy(self.verifier), **made}
+        # Compiled trees are cheap to rebuild. A copy gets a verifier of its own.
+        empty: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_compiled": {}}
+        return {**self.__dict__, "verifier": copy(self.verifier), **empty}
 
     def __repr__(self) -> str:
         return log_line(f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>")
 
     def __dir__(self) -> list[str]:
-        # What the package's own parts ask of a robot is not what people complete names for.
+        # Name completion lists the members for users only.
         return [name for name in super().__dir__() if name not in _INSIDE]
 
     def _sheet(self) -> TextDocument:
@@ -142,114 +158,205 @@ class Robot(Displayable):
         return described(self.tree, self.base_frame, self.tip_frame, order)
 
     def view(self, q: Given = "ready", *, height: int = 480) -> Any:
-        """The robot in three dimensions, with a slider for each joint, in a notebook's cell.
+        """Return a three-dimensional view of the robot for a notebook cell, with a slider for each joint.
 
-        It needs no network and no server, is kept with the notebook, and moves in the browser by itself: what
-        it draws is for the eye, and not checked. `urdfkin view` checks as it moves.
+        The view needs no network and no server, and it is saved with the notebook. The browser computes the
+        motion; its poses are not checked. `urdfkin view` checks every pose that it shows.
 
         Args:
-            q: (nq,) where it begins.
-            height: Of the cell, pixels.
+            q: (nq,) initial configuration, rad, m.
+            height: Height of the cell, pixels.
 
         Raises:
-            InputError: wrong length, a number that is not finite, a batch.
+            InputError: a wrong length, a number that is not finite, or a batch.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> cell = arm.view("joint_1=30deg, joint_2=0", height=300)  # as the last line of a cell: shown
         """
         q_0 = configuration.checked(self.tree, q, "q")
         if q_0.ndim != 1:
-            raise InputError("a view begins at one configuration", found=f"shape {q_0.shape}")
+            raise InputError("q of a view must be one configuration", found=f"shape {q_0.shape}")
         return hook("a robot in a cell")(self, q_0, whole_number(height, "height", 1, 10_000))
 
-    # -- what it is ----------------------------------------------------------------------------------
+    # -- description ---------------------------------------------------------------------------------
 
     @property
     def name(self) -> str:
-        """The robot's name in the URDF."""
+        """The robot's name in the URDF.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").name
+        'planar_two_link'
+        """
         return self.tree.name
 
     @property
     def urdf(self) -> str:
-        """The URDF text that Pinocchio checks against."""
+        """The URDF text that Pinocchio reads for its checks.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").urdf.count("<joint ")
+        3
+        """
         return self.verifier.text
 
     @property
     def origin(self) -> Origin:
-        """What was given to `load`."""
+        """The source and the arguments that `load` received.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").origin.source
+        'planar_two_link'
+        """
         return self.verifier.origin
 
     @property
     def source(self) -> str:
-        """Where it comes from: a path, a catalogue name, `-`, `<text>`."""
+        """The source of the robot: a path, a catalogue name, `-` for standard input, or `<text>`.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").source
+        'planar_two_link'
+        """
         return self.origin.source
 
     @property
     def sha256(self) -> str:
-        """The digest of the URDF's text as UTF-8, or of the MJCF file without what it includes."""
+        """SHA-256 of the URDF text as UTF-8; for MJCF, of the file itself without its included files.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").sha256[:8]
+        '5354bbcf'
+        """
         return self.verifier.sha256
 
     @property
     def path(self) -> str | None:
-        """Where the file stands; None for what was given as text."""
+        """Absolute path of the file; None for a robot that was given as text.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").path.endswith("planar_two_link.urdf")
+        True
+        """
         entry = catalogue().get(self.source)
         path = entry.path if entry is not None else Path(self.source)
         return str(path.resolve()) if not self.source.startswith(("<", "-")) and path.is_file() else None
 
     @property
     def root_joint(self) -> str | None:
-        """What the root link hangs from, as it was given to `load`."""
+        """The argument `root_joint` of `load`: "floating", "planar", or None for a fixed root link.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link", root_joint="floating").root_joint
+        'floating'
+        """
         return self.origin.root_joint
 
     @property
     def nq(self) -> int:
-        """Length of a configuration."""
+        """Length of a configuration `q`.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link", root_joint="floating").nq  # position 3, quaternion 4, joints 2
+        9
+        """
         return self.tree.nq
 
     @property
     def nv(self) -> int:
-        """Length of the rates."""
+        """Length of the joint velocities `v` and of the joint accelerations `a`.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link", root_joint="floating").nv  # linear 3, angular 3, joints 2
+        8
+        """
         return self.tree.nv
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Moving joints in Pinocchio's order, followers too."""
+        """Names of the moving joints in Pinocchio's order, mimic joints included.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").joint_names
+        ('joint_1', 'joint_2')
+        """
         return tuple(joint.name for joint in self.tree.joints if joint.kind.nv)
 
     @property
     def link_names(self) -> tuple[str, ...]:
-        """Every link, root first."""
+        """Names of all links; the root link is the first.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").link_names
+        ('base', 'link_1', 'link_2', 'tip')
+        """
         return self.tree.links
 
     @property
     def link_frames(self) -> tuple[LinkFrame, ...]:
-        """Every link as a frame, `link:NAME`, to be asked for all at once; no name stands for two."""
+        """All links as frames `link:NAME`, a list for `placement` and others; each name is unique.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> arm.link_frames
+        ('link:base', 'link:link_1', 'link:link_2', 'link:tip')
+        >>> arm.placement([0.0, 0.0], arm.link_frames)[:, 0, 3].tolist()  # x of each link, m
+        [0.0, 0.0, 0.5, 0.9]
+        """
         return self.tree.link_frames
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """A name for each number of `q`."""
+        """A name for each number of `q`.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").coordinate_names
+        ('joint_1', 'joint_2')
+        """
         return configuration.coordinate_names(self.tree)
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """A name for each number of `v` and `a`, and for each column of a Jacobian."""
+        """A name for each number of `v` and `a`, and for each column of a Jacobian.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").rate_names
+        ('joint_1', 'joint_2')
+        """
         return configuration.rate_names(self.tree)
 
     @property
     def frame_names(self) -> tuple[str, ...]:
-        """Every link and joint, each once, under Pinocchio's names."""
+        """Names of all links and joints in Pinocchio's form, each once.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").frame_names
+        ('base', 'joint_1', 'link_1', 'joint_2', 'link_2', 'end', 'tip')
+        """
         return self.tree.frame_names
 
     @property
     def all_frames(self) -> tuple[str, ...]:
-        """Every link and every joint once, as `link:NAME` and `joint:NAME`.
+        """All links and all joints as frames `link:NAME` and `joint:NAME`, each once.
 
-        No name stands for two: each is a `FrameName`, which means the link or joint NAME even where another
-        is itself called `link:NAME`.
+        Each is a `FrameName` and therefore unique. It means the link or joint NAME even if another link or
+        joint has the literal name `link:NAME`.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").all_frames[-3:]
+        ('joint:joint_1', 'joint:joint_2', 'joint:end')
         """
         return (*self.tree.link_frames, *self.tree.joint_frames)
 
     @property
     def tip_frame(self) -> str:
-        """The catalogue's tip; for other robots the leaf that most joints lie before."""
+        """The default tip: the catalogue's tip, or the leaf link with the most moving joints above it.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").tip_frame
+        'tip'
+        """
         if self._tip_frame is None:
             leaf = max(
                 self.tree.leaves(), key=lambda link: sum(self.tree.joints[i].nv for i in self.tree.path(link))
@@ -258,11 +365,11 @@ class Robot(Displayable):
         return self._tip_frame
 
     def _default_frame(self) -> str:
-        """The tip, where there is no choice: the catalogue's, or the one leaf."""
+        """Return the catalogue's tip or the only leaf; raise InputError if there are several leaves."""
         if not self._has_one_tip:
             leaves = [self.tree.frame_name(leaf) for leaf in self.tree.leaves()]
             raise InputError(
-                "which frame? The robot ends in several",
+                "no frame is given, and the robot has several tips",
                 where=self.name,
                 found=listed(leaves),
                 remedy=f"name one, such as robot.tip_frame, {self.tip_frame!r}",
@@ -271,35 +378,60 @@ class Robot(Displayable):
 
     @property
     def joints(self) -> dict[str, Joint]:
-        """Every joint by its name, fixed ones too, in Pinocchio's order: kind, axis, limit, mimic rule."""
+        """All joints by name, fixed joints included, in Pinocchio's order: kind, axis, limit, mimic rule.
+
+        >>> import urdfkin
+        >>> joint = urdfkin.load("planar_two_link").joints["joint_2"]
+        >>> joint.axis.tolist(), joint.limit.lower, joint.limit.upper
+        ([0.0, 0.0, 1.0], -3.0, 3.0)
+        """
         return {joint.name: joint for joint in self.tree.joints}
 
     @property
     def frames(self) -> dict[str, str]:
-        """Every frame's name and the link that carries it: a joint's frame is its child link's."""
+        """The link that carries each frame, by the frame's name; a joint's frame belongs to its child link.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").frames["joint_2"]
+        'link_2'
+        """
         of = zip(self.tree.joints, self.tree.links[1:], strict=True)
         return {joint.name: link for joint, link in of} | {link: link for link in self.tree.links}
 
     @property
     def limits(self) -> FloatArray:
-        """(2, nq) lower and upper bounds of `q`, rad and m; infinite where a joint has none.
+        """(2, nq) lower and upper limits of `q`, rad, m; infinite for a joint without limits.
 
-        They are the joints' own; `limit_violations` checks those of mimic joints too.
+        The limits of mimic joints are not included; `limit_violations` checks them too.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").limits.tolist()
+        [[-3.0, -3.0], [3.0, 3.0]]
         """
         return configuration.limits(self.tree)
 
     @property
     def velocity_limits(self) -> FloatArray:
-        """(nv,) the largest rates, rad/s and m/s; infinite where a joint has none."""
+        """(nv,) largest joint velocities, rad/s, m/s; infinite for a joint without a velocity limit.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").velocity_limits.tolist()
+        [4.0, 4.0]
+        """
         return configuration.velocity_limits(self.tree)
 
     def neutral(self) -> FloatArray:
-        """(nq,) zeros, and the identity quaternion for floating joints."""
+        """Return the zero configuration (nq,): zeros, and the identity quaternion for floating joints.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").neutral().tolist()
+        [0.0, 0.0]
+        """
         return configuration.neutral(self.tree)
 
     @property
     def poses(self) -> dict[str, FloatArray]:
-        """Named configurations (nq,): `neutral`; `ready`, within all limits; the catalogue's.
+        """Named configurations (nq,): `neutral`, `ready` (within all limits), and those of the catalogue.
 
         >>> import urdfkin
         >>> robot = urdfkin.load("panda")
@@ -309,13 +441,24 @@ class Robot(Displayable):
         return configuration.poses(self.tree)
 
     def sample(self, n: int, seed: int = 0) -> FloatArray:
-        """(n, nq) configurations within limits, followers' too; the same seed gives the same ones.
+        """Draw random configurations (n, nq) within the limits, those of mimic joints included.
 
-        Where a follower's limits leave its leader no room, the leader keeps to its own, and
-        `limit_violations` names the follower.
+        The same seed gives the same configurations. If no value of a mimicked joint satisfies the mimic
+        joint's limits, only the limits of the mimicked joint apply; `limit_violations` then names the mimic
+        joint.
+
+        Args:
+            n: Number of configurations.
+            seed: Seed of the random generator.
 
         Raises:
-            InputError: `n` or `seed` is no whole number from 0 on; `n` configurations do not fit into memory.
+            InputError: `n` or `seed` is not a whole number >= 0, or `n` configurations exceed the memory.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> q = arm.sample(5, seed=1)
+        >>> q.shape, arm.limit_violations(q)
+        ((5, 2), [])
         """
         n = whole_number(n, "n", 0, _MOST_NUMBERS // max(1, self.nq))
         seed = whole_number(seed, "seed", 0)
@@ -330,23 +473,30 @@ class Robot(Displayable):
             ) from None
 
     def limit_violations(self, q: Given) -> list[str]:
-        """One line for each joint that leaves its bounds somewhere in `q` (..., nq)."""
+        """Return one line for each joint that is outside its limits in some configuration of `q` (..., nq).
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
+        ['joint joint_1: 4 is outside [-3, 3]']
+        """
         return configuration.limit_violations(self.tree, configuration.checked(self.tree, q, "q"))
 
     def integrate(self, q: Given, v: Given) -> FloatArray:
-        """(..., nq) where `q` gets to in a second at the rates `v`, as Pinocchio's `integrate`.
+        """Return the configuration (..., nq) one second after `q` at constant joint velocities `v`.
 
-        For a step of another duration give `v * seconds`. Quaternions stay of norm 1; angles of continuous
-        joints count turns.
+        The definition is Pinocchio's `integrate`. For another duration, pass `v * seconds`. Quaternions
+        keep norm 1. Angles of continuous joints are not wrapped.
 
         Args:
             q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s; those of planar and floating joints in the moving frame.
+            v: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
 
         Raises:
-            InputError: wrong length, a number that is not finite.
+            InputError: a wrong length, or a number that is not finite.
 
         >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").integrate([0.5, 0.0], [1.0, -1.0]).tolist()
+        [1.5, -1.0]
         >>> a1 = urdfkin.load("a1", root_joint="floating", verify=False)
         >>> q = a1.integrate("neutral", "neutral, root_joint.vx=1, root_joint.wz=180deg/s")
         >>> q[:7].round(4).tolist()
@@ -357,33 +507,61 @@ class Robot(Displayable):
         )
 
     def difference(self, start: Given, end: Given) -> FloatArray:
-        """(..., nv) the rates that lead from one configuration to another in a second, the shortest way.
+        """Return the joint velocities (..., nv) that lead from `start` to `end` in one second.
 
-        As Pinocchio's `difference`: `integrate(start, difference(start, end))` is where `end` is.
+        The definition is Pinocchio's `difference`, the shortest motion. `integrate(start, difference(start,
+        end))` is the same pose as `end`.
 
         Args:
             start: (..., nq) rad, m.
-            end: (..., nq).
+            end: (..., nq) rad, m.
+
+        Returns:
+            (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
 
         Raises:
-            InputError: wrong length, a number that is not finite.
+            InputError: a wrong length, or a number that is not finite.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").difference([0.5, 0.0], [1.5, -1.0]).tolist()
+        [1.0, -1.0]
         """
         ends = (configuration.checked(self.tree, q, "q") for q in (start, end))
         return integration.difference(self.tree, *ends)
 
     def to_pinocchio(self, q: Given, *, mimic: bool = False) -> FloatArray:
-        """(..., nq) to the configuration of `pinocchio.buildModelFromUrdf(path, mimic=mimic)`."""
+        """Convert `q` (..., nq) to Pinocchio's configuration, for the model of `pinocchio_model`.
+
+        Pinocchio stores a continuous joint as (cos q, sin q), and without `mimic` a mimic joint has a
+        coordinate of its own.
+
+        Args:
+            q: (..., nq) rad, m.
+            mimic: The value of `mimic` that the Pinocchio model was built with.
+
+        Returns:
+            (..., model.nq).
+
+        Raises:
+            InputError: a wrong length, or a number that is not finite.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").to_pinocchio("joint_1=0.5, joint_2=-1").tolist()
+        [0.5, -1.0]
+        """
         return configuration.to_pinocchio(
             self.tree, configuration.checked(self.tree, q, "q"), mimic=as_bool(mimic, "mimic")
         )
 
     def pinocchio_model(self, *, mimic: bool = False) -> Any:
-        """A new `pinocchio.Model` of this robot, as Pinocchio reads its URDF; `to_pinocchio(q)` are its q.
+        """Return a new `pinocchio.Model` that Pinocchio builds from this robot's URDF text.
 
-        With a root joint it stands on Pinocchio's, a free-flyer or a planar joint.
+        `to_pinocchio(q)` returns its configurations. With a root joint, the model has Pinocchio's free-flyer
+        or planar joint.
 
         Args:
-            mimic: Whether followers follow in the model; Pinocchio 4.1 refuses some robots so.
+            mimic: True: the model couples its mimic joints, which Pinocchio 4.1 rejects for some robots.
+                False: each mimic joint is an independent joint.
 
         Raises:
             OracleError: Pinocchio does not accept this robot.
@@ -402,13 +580,25 @@ class Robot(Displayable):
         return self.verifier.model(mimic=as_bool(mimic, "mimic"))
 
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
-        """The inverse of `to_pinocchio`; angles of continuous joints come back in [-pi, pi].
+        """Convert Pinocchio's configuration to `q` (..., nq), the inverse of `to_pinocchio`.
 
-        Of both ends the double nearest to them comes back as it is.
+        Angles of continuous joints are returned in [-pi, pi]. The double nearest to pi or -pi is returned
+        unchanged.
+
+        Args:
+            q: (..., model.nq), a configuration of `pinocchio_model(mimic=mimic)`.
+            mimic: The value of `mimic` that the Pinocchio model was built with.
+
+        Raises:
+            InputError: a wrong length, or a number that is not finite.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").from_pinocchio([0.5, -1.0]).tolist()
+        [0.5, -1.0]
         """
         return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=as_bool(mimic, "mimic"))
 
-    # -- what it computes ----------------------------------------------------------------------------
+    # -- computation --------------------------------------------------------------------------------
 
     def compute(
         self,
@@ -422,24 +612,29 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Any quantity of the walk by its name, as the method of that name computes it.
+        """Return a quantity by its name; the result equals that of the method of the same name.
 
         Args:
             name: "placement", "velocity", "jacobian", "jacobian rate", "hessian" or "acceleration".
-            inputs: q, v and a, as far as it takes them.
-            frame: A link's or joint's name, or a list of names; the tip where there is one.
-            reference: For which point and in which axes; a placement has none.
-            base: How the root link moves; None if it stands at the world's origin.
-            out: C-contiguous float64 array of the result's shape to write into.
-            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
-                it to the robot.
-            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+            inputs: The inputs of that method, in order: (q,), (q, v) or (q, v, a).
+            frame: Name of a link or joint, or a list of names; None: the robot's only tip.
+            reference: Reference frame of the result; a placement has none.
+            base: Motion of the root link; None: fixed at the world origin.
+            out: Output array, C-contiguous float64 of the result's shape.
+            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
+                as chosen in `load`.
+            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Raises:
-            UnknownNameError: no such quantity or frame.
-            InputError: wrong length, a number that is not finite, a batch that does not broadcast; other
-                inputs than the quantity takes; one that has a way of its own.
-            VerificationError: Pinocchio computes something else.
+            UnknownNameError: the quantity or the frame does not exist.
+            InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast,
+                the wrong number of inputs, or a quantity that only its own method computes.
+            VerificationError: Pinocchio's result differs by more than the bound.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> arm.compute("velocity", ([0.0, 0.0], [1.0, 0.0]), "tip").tolist()
+        [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
         row = quantity(as_str(name, "name"))
         if row not in walked():
@@ -458,24 +653,35 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 4, 4) T_world_frame, eq. 7.77 with the rotations alongside; (..., frames, 4, 4) of several.
+        """Return the placement of a frame, the homogeneous matrix T_world_frame (eq. 7.77).
 
         Args:
             q: (..., nq) rad, m.
-            frame: A link's or joint's name; or a list of names, all of which one pass computes
-                (`link_frames` are every link); the tip where there is one.
-            base: How the root link moves; None if it stands at the world's origin.
-            out: C-contiguous float64 array of the result's shape to write into; after an error it may hold
-                anything.
-            verify: Whether Pinocchio checks this call; "sample" has 100 of its configurations checked; None
-                leaves it to the robot.
-            threads: How many compute a batch; None: every processor from 4,096 configurations on. The
-                results do not depend on it.
+            frame: Name of a link or joint, or a list of names that one pass computes together, such as
+                `link_frames`. None: the robot's only tip.
+            base: Motion of the root link; None: fixed at the world origin.
+            out: Output array, C-contiguous float64 of the result's shape. Its contents are undefined after
+                an error.
+            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
+                as chosen in `load`.
+            threads: Number of threads for a batch. None: all processors from 4,096 configurations on. The
+                result does not depend on it.
+
+        Returns:
+            (..., 4, 4), or (..., frames, 4, 4) for a list of frames; positions in m.
 
         Raises:
-            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
-            UnknownNameError: no such frame.
-            VerificationError: Pinocchio computes something else.
+            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
+            UnknownNameError: the frame does not exist.
+            VerificationError: Pinocchio's result differs by more than the bound.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> T = arm.placement([0.0, 0.0], "tip")
+        >>> T[:3, 3].tolist()
+        [0.9, 0.0, 0.0]
+        >>> arm.placement([[0.0, 0.0], [0.1, 0.2]], ["link_2", "tip"]).shape
+        (2, 2, 4, 4)
         """
         if (
             (base is None and threads is None)
@@ -495,32 +701,31 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 4, 4) T_other_frame, the pose of a frame as it is seen from another, wherever the base is.
+        """Return the pose of a frame relative to another frame, T_other_frame (..., 4, 4).
 
-        T_other_frame = T_world_other^-1 T_world_frame, eq. 7.77 twice; Pinocchio is asked for both.
+        T_other_frame = T_world_other^-1 T_world_frame, with eq. 7.77 for both. Pinocchio computes both
+        placements for the check. The result does not depend on the motion of the base.
 
         Args:
             q: (..., nq) rad, m.
             frame: As in `placement`.
-            relative_to: The name of the link or joint that it is seen from.
+            relative_to: Name of the other link or joint.
             out: As in `placement`.
             verify: As in `placement`.
             threads: As in `placement`.
 
         Raises:
-            InputError: as `placement`.
-            UnknownNameError: no such frame.
-            VerificationError: Pinocchio computes something else.
+            InputError: as in `placement`.
+            UnknownNameError: the frame does not exist.
+            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
-        >>> q = [0.3, 0.4]
-        >>> T = arm.relative_placement(q, arm.tip_frame, arm.tip_frame)
-        >>> bool(abs(T - np.eye(4)).max() < 1e-15)
-        True
+        >>> arm.relative_placement([0.0, 0.0], "tip", "link_2")[:3, 3].tolist()
+        [0.4, 0.0, 0.0]
         """
         name = as_str(relative_to, "relative_to")
-        name = name if isinstance(name, FrameName) else str(name)  # a replay line has no words for NumPy's
+        name = name if isinstance(name, FrameName) else str(name)  # a replay line prints plain strings
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
         self.verifier.ready(verify)
@@ -542,25 +747,26 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 6) velocity of a frame, [linear; angular] m/s, rad/s: eq. 7.127, 7.128.
+        """Return the velocity of a frame (..., 6), [linear; angular] in m/s, rad/s (eq. 7.127, 7.128).
 
         Args:
             q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s; those of planar and floating joints in the moving frame.
-            frame: A link's or joint's name, or a list of names, which adds an axis behind the batch; the tip
-                where there is one.
-            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
-                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
-            base: How the root link moves; None if it stands at the world's origin.
-            out: C-contiguous float64 array of the result's shape to write into.
-            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
-                it to the robot.
-            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+            v: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
+            frame: Name of a link or joint, or a list of names, which adds an axis after the batch axes. None:
+                the robot's only tip.
+            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
+                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
+                world axes.
+            base: Motion of the root link; None: fixed at the world origin.
+            out: Output array, C-contiguous float64 of the result's shape.
+            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
+                as chosen in `load`.
+            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Raises:
-            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
-            UnknownNameError: no such frame, reference or joint.
-            VerificationError: Pinocchio computes something else.
+            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
+            UnknownNameError: the frame, reference or joint does not exist.
+            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -586,27 +792,28 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 6, nv) velocity Jacobian, eq. 7.85: `velocity` is J v.
+        """Return the velocity Jacobian J of a frame (..., 6, nv), with velocity = J v (eq. 7.85).
 
-        Column i is the frame's velocity [linear; angular] for a unit rate of `rate_names[i]` alone, m/s and
-        rad/s per rad/s or m/s.
+        Column i is the frame's velocity [linear; angular] when the joint velocity `rate_names[i]` is 1 and
+        all others are 0. Units: m/s and rad/s per rad/s or m/s.
 
         Args:
             q: (..., nq) rad, m.
-            frame: A link's or joint's name, or a list of names, which adds an axis behind the batch; the tip
-                where there is one.
-            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
-                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
-            base: How the root link moves; None if it stands at the world's origin.
-            out: C-contiguous float64 array of the result's shape to write into.
-            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
-                it to the robot.
-            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+            frame: Name of a link or joint, or a list of names, which adds an axis after the batch axes. None:
+                the robot's only tip.
+            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
+                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
+                world axes.
+            base: Motion of the root link; None: fixed at the world origin.
+            out: Output array, C-contiguous float64 of the result's shape.
+            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
+                as chosen in `load`.
+            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Raises:
-            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
-            UnknownNameError: no such frame, reference or joint.
-            VerificationError: Pinocchio computes something else.
+            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
+            UnknownNameError: the frame, reference or joint does not exist.
+            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -634,29 +841,31 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 6, nv) J-dot, the time derivative of `jacobian` along the motion (7.126).
+        """Return J-dot (..., 6, nv), the time derivative of `jacobian` along the motion (eq. 7.126).
 
-        In LOCAL_WORLD_ALIGNED, J a + J-dot v is the acceleration of the text and of `acceleration`. In LOCAL
-        and WORLD it is the *spatial* acceleration, which differs by w x vel: there the point, or the axes,
-        that the rows speak of move themselves. On a moving base, what the base does comes on top.
+        In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the result of `acceleration`, the classical one. In LOCAL
+        and WORLD, J a + J-dot v is the *spatial* acceleration, because the axes or the point move. Its linear
+        part is the classical one minus w x vel. On a moving base, the acceleration that the base causes must
+        be added.
 
         Args:
             q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s; those of planar and floating joints in the moving frame.
-            frame: A link's or joint's name, or a list of names, which adds an axis behind the batch; the tip
-                where there is one.
-            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
-                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
-            base: How the root link moves; None if it stands at the world's origin.
-            out: C-contiguous float64 array of the result's shape to write into.
-            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
-                it to the robot.
-            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+            v: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
+            frame: Name of a link or joint, or a list of names, which adds an axis after the batch axes. None:
+                the robot's only tip.
+            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
+                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
+                world axes.
+            base: Motion of the root link; None: fixed at the world origin.
+            out: Output array, C-contiguous float64 of the result's shape.
+            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
+                as chosen in `load`.
+            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Raises:
-            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
-            UnknownNameError: no such frame, reference or joint.
-            VerificationError: Pinocchio computes something else.
+            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
+            UnknownNameError: the frame, reference or joint does not exist.
+            VerificationError: Pinocchio's result differs by more than the bound.
         """
         return self._computed("jacobian rate", (q, v), frame, reference, base, out, verify, threads)
 
@@ -671,40 +880,45 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 6, nv, nv) derivatives of `jacobian` by each rate: [..., i, j] is that of column i by rate j.
+        """Return the kinematic Hessian H (..., 6, nv, nv), the derivative of `jacobian` by each coordinate.
 
-        J-dot of 7.126 is the sum over j of H[..., j] v[j], and v^T H v what the acceleration has of the rates
-        alone. Where rate j comes before column i, its z_j turns the column, z_j x (z_i x d_i); where it comes
-        behind, it moves the end of its arm, z_i x (z_j x d_j). WORLD has the first kind alone, LOCAL the
-        second.
+        H[..., i, j] is the derivative of column i of J in the direction of the joint velocity j. J-dot of
+        eq. 7.126 is the sum of H[..., j] v[j] over j. v^T H v is the part of the acceleration that depends on
+        v alone.
 
-        In LOCAL_WORLD_ALIGNED, but for the rates of one floating joint, the angular rows at [i, j] and [j, i]
-        differ by w_j x w_i, the angular rows of the Jacobian: not at all where these are parallel, and on a
-        planar arm the angular rows are 0. The linear rows are symmetric in i and j, but for the rates of one
-        planar or floating joint.
+        - Joint j before joint i: z_j rotates the column, z_j x (z_i x d_i).
+        - Joint j after joint i: z_j moves the end of the lever arm, z_i x (z_j x d_j).
+
+        WORLD has only terms of the first kind, LOCAL only terms of the second.
+
+        Symmetry in LOCAL_WORLD_ALIGNED: the linear rows are symmetric in i and j, except within one planar or
+        floating joint. The angular rows at [i, j] and [j, i] differ by w_j x w_i, where w_i are the angular
+        rows of column i of J, except within one floating joint. The difference is 0 for parallel axes. All
+        angular rows are 0 on a planar arm.
 
         Args:
             q: (..., nq) rad, m.
-            frame: A link's or joint's name, or a list of names, which adds an axis behind the batch; the tip
-                where there is one.
-            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
-                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
-            base: How the root link moves; None if it stands at the world's origin.
-            out: C-contiguous float64 array of the result's shape to write into.
-            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
-                it to the robot.
-            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+            frame: Name of a link or joint, or a list of names, which adds an axis after the batch axes. None:
+                the robot's only tip.
+            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
+                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
+                world axes.
+            base: Motion of the root link; None: fixed at the world origin.
+            out: Output array, C-contiguous float64 of the result's shape.
+            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
+                as chosen in `load`.
+            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Raises:
-            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
-            UnknownNameError: no such frame, reference or joint.
-            VerificationError: Pinocchio computes something else.
+            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
+            UnknownNameError: the frame, reference or joint does not exist.
+            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link", verify=False)
-        >>> H = arm.hessian([0.0, 0.0], arm.tip_frame)
-        >>> bool((H[:3] == H[:3].swapaxes(-1, -2)).all())
-        True
+        >>> H = arm.hessian([0.0, 0.0], "tip")
+        >>> H[0].tolist()  # x row, m/rad: the second derivatives of x = 0.5 cos q1 + 0.4 cos(q1 + q2)
+        [[-0.9, -0.4], [-0.4, -0.4]]
         """
         if (
             (base is None and threads is None)
@@ -727,31 +941,34 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 6) classical acceleration of a frame, [linear; angular] m/s^2, rad/s^2: eq. 7.129, 7.130.
+        """Return the classical acceleration of a frame (..., 6), [linear; angular] (eq. 7.129, 7.130).
 
-        The linear part is the second derivative of the position of the frame's origin, p'', not the spatial
-        acceleration p'' - w x p' (Pinocchio has both: `getFrameClassicalAcceleration` is this one). Gravity
-        is not in it; `imu` has what a sensor reads. With `jacobian` and `jacobian_rate` in
-        LOCAL_WORLD_ALIGNED it is J a + J-dot v; `acceleration_breakdown` says which joint contributes what.
+        Units are m/s^2 and rad/s^2. The linear part is p'', the second derivative of the position of the
+        frame's origin. It is not the spatial acceleration p'' - w x p'. Pinocchio's function for it is
+        `getFrameClassicalAcceleration`. Gravity is not included; `imu` includes it.
+
+        In LOCAL_WORLD_ALIGNED the result equals J a + J-dot v, with `jacobian` and `jacobian_rate`.
+        `acceleration_breakdown` lists the contribution of each joint.
 
         Args:
             q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s; those of planar and floating joints in the moving frame.
-            a: (..., nv) rad/s^2, m/s^2, likewise.
-            frame: A link's or joint's name, or a list of names, which adds an axis behind the batch; the tip
-                where there is one.
-            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
-                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
-            base: How the root link moves; None if it stands at the world's origin.
-            out: C-contiguous float64 array of the result's shape to write into.
-            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
-                it to the robot.
-            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+            v: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
+            a: (..., nv) rad/s^2, m/s^2; in the same axes as `v`.
+            frame: Name of a link or joint, or a list of names, which adds an axis after the batch axes. None:
+                the robot's only tip.
+            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
+                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
+                world axes.
+            base: Motion of the root link; None: fixed at the world origin.
+            out: Output array, C-contiguous float64 of the result's shape.
+            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
+                as chosen in `load`.
+            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Raises:
-            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
-            UnknownNameError: no such frame, reference or joint.
-            VerificationError: Pinocchio computes something else.
+            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
+            UnknownNameError: the frame, reference or joint does not exist.
+            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -779,39 +996,38 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 6) what an accelerometer and a gyroscope in a frame read, in the frame's own axes.
+        """Return the readings of an IMU in a frame (..., 6), in the frame's own axes.
 
-        The first three numbers are the *proper* acceleration R^T (p'' - g), m/s^2: what the frame is
-        accelerated by relative to free fall, upwards 9.81 where it stands still. p'' is the classical
-        acceleration of `acceleration` (7.130), not the spatial one. The other three are R^T w (7.127), rad/s.
+        The first three numbers are the accelerometer's, the *proper* acceleration R^T (p'' - g) in m/s^2. At
+        rest it is 9.81 upwards. p'' is the classical acceleration of `acceleration` (eq. 7.130), not the
+        spatial one. The last three numbers are the gyroscope's, R^T w in rad/s (eq. 7.127).
 
         Args:
             q: (..., nq) rad, m.
             v: (..., nv) rad/s, m/s.
             a: (..., nv) rad/s^2, m/s^2.
-            frame: A link's or joint's name, or a list of names; the tip where there is one.
-            gravity: (3,) m/s^2 in the world's axes.
-            base: How the root link moves; None if it stands at the world's origin.
-            out: C-contiguous float64 array of the result's shape to write into.
-            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
-                it to the robot.
-            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+            frame: Name of a link or joint, or a list of names; None: the robot's only tip.
+            gravity: (3,) m/s^2 in world axes.
+            base: Motion of the root link; None: fixed at the world origin.
+            out: Output array, C-contiguous float64 of the result's shape.
+            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
+                as chosen in `load`.
+            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Raises:
-            InputError: wrong length, a number that is not finite, a batch that does not broadcast; gravity
-                that is not three finite numbers.
-            UnknownNameError: no such frame.
-            VerificationError: Pinocchio computes something else.
+            InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast, or a
+                gravity that is not three finite numbers.
+            UnknownNameError: the frame does not exist.
+            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
-        >>> robot = urdfkin.load("ur5")
-        >>> rest = robot.neutral(), [0.0] * 6, [0.0] * 6
-        >>> robot.imu(*rest, "base_link").tolist()
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> arm.imu([0.0, 0.0], [0.0, 0.0], [0.0, 0.0], "tip").tolist()  # at rest
         [0.0, 0.0, 9.81, 0.0, 0.0, 0.0]
         """
         g = vectors(gravity, "gravity")
         if g.shape != (3,):
-            raise InputError("gravity is one vector (3,)", found=f"shape {g.shape}")
+            raise InputError("gravity must be one vector (3,)", found=f"shape {g.shape}")
         return self._computed(
             "imu", (q, v, a), frame, Reference.LOCAL, base, out, verify, threads, gravity=g.tolist()
         )
@@ -826,37 +1042,37 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> SingularValues:
-        """The singular values of `jacobian` with guaranteed bounds, their condition and manipulability.
+        """Return the singular values of `jacobian` with guaranteed bounds, condition and manipulability.
 
-        They are the same in LOCAL and LOCAL_WORLD_ALIGNED. Columns that are 0 for every q are left out. Of
-        "all" rows, metres and radians are mixed as SI units mix them. How far J can be off, and what the
-        decomposition rounds, is in the bounds. Their product's gradient is
-        `found.manipulability_gradient(robot.hessian(q, frame))`.
+        The bounds include the rounding error of J and of the decomposition. Columns of J that are 0 for every
+        q are left out. The values are the same in LOCAL and LOCAL_WORLD_ALIGNED. With rows "all" they mix
+        metres and radians in SI units. `found.manipulability_gradient(robot.hessian(q, frame))` returns the
+        gradient of the manipulability.
 
         Args:
             q: (..., nq) rad, m.
-            frame: A link's or joint's name.
-            rows: "all", "linear" or "angular".
-            base: How the root link moves; None if it stands at the world's origin.
-            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
-                it to the robot.
-            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+            frame: Name of a link or joint; None: the robot's only tip.
+            rows: Rows of J: "all", "linear" or "angular".
+            base: Motion of the root link; None: fixed at the world origin.
+            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
+                as chosen in `load`.
+            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Raises:
-            InputError: wrong length, a number that is not finite, a batch that does not broadcast; other
-                rows.
-            UnknownNameError: no such frame.
-            VerificationError: Pinocchio computes another Jacobian.
+            InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast, or
+                another value of `rows`.
+            UnknownNameError: the frame does not exist.
+            VerificationError: Pinocchio's Jacobian differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
         >>> found = arm.singular_values([0.3, 0.0], arm.tip_frame, "linear")
-        >>> found.values.lower[-1] == 0.0, found.condition.upper  # stretched out: one is, or may be, 0
+        >>> found.values.lower[-1] == 0.0, found.condition.upper  # singular when stretched out
         (np.True_, np.float64(inf))
         """
         which = _ROWS.get(as_str(rows, "rows"))
         if which is None:
-            raise InputError("rows are all, linear or angular", found=safe_repr(rows))
+            raise InputError("rows must be 'all', 'linear' or 'angular'", found=safe_repr(rows))
         frame = self._default_frame() if frame is None else frame
         J = self.jacobian(q, as_str(frame, "frame"), base=base, verify=verify, threads=threads)
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,))
@@ -878,34 +1094,41 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """The manipulator Jacobian J = C^-1 J_v (7.122): derivatives of position and orientation by q.
+        """Return the analytical Jacobian J = C^-1 J_v (eq. 7.122), derivatives of position and orientation.
 
-        It is checked against Pinocchio's rotation and Jacobian, with the rates of the orientation's numbers
-        by a way of their own (`urdfkin.verify.analytical_reference`). The bound grows as 1 / s^2, s being the
-        sine or cosine of the middle angle: near the singularity that many digits are lost.
+        The orientation is three Euler angles or a quaternion. The check uses Pinocchio's rotation and
+        Jacobian, and an independent formula for the angle derivatives
+        (`urdfkin.verify.analytical_reference`). Near the representational singularity digits are lost: the
+        bound grows as 1 / s^2, where s is the sine or cosine of the middle angle.
 
         Args:
             q: (..., nq) rad, m.
-            frame: A link's or joint's name, or a list of names; the tip where there is one.
-            representation: Euler sequence by SciPy's name ("ZYZ" is the text's, "xyz" is rpy), or
-                "quaternion".
-            nearest: How near the representational singularity may be, radians.
-            base: How the root link stands; None if at the world's origin.
-            out: C-contiguous float64 array of the result's shape to write into.
-            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
-                it to the robot.
-            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+            frame: Name of a link or joint, or a list of names; None: the robot's only tip.
+            representation: Euler sequence by SciPy's name, or "quaternion". "ZYZ" is the textbook's, "xyz" is
+                roll-pitch-yaw.
+            nearest: Smallest accepted distance from the representational singularity, rad.
+            base: Placement of the root link; None: at the world origin.
+            out: Output array, C-contiguous float64 of the result's shape.
+            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
+                as chosen in `load`.
+            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Returns:
             (..., 6, nv), or (..., 7, nv) for a quaternion.
 
         Raises:
-            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`, or, when it
-                is to be checked, than rounding can tell (some 1e-13 rad); the error says how near. A
-                quaternion has none.
-            UnknownNameError: no such frame or representation.
-            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
-            VerificationError: Pinocchio computes something else.
+            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`. For a
+                checked call the limit is at least the rounding error, about 1e-13 rad. The error gives the
+                distance. A quaternion has no singularity.
+            UnknownNameError: the frame or representation does not exist.
+            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
+            VerificationError: Pinocchio's result differs by more than the bound.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> J = arm.analytical_jacobian([0.3, 0.4], representation="xyz")
+        >>> J.shape, J[5].tolist()  # yaw = q1 + q2
+        ((6, 2), [1.0, 1.0])
         """
         representation, nearest = as_str(representation, "representation"), real_number(nearest, "nearest")
         options: dict[str, Any] = {"representation": representation, "nearest": nearest}
@@ -935,9 +1158,9 @@ class Robot(Displayable):
             raise RepresentationSingularityError(representation, distance, call.index(k))
         if not np.isfinite(J).all():
             raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
-        handed_out = call.in_shape(J) if out is None else out
-        self.verifier.check(ANALYTICAL_JACOBIAN, call, handed_out, verify)
-        return handed_out
+        result = call.in_shape(J) if out is None else out
+        self.verifier.check(ANALYTICAL_JACOBIAN, call, result, verify)
+        return result
 
     def acceleration_breakdown(
         self,
@@ -952,31 +1175,42 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> AccelerationBreakdown:
-        """A frame's classical acceleration as a sum over joints and kinds: whose doing it is (7.125, 7.130).
+        """Return the contributions of each joint to a frame's classical acceleration (eq. 7.125, 7.130).
 
-        The kinds are transverse, centripetal, Coriolis and sliding. The sum is `acceleration`, and is checked
-        against Pinocchio's.
+        A joint has four kinds of contribution: transverse, centripetal, Coriolis and sliding. The sum of all
+        contributions equals `acceleration` and is compared with Pinocchio's.
 
         Args:
             q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s; those of planar and floating joints in the moving frame.
-            a: (..., nv) rad/s^2, m/s^2, likewise.
-            frame: A link's or joint's name; the tip where there is one.
-            reference: LOCAL_WORLD_ALIGNED: of the frame's origin, in world axes. LOCAL: of the origin, in the
-                frame's axes. WORLD: of the point of its body that is at the world's origin, in world axes.
-            base: How the root link moves; None if it stands at the world's origin.
-            out: C-contiguous float64 array (..., joints, 4, 6) to write the terms into.
-            verify: Whether Pinocchio checks this call; "sample" has 100 configurations checked; None leaves
-                it to the robot.
-            threads: How many compute a batch; None: every processor from 4,096 configurations on.
+            v: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
+            a: (..., nv) rad/s^2, m/s^2; in the same axes as `v`.
+            frame: Name of a link or joint; None: the robot's only tip.
+            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
+                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
+                world axes.
+            base: Motion of the root link; None: fixed at the world origin.
+            out: Output array for the terms, C-contiguous float64 (..., joints, 4, 6).
+            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
+                as chosen in `load`.
+            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Returns:
-            The parts, with the caller's batch shape in front; `print` and notebooks show them as a table.
+            The contributions, with leading batch axes; `print` and notebooks show them as a table.
 
         Raises:
-            InputError: wrong length, a number that is not finite, a batch that does not broadcast.
-            UnknownNameError: no such frame, reference or joint.
-            VerificationError: Pinocchio computes something else.
+            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
+            UnknownNameError: the frame, reference or joint does not exist.
+            VerificationError: Pinocchio's result differs by more than the bound.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> print(arm.acceleration_breakdown([0.0, 0.0], [1.0, 0.0], [0.0, 0.0], "tip"))
+        Acceleration by joint and kind
+        m/s^2 and rad/s^2; the parts sum to the acceleration (7.125, 7.130).
+        joint    kind         lin x  lin y  lin z  ang x  ang y  ang z
+        --------------------------------------------------------------
+        joint_1  centripetal   -0.9      0      0      0      0      0
+        sum                    -0.9      0      0      0      0      0
         """
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, as_str(frame, "frame"), reference, base, (q, v, a))
@@ -1003,27 +1237,28 @@ class Robot(Displayable):
         digits: int | None = None,
         hessian: bool = False,
     ) -> Enclosures:
-        """Intervals proven to contain the true placement, velocity, acceleration, J and J-dot of one sample.
+        """Return intervals that provably contain the true placement, velocity, acceleration, J and J-dot.
 
-        "True" are the equations' values (7.77, 7.85, 7.126 to 7.130) for the URDF's decimals as they are
-        written and the doubles of q, v, a and `base` as they are. For each number there are the two doubles
-        between which its value lies, nearly always neighbours, and whether urdfkin's own and Pinocchio's are
-        among them. That takes some five milliseconds for each joint before the frame.
+        The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130, without rounding. Their inputs are the
+        decimals in the URDF and the exact doubles of `q`, `v`, `a` and `base`. An interval has two doubles as
+        ends, which are nearly always neighbours. The result also states whether urdfkin's and Pinocchio's
+        values lie within. The time is about 5 ms for each joint before the frame.
 
         Args:
             q: (nq,) rad, m.
             v: (nv,) rad/s, m/s.
             a: (nv,) rad/s^2, m/s^2.
-            frame: A link's or joint's name.
-            reference: For which point and in which axes.
-            base: How the root link moves; None if it stands at the world's origin.
-            digits: Of the intervals' ends on the way; None: 30, and one for each joint before the frame: the
-                results' ends are then neighbouring doubles. 15, a double's, show what rounding can cost.
-            hessian: Whether the Hessian's are wanted too: a millisecond or so for each two joints.
+            frame: Name of a link or joint; None: the robot's only tip.
+            reference: Reference frame of velocities, accelerations and Jacobians.
+            base: Motion of the root link; None: fixed at the world origin.
+            digits: Decimal digits of the interval arithmetic, at least 15. None: 30, plus one for each joint
+                before the frame, which makes the ends neighbouring doubles. 15 digits, those of a double,
+                show the possible rounding error.
+            hessian: Also enclose the Hessian, about 1 ms for each pair of joints.
 
         Raises:
-            InputError: a batch, wrong length, or fewer digits than 15.
-            UnknownNameError: no such frame or reference.
+            InputError: a batch, a wrong length, or fewer than 15 digits.
+            UnknownNameError: the frame or reference does not exist.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -1040,20 +1275,31 @@ class Robot(Displayable):
         return enclose(self.verifier, self.plan, inputs, frame, reference, base, digits, hessian=hessian)
 
     def prepare(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> PreparedFrame:
-        """One frame in one reference, for one configuration after the other, without a check: see there.
+        """Return a fast evaluator of one frame without checks, one configuration per call.
+
+        `PreparedFrame` lists its methods.
+
+        Args:
+            frame: Name of a link or joint; None: the robot's only tip.
+            reference: Reference frame of its results.
 
         Raises:
-            UnknownNameError: no such frame or reference.
+            UnknownNameError: the frame or reference does not exist.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").prepare("tip")
+        >>> tip.velocity([0.0, 0.0], [1.0, 0.0]).tolist()
+        [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
         frame = self._default_frame() if frame is None else frame
-        # The hash of an enumeration's member takes longer than the rest of this. With its type in the key,
-        # 1, which is equal to a member, is not taken for it.
-        # Nor is `LinkFrame("link:a")` the frame of a link that is called so.
+        # Hashing an enumeration member takes longer than the rest of this function, so a plain name is a key
+        # by itself. The types in the key distinguish a member from an equal number, and `LinkFrame("link:a")`
+        # from a link with the literal name "link:a".
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         try:
             prepared = self._prepared.get(key)
-        except TypeError:  # no hash, and so hardly a name
+        except TypeError:  # not hashable, therefore not a valid name
             self.tree.frame_link(frame)
             return self.prepare(frame, Reference.of(reference))
         if prepared is None:
@@ -1062,16 +1308,26 @@ class Robot(Displayable):
         return prepared
 
     def compiled(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
-        """One frame compiled for this robot alone by the system's compiler, the fastest form: see there.
+        """Return an evaluator of one frame in machine code for this robot, the fastest form.
 
-        Each quantity is compiled when it is first asked for, some seconds once on a machine, and held against
-        Pinocchio. Without a compiler Numba's walk computes.
+        The system's C compiler compiles each quantity at its first use. That takes a few seconds, once on a
+        machine, and the compiled code is compared with Pinocchio. Without a C compiler, Numba's forward
+        recursion is used. `CompiledFrame` lists the methods.
+
+        Args:
+            frame: Name of a link or joint; None: the robot's only tip.
+            reference: Reference frame of its results.
 
         Raises:
-            UnknownNameError: no such frame or reference.
-            VerificationError: when it is first called: Pinocchio computes something else.
+            UnknownNameError: the frame or reference does not exist.
+            VerificationError: at the first call, if Pinocchio's result differs by more than the bound.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip.placement([0.0, 0.0])[:3, 3].tolist()
+        [0.9, 0.0, 0.0]
         """
-        from urdfkin.export.compiled_frame import CompiledFrame  # noqa: PLC0415  seldom wanted
+        from urdfkin.export.compiled_frame import CompiledFrame  # noqa: PLC0415  rarely used
 
         frame = self._default_frame() if frame is None else frame
         self.tree.frame_link(frame)
@@ -1090,31 +1346,31 @@ class Robot(Displayable):
         name: str | None = None,
         verify: bool | None = None,
     ) -> str:
-        """A frame's kinematics as straight-line code, with its proof in the same text.
+        """Return the kinematics of a frame as straight-line source code.
 
-        What is printed was held against Pinocchio; the text says how closely it agreed, and brings test
-        vectors with true values at fifty digits, which it can run by itself.
+        The code is compared with Pinocchio before it is returned. Its text states the agreement. It also
+        contains a self-test with true values at fifty digits.
 
         Args:
-            to: A language of `urdfkin.export.LANGUAGES`: "c", "numpy" and others.
-            frame: A link's or joint's name; the robot's tip when None.
-            quantities: "placement", "velocity", "jacobian", "jacobian_rate", "acceleration".
-            reference: For which point and in which axes.
-            name: What functions' names begin with; None: the robot's and the frame's.
-            verify: Whether Pinocchio checks it; None leaves it to the robot. Where it does not, the text's
-                first line says UNVERIFIED.
+            to: Language, one of `urdfkin.export.LANGUAGES`, such as "c" or "numpy".
+            frame: Name of a link or joint; None: `tip_frame`.
+            quantities: Any of "placement", "velocity", "jacobian", "jacobian_rate", "acceleration".
+            reference: Reference frame of velocities, accelerations and Jacobians.
+            name: Prefix of the function names; None: made of the names of the robot and the frame.
+            verify: True: check the code with Pinocchio. None: as chosen in `load`. The first line of
+                unchecked code states UNVERIFIED.
 
         Raises:
-            UnknownNameError: no such language, frame, quantity or reference.
-            InputError: no quantity, or one with a way of its own.
-            VerificationError: Pinocchio computes something else.
+            UnknownNameError: the language, frame, quantity or reference does not exist.
+            InputError: no quantity is given, or one that cannot be exported.
+            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
-        >>> code = urdfkin.load("ur5").export("numpy", "tool0", ["jacobian"])
+        >>> code = urdfkin.load("planar_two_link").export("numpy", "tip", ["jacobian"])
         >>> scope = {}
         >>> exec(code, scope)
-        >>> scope["jacobian"]([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]).shape
-        (6, 6)
+        >>> scope["jacobian"]([0.0, 0.0])[:2].tolist()
+        [[-0.0, -0.0], [0.9, 0.4]]
         """
         from urdfkin.export import write  # noqa: PLC0415
         from urdfkin.export.code import code_of  # noqa: PLC0415  loads mpmath
@@ -1127,25 +1383,40 @@ class Robot(Displayable):
     # -- chains and Denavit-Hartenberg tables ---------------------------------------------------------
 
     def chain(self, tip: str | None = None, base: str | None = None) -> FrameChain:
-        """The joints between two frames, down the tree, up, or through the common ancestor.
+        """Return the chain of joints between two frames.
+
+        The path may lead down the tree, up the tree, or through the common ancestor.
 
         Args:
-            tip: A link's or joint's name; the robot's tip when None.
-            base: Likewise; the robot's base frame when None.
+            tip: Name of a link or joint; None: `tip_frame`.
+            base: Name of a link or joint; None: `base_frame`.
 
         Raises:
-            UnknownNameError: no such frame.
-            InputError: a planar or floating joint lies on the way.
+            UnknownNameError: the frame does not exist.
+            InputError: the path contains a planar or floating joint.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").chain("tip", "base")
+        <FrameChain planar_two_link: base to tip, 2 joints>
         """
         return chain(
             self.tree, as_choice(tip, self.tip_frame, "tip"), as_choice(base, self.base_frame, "base")
         )
 
     def select(self, path: FrameChain | DHTable, q: Given) -> FloatArray:
-        """(..., coordinates) of a path or table out of the robot's `q` (..., nq).
+        """Return the coordinates of a chain or table, (..., coordinates), from the robot's `q` (..., nq).
+
+        Args:
+            path: A result of `chain` or `dh`.
+            q: (..., nq) rad, m.
 
         Raises:
-            InputError: `q` has another length than the robot's.
+            InputError: the length of `q` is not `nq`.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> arm.select(arm.chain("link_1", "base"), [0.1, 0.2]).tolist()
+        [0.1]
         """
         return path.coupling.select(self.tree, q)
 
@@ -1166,39 +1437,44 @@ class Robot(Displayable):
         like: DHTable | None = None,
         verify: bool | None = None,
     ) -> DHTable:
-        """The Denavit-Hartenberg table of the path between two frames, checked against Pinocchio.
+        """Return the Denavit-Hartenberg table of the path between two frames, checked with Pinocchio.
 
-        Its methods take the path's own coordinates, `table.joint_names`; `robot.select(table, q)` picks them
-        out of the robot's. The other arguments are those of `urdfkin.dh.dh_table`.
+        The table's methods take only the coordinates of the path, in the order of `table.joint_names`;
+        `robot.select(table, q)` returns them. `urdfkin.dh.dh_table` explains the other arguments in full.
 
         Args:
-            tip: A link's or joint's name; the robot's tip when None.
-            base: Likewise; the robot's base frame when None.
-            convention: "standard" (distal, the text's) or "modified" (proximal, Craig's).
-            near_parallel: "hayati" or "strict": what nearly parallel axes get.
-            snap: Radians within which angles are made multiples of 15 degrees; 0 for an exact table.
-            last: "tip" or "flange": whether the last row takes the tip.
-            parallel_offset: "last", "first" or "each".
-            flip: Joints to count the other way.
-            first: "base" or "joint": whether the first row takes the way from the base (Craig's d_1 is zero).
-            sign: How to choose the direction of x: "theta" (smallest), "a" or "alpha" (not negative).
-            slide: "drawn" or "minimal": where the lines of sliding joints are.
-            like: A published table, whose frames, senses and zeros are to be taken.
-            verify: Whether Pinocchio checks the table; None leaves it to the robot.
+            tip: Name of a link or joint; None: `tip_frame`.
+            base: Name of a link or joint; None: `base_frame`.
+            convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
+            near_parallel: Row type for nearly parallel axes, "hayati" or "strict".
+            snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
+            last: "tip": the last row reaches the tip. "flange": the tool transform does.
+            parallel_offset: Row that has the offset along a run of parallel axes: "last" (the first row after
+                the run), "first", or "each" (each row has that of its own link).
+            flip: Names of joints to count in the opposite sense.
+            first: "base": the first row includes the offset from the base. "joint": Craig's choice, d_1 = 0.
+            sign: Rule for the direction of x: "theta" (smallest), "a" or "alpha" (not negative).
+            slide: Position of the axes of sliding joints: "drawn" (as in the URDF) or "minimal".
+            like: A published table, a source of frames, senses and zeros; `flip`, `first`, `last`, `sign` and
+                `parallel_offset` are then ignored.
+            verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
-            UnknownNameError: a frame or a joint that does not exist.
-            InputError: an option's value, or a planar or floating joint on the way.
-            TableError: Pinocchio computes something else.
+            UnknownNameError: a frame or a joint does not exist.
+            InputError: an option has an invalid value, or the path contains a planar or floating joint.
+            TableError: Pinocchio's placements differ by more than the bound.
 
         Example:
             >>> import urdfkin
+            >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+            >>> [row.a for row in table.rows]
+            [0.5, 0.4]
             >>> urdfkin.load("ur5").dh("tool0", "base", snap=1e-6).rows[3].d
             0.10915
         """
         if not isinstance(like, DHTable | None):
             raise InputError(
-                "like is a table", found=safe_repr(like), remedy="read_table(FILE) of urdfkin.dh makes one"
+                "like must be a table", found=safe_repr(like), remedy="read one with urdfkin.read_table(FILE)"
             )
         table = dh_table(
             self.tree,
@@ -1222,22 +1498,22 @@ class Robot(Displayable):
     def screws(
         self, tip: str | None = None, base: str | None = None, *, verify: bool | None = None
     ) -> ProductOfExponentials:
-        """The product of exponentials of the path between two frames, checked against Pinocchio.
+        """Return the product of exponentials of the path between two frames, checked with Pinocchio.
 
         Args:
-            tip: A link's or joint's name; the robot's tip when None.
-            base: Likewise; the robot's base frame when None.
-            verify: Whether Pinocchio checks it; None leaves it to the robot.
+            tip: Name of a link or joint; None: `tip_frame`.
+            base: Name of a link or joint; None: `base_frame`.
+            verify: True: check it with Pinocchio. None: as chosen in `load`.
 
         Raises:
-            UnknownNameError: a frame that does not exist.
-            InputError: a planar or floating joint on the way.
-            TableError: Pinocchio computes something else.
+            UnknownNameError: a frame does not exist.
+            InputError: the path contains a planar or floating joint.
+            TableError: Pinocchio's placements differ by more than the bound.
 
         Example:
             >>> import urdfkin
-            >>> urdfkin.load("ur5").screws("tool0", "base").space[0].tolist()
-            [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+            >>> urdfkin.load("planar_two_link").screws("tip", "base").space[1].tolist()  # [w; v]
+            [0.0, 0.0, 1.0, 0.0, -0.5, 0.0]
         """
         found = screws_of(self.chain(tip, base))
         if self.verifier.wanted(verify):
@@ -1245,30 +1521,41 @@ class Robot(Displayable):
         return found
 
     def tree_parameters(self, *, verify: bool | None = None) -> TreeParameters:
-        """Khalil and Kleinfinger's parameters of the whole robot as one table, checked against Pinocchio.
+        """Return the Khalil-Kleinfinger parameters of the whole robot as one table, checked with Pinocchio.
 
         Args:
-            verify: Whether Pinocchio checks it; None leaves it to the robot.
+            verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
-            InputError: a planar or floating joint, which has no single axis.
-            TableError: Pinocchio computes something else.
+            InputError: the robot has a planar or floating joint, which has no single axis.
+            TableError: Pinocchio's placements differ by more than the bound.
+
+        >>> import urdfkin
+        >>> [(row.joint, row.d) for row in urdfkin.load("planar_two_link").tree_parameters().rows]
+        [('joint_1', 0.0), ('joint_2', 0.5), ('end', 0.4)]
         """
         parameters = tree_parameters(self.tree)
         if self.verifier.wanted(verify):
             self.verifier.tree_parameters(parameters)
         return parameters
 
-    # -- what it is worth ----------------------------------------------------------------------------
+    # -- verification --------------------------------------------------------------------------------
 
     def certificate(self) -> Certificate:
-        """What was checked so far, how closely it agreed, by whom, and what was not checked."""
+        """Return the record of all checks so far: the oracle, the agreement, and the unchecked results.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> J = arm.jacobian([0.0, 0.0], "tip")
+        >>> arm.certificate().verified
+        True
+        """
         return self.verifier.certificate()
 
-    # -- inside --------------------------------------------------------------------------------------
+    # -- internal ------------------------------------------------------------------------------------
 
     def plan(self, links: Sequence[int]) -> CompiledTree:
-        """The walk that meets the given links, made once."""
+        """Return the compiled tree of the joints that move the given links; it is built once."""
         key = tuple(links)
         if (plan := self._plans.get(key)) is None:
             plan = self._plans[key] = compile_tree(self.tree, key)
@@ -1300,7 +1587,7 @@ class Robot(Displayable):
     def _fast(
         self, frame: str | Sequence[str] | None, reference: Reference | str, verify: Verify | None
     ) -> PreparedFrame | None:
-        """The short way for a single configuration that nobody checks; None where it is not for this call."""
+        """Return the fast evaluator for an unchecked call; None if the call needs the general code."""
         if verify is not False and (verify is not None or self.verifier.policy is not False):
             return None
         if frame is None:

@@ -68,7 +68,7 @@ def test_a_strict_table_that_loses_more_than_the_robots_rounding_says_how_many_m
     assert longest > 1e11
     assert not check.within
     assert check.agrees
-    predicted = f"eps times that is {EPS * longest * 1e3:.2g} mm"
+    predicted = f"which rounds by {EPS * longest * 1e3:.2g} mm"
     assert predicted in str(check)
     assert 1e-3 * EPS * longest <= check.metres <= 100.0 * EPS * longest
 

@@ -103,7 +103,7 @@ CASES: dict[str, tuple[Callable[[pytest.MonkeyPatch], Document], list[str], str,
         (1, 0),
     ),
     "tables, no number": (_tables_without_numbers, ["disagrees"], "disagree: beyond all numbers", 1, (1, 0)),
-    "refused": (_refused, ["not verified"], "memory grows with the cube of the rates", 3, (1, 0)),
+    "refused": (_refused, ["not verified"], "memory grows with nv^3", 3, (1, 0)),
     "bad input": (_broken, ["bad input"], "URDF", 2, (0, 1)),
     "crash": (_crashed, ["not verified"], "please report it: MemoryError: no message", 3, (1, 0)),
     "interrupt": (

@@ -35,7 +35,7 @@ def test_the_table_is_printed_with_its_check() -> None:
     assert "ur5: base to tool0, standard Denavit-Hartenberg parameters" in result.stdout
     assert "2  shoulder_lift_joint     -425            0       0           q2" in result.stdout
     assert "guaranteed" in result.stdout
-    assert "agrees within rounding and what was snapped" in result.stdout
+    assert "agrees within rounding and snapping" in result.stdout
 
 
 def test_the_forms_of_the_command_are_those_of_the_package() -> None:

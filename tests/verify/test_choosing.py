@@ -236,9 +236,9 @@ def test_a_robot_may_be_loaded_to_check_samples_and_a_call_ask_for_more_or_less(
 
 @pytest.mark.parametrize("verify", ["sampled", "", "True", 1, 0, None, np.True_, np.ones(2), ["sample"]])
 def test_what_is_no_choice_is_refused(fresh: Robot, verify: object) -> None:
-    with pytest.raises(InputError, match='verify is True, False or "sample"'):
+    with pytest.raises(InputError, match='verify must be True, False or "sample"'):
         urdfkin.load("ur5", verify=verify)  # type: ignore[arg-type]
     if verify is not None:
-        with pytest.raises(InputError, match='verify is True, False or "sample"'):
+        with pytest.raises(InputError, match='verify must be True, False or "sample"'):
             fresh.jacobian(fresh.neutral(), "panda_hand", verify=verify)  # type: ignore[arg-type]
     assert fresh.certificate().lines == ()

@@ -341,7 +341,7 @@ def test_a_base_and_a_batch_shape_are_taken_and_bad_words_refused() -> None:
     alone = robot.singular_values(q[1, 2], "tool0", base=BaseMotion(T))
     np.testing.assert_allclose(found.values.value[1, 2], alone.values.value, rtol=1e-14)
     assert {line.quantity for line in robot.certificate().lines} == {"jacobian"}
-    with pytest.raises(InputError, match="rows are all, linear or angular: found 'both'"):
+    with pytest.raises(InputError, match="rows must be 'all', 'linear' or 'angular': found 'both'"):
         robot.singular_values(q, "tool0", "both")
     with pytest.raises(UnknownNameError, match="tool1"):
         robot.singular_values(q, "tool1")

@@ -1,1 +1,1 @@
-"""How exact a result must be, and how exact it was: bounds, comparison, sampling, certificates, reports."""
+"""Verification: compare results with an oracle, within derived bounds, and certify the agreement."""

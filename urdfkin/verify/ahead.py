@@ -1,4 +1,4 @@
-"""All kernels that a check needs, loaded before it does."""
+"""Load the compiled kernels of all checks in advance."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from urdfkin.verify import comparison, mimic_columns
 
 
 def load_kernels() -> None:
-    """Compile every kernel, or read it from disk: before processes start that would all compile."""
+    """Compile each kernel or read it from disk, before worker processes start that would each compile it."""
     load_cores()
     comparison.load_kernel()
     mimic_columns.load_kernel()

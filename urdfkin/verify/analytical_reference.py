@@ -1,13 +1,17 @@
-"""Rates of an orientation's numbers from a rotation matrix and angular velocities, without any angle.
+"""Analytical Jacobians from a rotation matrix and a velocity Jacobian, without computing any angle.
 
-The second opinion on 7.122, for the check: nothing here is shared with `urdfkin.kinematics.rotation` or
-`urdfkin.kinematics.bodies`. A sequence turns about i, then j, then k; in R = R_i R_j R_k the first axis is
-e_i, the third R e_k, and the middle one, the line of nodes, is perpendicular to both. Which of its two senses
-counts is said by the range of the middle angle b: [0, pi] where k is i again, [-pi/2, pi/2] where it is not.
-With n = e_i x R e_k, the middle axis is n / |n| in the first case, and in the second that times e_j x e_i .
-e_k;
-|n| is |sin b|, or |cos b|. The rates are products of w with the reciprocal basis of the three axes. The judge
-puts arrays of fifty digits into the same lines.
+This is an independent computation of eq. 7.122, for the check. It shares no code with
+`urdfkin.kinematics.rotation` and `urdfkin.kinematics.bodies`.
+
+An Euler sequence rotates about i, then j, then k, so that R = R_i R_j R_k. The first axis is e_i and the
+third is R e_k. The middle axis, the line of nodes, is perpendicular to both: n / |n| with n = e_i x R e_k.
+The range of the middle angle b determines its sign:
+
+- k = i: b is in [0, pi], the sign is +1, and |n| = |sin b|.
+- k != i: b is in [-pi/2, pi/2], the sign is (e_j x e_i) . e_k, and |n| = |cos b|.
+
+The angle derivatives are the products of w with the reciprocal basis of the three axes. The functions also
+accept arrays of fifty-digit numbers, which the accuracy study uses.
 """
 
 from __future__ import annotations
@@ -17,17 +21,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-#: Floats, or numbers of the judge's.
+#: Floats, or the fifty-digit numbers of the accuracy study.
 Numbers = NDArray[Any]
 
 
 def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Numbers]:
-    """Rates of position and of three angles, and how far the representation is from its singularity.
+    """Return the derivatives of position and three Euler angles, and the distance from the singularity.
 
     Args:
-        name: Sequence, SciPy's name: capitals turn with the body, small letters stay fixed.
-        R: (..., 3, 3) rotation.
-        J_v: (..., 6, n) [linear; angular], in the axes that R turns to.
+        name: Sequence by SciPy's name. Capital letters are body axes, small letters fixed axes.
+        R: (..., 3, 3) rotation from body axes to world axes.
+        J_v: (..., 6, n) velocity Jacobian, [linear; angular], in world axes.
 
     Returns:
         (..., 6, n) and (...) |sin b| or |cos b| of the middle angle.
@@ -47,11 +51,11 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
 
 
 def quaternion_jacobian(quat: Numbers, J_v: Numbers) -> Numbers:
-    """Rates of position and of a unit quaternion: half the product of (w, 0) and the quaternion.
+    """Return the derivatives of position and unit quaternion; the latter are half of (w, 0) times quat.
 
     Args:
-        quat: (..., 4) scalar last.
-        J_v: (..., 6, n) as for `euler_jacobian`.
+        quat: (..., 4) unit quaternion, scalar last.
+        J_v: (..., 6, n) as in `euler_jacobian`.
 
     Returns:
         (..., 7, n).

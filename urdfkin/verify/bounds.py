@@ -1,34 +1,37 @@
-"""The recursion on lengths: how large the terms are that a frame's motion is summed from.
+"""Bounds on the difference between two correct computations of a quantity.
 
-The equations of 7.58 and 7.127 to 7.130 run on `urdfkin.kinematics.number_kinds`, so that no intermediate
-value can exceed what is found here.
-
-One term is Pinocchio's alone: where 7.129 has v_i w_{i-1} x z it has v_i w_i x z. The joint's own share of
-w_i is parallel to z and adds nothing but rounding, v_i^2 |z x z|, which fast joints about an axis askew do
-show: the scale of alpha counts it, by giving the equation the w of the link behind the joint.
-
-
-How far two correct computations may differ: the roundings that they count, times the size of their terms.
-
-A result is accepted when every number differs from Pinocchio's by at most
+A result is accepted if each number differs from the oracle's by at most
 
     k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
 
-*scale* is the size of the terms that the number is summed from, in its own unit (`magnitudes`): two
-computations that add the same terms in another order differ in proportion to the terms, not to their sum.
+*scale* is the size of the terms that the number is summed from, in its own unit (`magnitudes`). Two
+computations that add the same terms in a different order differ in proportion to the terms, not to their sum.
 
-*k* counts roundings, to first order in eps (`urdfkin.kinematics.roundings`): so many for each joint on the
-path, each of which turns what is behind it. Rotations do not stretch what was wrong before, so the error
-grows with the number of joints and no faster.
+*k* counts roundings to first order in eps (`urdfkin.kinematics.roundings`), a fixed number for each joint on
+the path. Each joint rotates the result of the joints after it. Rotations do not amplify an error, so the
+error grows only linearly with the number of joints.
 
-A quantity is multilinear in rotated vectors, each a *factor* that may be off by as much: a position has one
-in each term (R d), a velocity two (w and d), an acceleration three (w, w, d, or v z, w, d), a Jacobian's
-linear rows two (z and d), its rate's three (w, z and d), its Hessian's three (z, z and d); seeing it in the
-frame's own axes is one factor more, seeing it from the world's origin crosses it with p and is one more.
+A quantity is multilinear in rotated vectors. Each vector is a *factor* with its own rounding error:
 
-Rounding seldom conspires as it would have to. What is measured is a fraction of an eps for each
-joint, and reports give the disagreement itself, in multiples of eps * scale, so that it can be compared
-across robots.
+| Quantity | Factors | Vectors in a term |
+|---|---|---|
+| position | 1 | R d |
+| velocity | 2 | w, d |
+| acceleration | 3 | w, w, d, or v z, w, d |
+| Jacobian, linear rows | 2 | z, d |
+| J-dot, linear rows | 3 | w, z, d |
+| Hessian, linear rows | 3 | z, z, d |
+
+LOCAL and WORLD need one factor more: a rotation into the frame's axes, or a cross product with p.
+
+Measured differences are a fraction of an eps for each joint, because rounding errors rarely add up in the
+worst way. Reports give them in multiples of eps * scale, which are comparable across robots.
+
+`magnitudes` runs the recursion on lengths. It evaluates eq. 7.58 and 7.127 to 7.130 with the number types of
+`urdfkin.kinematics.number_kinds`, so that no intermediate value exceeds its result. One of its terms occurs
+only in Pinocchio: eq. 7.129 has v_i w_{i-1} x z, Pinocchio has v_i w_i x z. The joint's own part of w_i is
+parallel to z and contributes only rounding, v_i^2 |z x z|. It matters for fast joints with an oblique axis.
+The scale of alpha includes it, because the equation receives the w of the link after the joint.
 """
 
 from __future__ import annotations
@@ -46,21 +49,21 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
 _UNTURNED = np.eye(3).ravel()
-_Z = 1.0  #: A joint's axis is as long as this.
+_Z = 1.0  #: Length of a joint's axis.
 
 
 @dataclass(frozen=True, slots=True)
 class Magnitudes:
-    """Upper bounds on the size of everything that enters a frame's motion.
+    """Upper bounds on the terms of a frame's position, velocity and acceleration.
 
     Attributes:
-        p: (n, frames) m: the length of the path from the world's origin, slides included.
-        w: (n, frames) rad/s.
-        vel: (n, frames) m/s.
-        alpha: (n, frames) rad/s^2.
-        acc: (n, frames) m/s^2.
-        roundings: (n, frames) of a factor: of each URDF joint on the path, of a base that is turned, and of
-            one joint more.
+        p: (n, frames) length of the path from the world origin, prismatic displacements included, m.
+        w: (n, frames) angular velocity, rad/s.
+        vel: (n, frames) linear velocity, m/s.
+        alpha: (n, frames) angular acceleration, rad/s^2.
+        acc: (n, frames) linear acceleration, m/s^2.
+        roundings: (n, frames) roundings of one factor: those of each URDF joint on the path, of a rotated
+            base, and of one additional joint.
     """
 
     p: FloatArray
@@ -75,9 +78,15 @@ class Magnitudes:
 def magnitudes(
     plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: FloatArray
 ) -> Magnitudes:
-    """For flat batches q (n, nq), v and a (n, nv) or None, and a base state (1 or n, 24).
+    """Return the magnitudes of the frames of a compiled tree.
 
-    Without v, only p and roundings are those of the frames: what depends on places alone needs no more.
+    Args:
+        plan: The compiled tree.
+        q: (n, nq) rad, m.
+        v: (n, nv) or None. Without v only `p` and `roundings` are valid, which suffices for placements and
+            Jacobians.
+        a: (n, nv) or None.
+        base: (1 or n, 24) state of the moving base.
     """
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
@@ -96,8 +105,8 @@ def magnitudes(
     for f, (step, place) in enumerate(plan.frames):
         carried = carry(states[step + 1], lengths[len(plan.steps) + f])
         for row, values in zip(out, carried, strict=False):
-            row[:, place] = values  # what is the same for all configurations is one number
-    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # such a base rounds like a joint
+            row[:, place] = values  # a value equal for all configurations is a scalar
+    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # a rotated base rounds like a joint
     out[5] = of_joints(plan.depth + 1 + turned[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
@@ -118,7 +127,7 @@ def _carry_place(state: list[FloatArray], d: FloatArray | float) -> list[FloatAr
 
 
 def _slid(plan: CompiledTree, i: int, q: FloatArray) -> FloatArray:
-    """How far a joint slides."""
+    """Return a bound on the displacement of a prismatic, planar or floating joint, (n,) m."""
     kind, at = int(plan.steps[i, Step.KIND]), int(plan.steps[i, Step.Q])
     if kind != Motion.SLIDE:
         return norm(q[:, at : at + (2 if kind == Motion.PLANAR else 3)])
@@ -165,17 +174,17 @@ def _step(
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
-#: A scale beyond the range of doubles is inf; `disagreement` accepts nothing there.
+#: A scale above the range of doubles is inf; `disagreement` then accepts no result.
 _BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """What a quantity is measured against, each array shaped to broadcast against the results.
+    """The bound k * eps * scale of a quantity; both arrays broadcast against the results.
 
     Attributes:
-        scale: The size of the terms, in the result's units; 0 where a result must agree exactly.
-        k: How many eps of it two correct computations may differ by.
+        scale: Size of the terms, in the result's units; 0 where the results must be equal.
+        k: Allowed difference in multiples of eps * scale.
     """
 
     scale: FloatArray
@@ -183,16 +192,16 @@ class Bound:
 
 
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """`k` for each result, the same for all its numbers; `leading` axes count results.
+    """Return `k` of each result, an array of shape `leading`; all numbers of a result share it.
 
-    A k that allows nothing, less, or anything is no number: no share of it is within the bound.
+    A k that is not finite and positive becomes NaN, so that no result is within its bound.
     """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
     return np.broadcast_to(np.where((k > 0.0) & (k < np.inf), k, np.nan), leading)
 
 
 def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
-    """A scale (n, frames, ...) with `k` for each result: its factors, times what each may be off by."""
+    """Return the bound of a scale (n, frames, ...): k is the number of factors times their roundings."""
     factors += reference is not _ALIGNED
     k = factors * size.roundings
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
@@ -200,13 +209,13 @@ def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Refer
 
 @_BEYOND
 def about_the_root(size: Magnitudes) -> Magnitudes:
-    """The magnitudes that hold between urdfkin and MuJoCo.
+    """Return the magnitudes for a comparison of urdfkin with MuJoCo.
 
-    MuJoCo keeps velocities, accelerations and Jacobians' columns about a centre of mass, at the root here
-    (`urdfkin.verify.mujoco`), and brings them to the frame at the end. What it adds up are the lengths of
-    another point, which is no farther from a joint, nor from the frame, than the path is long: levers of 2 p.
-    Both steps cross with a lever, which is a factor more: of one it makes two, of three four, never more than
-    twice as many. Each joint rounds by `MUJOCO` instead of `ROUNDINGS`.
+    MuJoCo stores velocities, accelerations and Jacobian columns for a centre of mass, which is at the root
+    here (`urdfkin.verify.mujoco`). It moves them to the frame at the end. The distance of that point from a
+    joint or from the frame is at most the length of the path, so lever arms are at most 2 p. Both steps use
+    a cross product with a lever arm, which is one factor more. That at most doubles the number of factors.
+    Each joint rounds by `MUJOCO` instead of `ROUNDINGS`.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -221,7 +230,7 @@ def about_the_root(size: Magnitudes) -> Magnitudes:
 
 
 def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
-    """For (n, frames, 4, 4): the path's length for positions, 1 for rotations, 0 for the last row."""
+    """Return (n, frames, 4, 4): the path's length for positions, 1 for rotations, 0 for the last row."""
     scale = np.zeros((*size.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
     scale[..., :3, 3] = size.p[..., None]
@@ -230,20 +239,21 @@ def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
 
 @_BEYOND
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
-    """For (n, frames, 4, 4), between the tree that was made of an MJCF file and MuJoCo's model of the file.
+    """Return the bound between the tree made of an MJCF file and MuJoCo's model of that file.
 
-    The tree has added up already what MuJoCo adds up anew: a body's place, its joints' anchors there and
-    back, a slide's reference value. So positions have the length of all that, where it exceeds the path's.
+    The tree contains sums that MuJoCo computes at each configuration: a body's position, the anchors of its
+    joints, a slide's reference value. The scale of positions is the length of these terms if it exceeds the
+    path's.
 
-    MuJoCo turns a hinge by fl(q - ref), the tree by ref and by q. The difference is rounded once, by (eps/2)
-    (|q| + |ref|) rad at most. That turns what is behind the hinge: a number of a rotation changes by the
-    angle at most, one of a position by the angle times the length. Twice that is allowed, to have room for
-    the second order; as a share of k eps it is angle / k.
+    MuJoCo rotates a hinge by fl(q - ref), the tree by ref and by q. The difference is rounded once, by at
+    most (eps/2) (|q| + |ref|) rad. That rotates everything after the hinge. A number of a rotation changes by
+    at most the angle, a number of a position by at most the angle times the length. The bound allows twice
+    that, for terms of second order. As a fraction of k eps it is angle / k.
 
     Args:
-        bound: Of the placements, for the tree.
-        lengths: (n, frames) what MuJoCo adds up: m.
-        angles: (n, frames) the sum of |q| + |ref| over the hinges that have a reference value: rad.
+        bound: Bound of the tree's placements, (n, frames, 4, 4).
+        lengths: (n, frames) sum of the lengths of the terms in MuJoCo, m.
+        angles: (n, frames) sum of |q| + |ref| over the hinges with a reference value, rad.
     """
     scale = bound.scale.copy()
     scale[..., :3, 3] = np.maximum(scale[..., :3, 3], lengths[..., None])
@@ -253,7 +263,7 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
 
 @_BEYOND
 def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
-    """For (n, frames, 6)."""
+    """Return (n, frames, 6), the size of the terms of [linear; angular] velocities."""
     linear = size.vel
     if reference is Reference.WORLD:
         linear = eq.point_velocity(linear, size.w, size.p)
@@ -262,13 +272,17 @@ def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
 
 @_BEYOND
 def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
-    """For (n, frames, 6). Pinocchio goes through spatial accelerations, which differ by w x vel.
+    """Return (n, frames, 6), the size of the terms of [linear; angular] accelerations.
 
-    It is that of a breakdown's sum too. There the terms are gathered by joints: v_k z x (v_k z x d_k) and
-    2 w_{k-1} x (v_k z x d_k) with d_k from the joint to the frame have the lengths (w_k^2 - w_{k-1}^2) d_k, w
-    being the sum of the rates so far, and added over the joints they are w^2 times each link's own length, as
-    in 7.130. The d_k, interorigin vectors added up from the frame, round as the sums of 7.77 do, and adding
-    up the 4 n parts rounds n + 3 times: both are less than the 2 eps that each joint has for sums.
+    Pinocchio computes classical accelerations from spatial ones, which differ by w x vel. The scale includes
+    that term.
+
+    The scale also holds for the sum of an acceleration breakdown, which groups the terms by joints. With d_k
+    from joint k to the frame, the terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have the length
+    (w_k^2 - w_{k-1}^2) d_k. Here w_k is the sum of the joint velocities up to joint k. Their sum over the
+    joints is w^2 times the length of each link, as in eq. 7.130. The d_k are sums of interorigin vectors and
+    round like the sums of eq. 7.77. The sum of the 4 n parts rounds n + 3 times. Both are below the 2 eps
+    that each joint has for sums.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
@@ -279,12 +293,12 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
 
 @_BEYOND
 def imu_scale(size: Magnitudes, gravity: FloatArray) -> FloatArray:
-    """For (n, frames, 6): gravity (3,) is one term more, which may cancel the others."""
+    """Return (n, frames, 6), the size of the terms of an IMU reading; gravity (3,) is one more term."""
     return _six(size.acc + eq.tangential(size.w, size.vel) + norm(gravity), size.w)
 
 
 def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    """(..., 6) from (...): the same for each of the three linear numbers, and for each angular one."""
+    """Return (..., 6) from two arrays (...): three equal linear numbers and three equal angular ones."""
     scale = np.empty((*linear.shape, 6))
     scale[..., :3] = linear[..., None]
     scale[..., 3:] = angular[..., None]
@@ -292,7 +306,7 @@ def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
 
 
 def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    """(..., 6, nv) from (..., nv), likewise."""
+    """Return (..., 6, nv) from two arrays (..., nv): three equal linear and three equal angular rows."""
     scale = np.empty((*linear.shape[:-1], 6, linear.shape[-1]))
     scale[..., :3, :] = linear[..., None, :]
     scale[..., 3:, :] = angular[..., None, :]
@@ -301,7 +315,10 @@ def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 
 @_BEYOND
 def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
-    """For (n, frames, 6, nv): the path's length for turning columns, 1 for sliding ones, 0 for idle ones."""
+    """Return (n, frames, 6, nv), the size of the terms of Jacobians.
+
+    Linear rows: the path's length for revolute columns, 1 for prismatic ones, 0 for joints off the path.
+    """
     turning, sliding = column_weights(plan)
     linear, angular = eq.turning_column(turning, size.p[..., None])
     return _six_rows(linear + sliding, angular)
@@ -309,10 +326,10 @@ def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
 
 @_BEYOND
 def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
-    """For (n, frames, 6, nv).
+    """Return (n, frames, 6, nv), the size of the terms of J-dot.
 
-    A frame's turning columns are no longer than its path, and their arms change no faster than its origin
-    moves. In LOCAL the rate is that of the numbers in the frame's own axes.
+    A revolute column is at most as long as the frame's path. Its lever arm changes at most as fast as the
+    frame's origin moves. In LOCAL the numbers are those in the frame's axes, which rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
@@ -325,8 +342,8 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     return _six_rows(linear, angular)
 
 
-#: Of a pair of columns whose second comes before the first, or with it, and of one whose second comes behind:
-#: how many products z x (z x d) Pinocchio's linear rows are summed from, and how many z x z where one slides.
+#: Number of products in a linear row of Pinocchio's Hessian: z x (z x d) of two revolute joints, and z x z of
+#: a revolute and a prismatic one. First for pairs with j before or equal to i, then for pairs with j after i.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -336,15 +353,19 @@ _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = 
 
 @_BEYOND
 def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
-    """For (n, frames, 6, nv, nv): of pairs of columns, a follower's with its leader's.
+    """Return (n, frames, 6, nv, nv), the size of the terms of Hessians, summed over pairs of columns.
 
-    No d is longer than the path. Pinocchio takes all from two columns c = [z x d; z] for the world's origin,
-    and is counted by the products that it adds: c_1 x c_2 has two in its linear rows, w_1 x v_2 + v_1 x w_2;
-    to go to a frame's origin p is p x (w_1 x w_2), one more; to have the other column there, (v - p x w) x w,
-    two. So the five, two and three of `_PAIR_TERMS`. urdfkin needs one, z x (z x d), or the two of c_1 x c_2.
+    The column of a mimic joint counts for the coordinate of the mimicked joint. No d is longer than the path.
+    Pinocchio computes each entry from two columns c = [z x d; z] at the world origin. The products it adds
+    are:
 
-    In LOCAL urdfkin pairs columns that were turned back, each by R: two products of five factors, R, z, R, z
-    and d, less than the three of four that are allowed for.
+    - two for c_1 x c_2, whose linear rows are w_1 x v_2 + v_1 x w_2
+    - one more to move the result to the frame's origin p, p x (w_1 x w_2)
+    - two more to move the other column there, (v - p x w) x w
+
+    These give the five, two and three of `_PAIR_TERMS`. urdfkin needs one product, z x (z x d), or the two of
+    c_1 x c_2. In LOCAL urdfkin rotates both columns by R first. Its two products of five factors (R, z, R, z,
+    d) are below the allowed three products of four.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -370,24 +391,30 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
 
 @_BEYOND
 def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> Bound:
-    """For (n, frames, 6, nv): the positions' rows are those of the Jacobian; it grows near the singularity.
+    """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
 
-    The rates of the outer angles are r . w, that of the middle one u . w, with the reciprocal basis of
-    the axes e_i, u and t = R e_k (`line_of_nodes`): |u| = 1, |r| = 1 / s, where s = |e_i x t| is the sine or
-    cosine of the middle angle. When t is off by no more than delta = k eps, u turns by delta / s, and r,
-    as -(r . du) u - (r . dt) r' shows, changes by 2 delta / s^2, with the least s there is: `apart` - delta.
-    With w off by delta of its size, the sums are 2 delta / s^2 + delta / s, at most 3 delta / s^2, and
-    delta / s + delta, at most 2 delta / s. In scales for the two factors of the Jacobian that is 1.5 / s^2
-    and 1 / s. What the angles' own arithmetic rounds (some 3 eps for arctan2 and its sine, 10 eps for
-    products and quotients, on either side) is held by the joint counted more: there is no offset to add here.
+    The position rows have the Jacobian's bound. The angle rows are r . w for the outer angles and u . w for
+    the middle angle, with the reciprocal basis of the axes e_i, u and t = R e_k (`analytical_reference`).
+    Here |u| = 1 and |r| = 1 / s, where s = |e_i x t| is the sine or cosine of the middle angle.
+
+    Let t have the error delta = k eps. Then u rotates by delta / s. By -(r . du) u - (r . dt) r', r changes
+    by 2 delta / s^2, with the smallest possible s, `apart` - delta. Let w have the relative error delta too.
+    Then the errors are:
+
+    - outer angles: 2 delta / s^2 + delta / s <= 3 delta / s^2
+    - middle angle: delta / s + delta <= 2 delta / s
+
+    The Jacobian's bound has two factors, so the scales are 1.5 / s^2 and 1 / s times the Jacobian's. The
+    arithmetic of the angles rounds about 3 eps for arctan2 and its sine and 10 eps for products and
+    quotients, on both sides. The additional joint in `roundings` covers that.
 
     Args:
-        bound: The Jacobian's.
-        size: Of the frames.
+        bound: Bound of the Jacobian.
+        size: Magnitudes of the frames.
         apart: (n, frames) s of Pinocchio's rotation.
     """
     s = apart - EPS * size.roundings
-    s = np.where(s > 0.0, s, 0.0)  # where rounding hides the singularity nothing is accepted
+    s = np.where(s > 0.0, s, 0.0)  # accept no result if s is below its rounding error
     scale = bound.scale.copy()
     with np.errstate(divide="ignore"):
         scale[..., [3, 5], :] *= (1.5 / (s * s))[..., None, None]
@@ -396,30 +423,31 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
 
 
 def quaternion_jacobian_bound(bound: Bound) -> Bound:
-    """For (n, frames, 7, nv): the positions' rows are those of the Jacobian; there is no singularity.
+    """Return the bound of analytical Jacobians with quaternions, (n, frames, 7, nv); no singularity.
 
-    A row of 4 q q^T is linear in R, off by less than 4.6 delta and at least 2 long, so that q is off by
-    2.3 delta, half the product of w and q by (2.3 + 1) / 2 delta of w: less than the Jacobian's two factors.
+    The position rows have the Jacobian's bound. A row of 4 q q^T is linear in R. Its error is below
+    4.6 delta and its length at least 2, so the error of q is below 2.3 delta. Half the product of w and q has
+    an error of (2.3 + 1) / 2 delta relative to w, which is below the Jacobian's two factors.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
 
 def hidden_scalar(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Below what |qw| rounding hides its sign: k eps is 2 delta, so that this is 3, and q is off by 2.3."""
+    """Return the |qw| below which rounding hides the sign: 1.5 k eps = 3 delta, above q's error 2.3 delta."""
     return 1.5 * EPS * result_k(bound, leading)
 
 
 def nearest_singularity(plan: CompiledTree) -> float:
-    """From where on (rad) rounding leaves Euler rates a digit: four times what R may be off by."""
+    """Return the smallest distance from the singularity with a valid digit, rad: four times R's error."""
     return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """(frames, nv) each: the sum of the mimic multipliers that turn, or slide, along each column."""
-    made: tuple[FloatArray, FloatArray] | None = plan.made.get("column weights")
-    if made is None:
-        made = plan.made["column weights"] = _column_weights(plan)
-    return made
+    """Return two (frames, nv): the sum of |multiplier| of each column's revolute and prismatic joints."""
+    weights: tuple[FloatArray, FloatArray] | None = plan.made.get("column weights")
+    if weights is None:
+        weights = plan.made["column weights"] = _column_weights(plan)
+    return weights
 
 
 def _column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
@@ -433,10 +461,10 @@ def _column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
 
 
 def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
-    """(frames, 6, nv) which numbers of a Jacobian are not 0 for every q, the base being where it may.
+    """Return (frames, 6, nv), True for the numbers of a Jacobian that are not 0 for every q and base.
 
-    The linear rows of a turning column are z x d. There d is 0 for every q where the path has no length and
-    nothing slides on it, from the joint to the frame, or in WORLD from the root to the joint.
+    The linear rows of a revolute column are z x d. There d is 0 for every q if the path has no length and no
+    prismatic joint. That is the path from the joint to the frame, or in WORLD from the root to the joint.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
     turns, multipliers = plan.steps[:, Step.KIND] == Motion.TURN, plan.geometry[:, Geometry.MULTIPLIER :]
@@ -460,9 +488,9 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
 
 
 def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
-    """|ours - theirs| in multiples of eps * scale; inf where the scale is 0 and they differ.
+    """Return |ours - theirs| in multiples of eps * scale; inf where they differ and the scale is 0.
 
-    A result that is not finite, or that a scale beyond all numbers would excuse, disagrees by inf.
+    It is inf also where a result or the scale is not finite.
     """
     unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, LEAST_UNIT), 0.0)
     with np.errstate(all="ignore"):

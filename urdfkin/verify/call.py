@@ -1,4 +1,4 @@
-"""One call's arguments as flat batches for the recursion, and the way back to the caller's shape."""
+"""Convert the arguments of a call to flat batches for the recursion, and its result to the caller's shape."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from urdfkin.verify.oracle_query import OracleQuery, QueryBatch
 
 T = TypeVar("T")
 
-#: Arrays whose methods are NumPy's own.
+#: Array types that do not override NumPy's methods.
 _PLAIN = np.ndarray, np.memmap
 
 
 class Part(NamedTuple):
-    """Some configurations of a call, as urdfkin sees them and as the user asked for them.
+    """Some configurations of a call, for the recursion and for the oracle.
 
     Attributes:
-        plan: The walk.
-        reference: For all but placements.
+        plan: The compiled tree.
+        reference: Reference frame; placements ignore it.
         q: (n, nq).
-        rates: (n, nv) v, and a, as far as the call was given them.
-        state: (n or 1, 24) how the base moves.
-        asked: The same configurations in the user's own numbers and names.
-        options: What else the call was given, by the method's names for it.
+        rates: (n, nv) v, or v and a, according to the quantity.
+        state: (n or 1, 24) state of the moving base.
+        asked: The same configurations, converted independently from the user's arguments.
+        options: Other arguments of the method, by name.
     """
 
     plan: CompiledTree
@@ -49,21 +49,21 @@ class Part(NamedTuple):
 
 
 class Call:
-    """One call's inputs as flat batches, and the way back to the caller's shape.
+    """The inputs of one call as flat batches.
 
     Args:
         tree: The robot.
-        plan: Makes the walk that meets some links, or knows it already.
-        frame: The name of a link or joint, or several.
-        reference: A member or its name.
-        base: How the root link moves; None if it stands still.
-        given: q, v and a, as far as the quantity needs them.
-        also: Frames that the walk meets besides, after the others; they are no results.
-        options: What else the call was given, by the method's names for it.
+        plan: Function that returns the compiled tree for some links.
+        frame: Name of a link or joint, or several names.
+        reference: A `Reference` or its name.
+        base: Motion of the root link; None: fixed at the world origin.
+        given: The inputs that the quantity needs, of q, v and a.
+        also: Additional frames after the others; they are computed but not returned.
+        options: Other arguments of the method, by name.
 
     Raises:
-        InputError: wrong lengths, batches that do not broadcast, something else than names.
-        UnknownNameError: no such frame or reference.
+        InputError: a wrong length, batch shapes that do not broadcast, or a frame that is not a name.
+        UnknownNameError: the frame or reference does not exist.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Call:
         **options: object,
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
-            raise InputError("base is a BaseMotion or None", found=type(base).__name__)
+            raise InputError("base must be a BaseMotion or None", found=type(base).__name__)
         named = [by_name(x, name) for x, name in zip(given, "qva", strict=False)]
         inputs: list[ArrayLike] = [
             cast("ArrayLike", x) if by is None else numbers(tree, by, name)
@@ -108,10 +108,10 @@ class Call:
             return np.broadcast_shapes(*shapes)
         except ValueError:
             found = ", ".join(str(shape) for shape in shapes)
-            raise InputError("the batch shapes of q, v, a and base do not fit", found=found) from None
+            raise InputError("the batch shapes of q, v, a and base do not broadcast", found=found) from None
 
     def _flat_input(self, array: FloatArray) -> FloatArray:
-        """(n, width); a single row for many configurations stays one in memory."""
+        """Return (n, width); a single row is broadcast without a copy."""
         width = array.shape[-1]
         if array.shape[:-1] == self.shape:
             return np.ascontiguousarray(array.reshape(self.n, width))
@@ -121,14 +121,17 @@ class Call:
 
     @property
     def results(self) -> int:
-        """How many results the call hands out."""
+        """Number of results that the call returns."""
         return self.n * len(self.links)
 
     def flat(self, out: FloatArray | None, own: tuple[int, ...]) -> FloatArray | None:
-        """`out` as the kernels write it, (n, frames, ...); raises InputError if it cannot take the result.
+        """Return `out` in the kernels' shape (n, frames, ...).
 
-        A subclass of NumPy's array may reshape to another shape than it is asked for, as a matrix does, and a
-        kernel would then write past its end.
+        Subclasses of NumPy's array are rejected. `reshape` of a matrix, for example, returns a different
+        shape than requested, and a kernel would then write past its end.
+
+        Raises:
+            InputError: `out` has a wrong type, dtype, layout or shape, or shares memory with an input.
         """
         if out is None:
             return None
@@ -142,17 +145,17 @@ class Call:
                 if isinstance(out, np.ndarray) and type(out) not in _PLAIN
                 else None,
             )
-        self.question.read()  # lists may hold views of out
+        self.question.read()  # lists may contain views of out
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
-            raise InputError("out must not share memory with q, v or a: they are read again for the check")
+            raise InputError("out must not share memory with q, v or a, because the check reads them again")
         return out.reshape(self.n, len(self.links), *own)
 
     def in_shape(self, result: FloatArray) -> FloatArray:
-        """An (n, frames, ...) result in the caller's batch shape, with an axis of frames if several."""
+        """Return an (n, frames, ...) result in the caller's batch shape; one frame has no axis of its own."""
         return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Evaluate the walk, or name the number that is not finite."""
+        """Call `evaluate`; if an input is not finite, raise an error that names the number."""
         try:
             return evaluate(*arguments, **options)
         except NotFiniteError:
@@ -161,19 +164,19 @@ class Call:
             raise
 
     def part(self, part: slice | IntArray) -> Part:
-        """Some of its configurations, for the check."""
+        """Return some of the configurations, for the check."""
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
         asked = self.question.rows(part)
         return Part(self.plan, self.reference, self.q[part], rates, state, asked, self.options)
 
     def index(self, k: int) -> tuple[int, ...]:
-        """Flat sample `k` as an index into the caller's batch."""
+        """Return the index of the flat sample `k` in the caller's batch."""
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
 
 def _described(out: object) -> str:
-    """What was given as `out`: its type, and of an array all that matters to a kernel."""
+    """Describe an invalid `out`: its type and, for an array, the properties that kernels need."""
     if not isinstance(out, np.ndarray):
         return type(out).__name__
     flags = {
@@ -186,14 +189,14 @@ def _described(out: object) -> str:
 
 
 def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """Whether several are asked for, and their names; whoever looks them up says which is none."""
+    """Return whether `frame` is a list, and its names; the lookup reports names that do not exist."""
     if isinstance(frame, str):
         return False, (frame,)
     try:
-        return True, tuple(frame)[: len(frame)]  # what has no length is used up by looking
+        return True, tuple(frame)[: len(frame)]  # an iterator has no length and raises TypeError
     except TypeError:
         raise InputError(
             "a frame is the name of a link or joint, or a list of names",
             found=safe_repr(frame),
-            remedy="robot.link_frames are all links",
+            remedy="robot.link_frames lists all links",
         ) from None

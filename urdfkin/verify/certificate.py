@@ -1,6 +1,6 @@
-"""A command that computes one case again.
+"""Certificates: the checked results of a robot, their agreement with the oracle, and the unchecked results.
 
-What was checked, how closely it agreed, and what was not checked.
+Also the comparison of results within a bound, its error, and the command that reproduces one case.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from urdfkin.verify.quantities import QUANTITIES
 def replay_line(
     origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
 ) -> str:
-    """The command; numbers are written so that they read back exactly.
+    """Return the command that computes one case again; its numbers read back exactly.
 
     Args:
-        origin: The robot; a text has to be given to the command on standard input.
-        command: The quantity's command.
-        frame: A link or joint.
-        reference: None for a placement, which has none.
-        values: Numbers of q, v and a, as many of the three as the command takes.
+        origin: Source of the robot. A robot given as text must be passed on standard input.
+        command: Command of the quantity.
+        frame: Name of a link or joint.
+        reference: Reference frame; None for a placement.
+        values: The numbers of q, v and a that the command takes.
 
     >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})
     "urdfkin velocity ur5 --frame 'tool 0' --reference local --q 0.5,0.1 --v neutral"
@@ -50,25 +50,25 @@ def replay_line(
     return " ".join(words)
 
 
-#: The reason that certificates give for what nobody wanted checked.
+#: Reason in certificates for results of calls with verify=False.
 NOT_ASKED_FOR = "verify=False was asked for"
-#: One entry after the other, in all ledgers.
+#: Lock for all ledgers.
 _entering = lock_over_forks()
 
 
 class VerificationError(UrdfkinError):
-    """urdfkin and its oracle disagree by more than rounding can explain: one of the two is wrong.
+    """urdfkin and the oracle differ by more than rounding can explain, so one of them is wrong.
 
     Attributes:
-        quantity: What was compared.
-        frame: Of which frame.
-        reference: In which reference; of an analytical Jacobian, in which representation.
-        index: Position of the worst sample in the batch.
+        quantity: Name of the quantity.
+        frame: Name of the frame.
+        reference: Reference frame; for an analytical Jacobian, the representation.
+        index: Index of the worst sample in the batch.
         ours: urdfkin's value of that sample.
-        theirs: The oracle's.
-        bound: What the two may differ by, number for number.
-        units: The disagreement, in eps * scale.
-        reproduce: A line that computes the case again.
+        theirs: The oracle's value.
+        bound: Largest allowed difference of each number.
+        units: The difference, in eps * scale.
+        reproduce: A command or a line of Python that computes the case again.
     """
 
     is_disagreement = True
@@ -101,13 +101,13 @@ class VerificationError(UrdfkinError):
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One batch of results held against Pinocchio's.
+    """Comparison of one batch of results with the oracle's.
 
     Attributes:
-        results: How many results (matrices or six-vectors) were compared.
-        worst: The largest disagreement, in eps * scale.
-        share: The largest disagreement as a share of its bound; above 1 is a failure.
-        index: Where the largest share is, in the results' leading axes.
+        results: Number of results (matrices or six-vectors).
+        worst: Largest difference, in eps * scale.
+        share: Largest ratio of a difference to its bound; above 1 is a failure.
+        index: Index of the largest ratio in the results' leading axes.
     """
 
     results: int
@@ -117,11 +117,11 @@ class Comparison:
 
     @classmethod
     def of_nothing(cls) -> Comparison:
-        """No results, which agree."""
+        """Return the comparison of no results, which agrees."""
         return cls(0, 0.0, 0.0, ())
 
     def __add__(self, other: Comparison) -> Comparison:
-        """Both together; the place is that of the larger share."""
+        """Return the comparison of both batches; `index` is that of the larger ratio."""
         first, second = (self, other) if self.share >= other.share else (other, self)
         return Comparison(
             self.results + other.results,
@@ -132,18 +132,18 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether every number lies within its bound."""
+        """True if every number is within its bound."""
         return self.share <= 1.0
 
 
 def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Comparison:
-    """Hold results against Pinocchio's.
+    """Compare results with the oracle's.
 
     Args:
-        ours: Results with `axes` leading axes; what is left is one result.
-        theirs: The same from Pinocchio.
-        bound: Scale and k, broadcastable against them.
-        axes: How many leading axes count results.
+        ours: urdfkin's results. The first `axes` axes count results, the others belong to one result.
+        theirs: The oracle's results, of the same shape.
+        bound: Bound of the difference; `scale` and `k` broadcast against the results.
+        axes: Number of leading axes that count results.
     """
     units = worst_of_each(ours, theirs, bound.scale, axes)
     if not units.size:
@@ -158,11 +158,11 @@ class Line:
     """A quantity's line in a certificate.
 
     Attributes:
-        quantity: What was computed.
-        checked: How many results the oracle confirmed.
-        worst: The largest disagreement among them, in eps * scale.
-        share: The same as a share of the bound.
-        unchecked: How many results were handed out without a check.
+        quantity: Name of the quantity.
+        checked: Number of results that the oracle confirmed.
+        worst: Largest difference among them, in eps * scale.
+        share: Largest ratio of a difference to its bound.
+        unchecked: Number of results that were returned without a check.
     """
 
     quantity: str
@@ -172,23 +172,23 @@ class Line:
     unchecked: int
 
 
-#: What its JSON begins with.
+#: First keys of the JSON form.
 _HEAD = ("robot", "source", "reading", "sha256", "urdfkin", "oracle")
 
 
 @dataclass(frozen=True, slots=True)
 class Certificate(Displayable):
-    """What a robot's results so far are worth.
+    """The record of a robot's results so far: which were checked, and how closely they agreed.
 
     Attributes:
         robot: The robot's name.
-        oracle: Who checked, and in which version: "Pinocchio 4.1.0".
-        lines: One for each quantity that was computed.
-        not_verified: Why results were not checked, in words; empty where all were.
-        reading: Who vouches for the way from another format to the URDF that is checked; empty for a URDF.
-        source: Where the robot came from.
-        sha256: The digest of its URDF's text as UTF-8; of the MJCF file that it was made of.
-        urdfkin: The version that computed.
+        oracle: Name and version of the oracle: "Pinocchio 4.1.0".
+        lines: One line for each computed quantity.
+        not_verified: Reasons for unchecked results; empty if all were checked.
+        reading: Result of the check of a conversion from another format to URDF; empty for a URDF.
+        source: Source of the robot: a path, a catalogue name or "<text>".
+        sha256: Digest of the URDF text as UTF-8, or of the MJCF file.
+        urdfkin: Version of urdfkin.
     """
 
     robot: str
@@ -202,13 +202,13 @@ class Certificate(Displayable):
 
     @property
     def verified(self) -> bool:
-        """Whether results were handed out and every one of them was checked and found within its bound."""
+        """True if there are results, and each of them was checked and is within its bound."""
         return any(line.checked for line in self.lines) and not any(
             line.unchecked or not line.share <= 1.0 for line in self.lines
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON; a figure beyond all numbers is null."""
+        """Return plain data for JSON; a value that is not finite becomes null."""
         lines = [asdict(line) for line in self.lines]
         for line in lines:
             line |= {key: None for key in ("worst", "share") if not math.isfinite(line[key])}
@@ -221,10 +221,10 @@ class Certificate(Displayable):
         }
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write it as JSON, whole or not at all.
+        """Write the certificate as JSON; after an error no partial file remains.
 
         Raises:
-            SourceError: no permission, no such folder, no room.
+            SourceError: the folder does not exist, or the file cannot be written (permission, disk full).
         """
         write_file(at_home(path), (json_text(self.as_dict()) + "\n").encode())
 
@@ -260,13 +260,13 @@ class Certificate(Displayable):
 
 @dataclass(slots=True)
 class Account:
-    """What a ledger holds of one quantity.
+    """The entries of a ledger about one quantity.
 
     Attributes:
-        checked: What Pinocchio confirmed.
-        unchecked: How many results it could not check, or was not asked to because of a sample.
-        not_asked_for: How many results nobody wanted checked.
-        counters: Arrays and places in them where others count more of these, each as it goes.
+        checked: Comparison of all results that the oracle confirmed.
+        unchecked: Number of results that the oracle could not check, or that a sample left out.
+        not_asked_for: Number of results of calls with verify=False.
+        counters: Arrays and indices of additional counters of unchecked results, which fast evaluators use.
     """
 
     checked: Comparison = field(default_factory=Comparison.of_nothing)
@@ -276,35 +276,35 @@ class Account:
 
     @property
     def unwanted(self) -> int:
-        """All results that nobody wanted checked."""
+        """Number of all results of calls without a check, those of the counters included."""
         return self.not_asked_for + sum(int(counts[place]) for counts, place in self.counters)
 
     def line(self, quantity: str) -> Line:
-        """The same as a certificate has it."""
+        """Return the certificate's line of these entries."""
         found = self.checked
         return Line(quantity, found.results, found.worst, found.share, self.unchecked + self.unwanted)
 
 
 @dataclass
 class Ledger:
-    """Counts what a robot hands out; safe to use from several threads."""
+    """Counts the checked and unchecked results of a robot; safe to use from several threads."""
 
     _accounts: dict[str, Account] = field(default_factory=dict)
     _reasons: dict[str, None] = field(default_factory=dict)
 
     def account(self, quantity: str) -> Account:
-        """A quantity's account, for those who count often."""
+        """Return the account of a quantity, for code that counts often."""
         with _entering:
             return self._accounts.setdefault(quantity, Account())
 
     def checked(self, quantity: str, comparison: Comparison) -> None:
-        """Enter results that Pinocchio confirmed."""
+        """Add results that the oracle confirmed."""
         account = self.account(quantity)
         with _entering:
             account.checked += comparison
 
     def unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
-        """Enter results that were handed out without a check, and why; None if nobody wanted one."""
+        """Add results without a check, with the reason; None for calls with verify=False."""
         account = self.account(quantity)
         with _entering:
             if reason is None:
@@ -314,7 +314,7 @@ class Ledger:
                 self._reasons[reason] = None
 
     def certificate(self, robot: str, oracle: str) -> Certificate:
-        """What stands in the ledger now."""
+        """Return a certificate of the current entries."""
         with _entering:
             found = [
                 (quantity, self._accounts[quantity]) for quantity in QUANTITIES if quantity in self._accounts
@@ -329,5 +329,5 @@ class Ledger:
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # A copy in another process starts its own account.
+        # A copy in another process starts with an empty ledger.
         return type(self), ()

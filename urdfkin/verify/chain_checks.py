@@ -1,6 +1,8 @@
-"""Whether a chain's axes stand where Pinocchio has them: each joint's origin and direction, and the tip.
+"""Check chains, OPW solvers and products of exponentials with Pinocchio's placements.
 
-Whether a product of exponentials is Pinocchio's motion of the tip in the base, to rounding.
+- `check_chain`: the origin and the direction of each joint, and the tip
+- `check_opw`: the forward kinematics of an OPW (ortho-parallel wrist) solver
+- `check_screws`: the motion of the tip relative to the base, to rounding
 """
 
 from __future__ import annotations
@@ -20,19 +22,23 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
 
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
-    """One line on how close they are; None where Pinocchio cannot check the robot.
+    """Compare a chain with Pinocchio; return a line about the agreement.
 
-    Pinocchio's frame of a joint is that of its child link: behind the joint's motion where the path passes
-    it forwards, before it where backwards. Both sides walk: Pinocchio from the root to both ends, the path
-    from one end to the other, neither with more joints nor a longer way than the two ends have together.
+    Pinocchio's frame of a joint is the frame of its child link. It comes after the joint's motion if the
+    chain passes the joint forwards, and before it if backwards. Pinocchio computes from the root to both
+    ends, the chain from one end to the other. The bound uses the joints and lengths of both paths from the
+    root, which neither computation exceeds.
 
     Args:
-        verifier: The robot's.
+        verifier: Verifier of the robot.
         path: The chain.
-        q: (n, nq) configurations of the robot.
+        q: (n, nq) configurations of the robot, rad, m.
+
+    Returns:
+        The line; None if Pinocchio cannot check the robot.
 
     Raises:
-        TableError: they differ by more than rounding.
+        TableError: the two differ by more than rounding.
     """
     if verifier.cannot() is not None:
         return None
@@ -59,7 +65,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     share = max(metres / (unit * way + LEAST_UNIT), turned / unit)
     if share > 1.0:
         raise TableError(
-            "the chain's axes disagree",
+            "the chain's axes disagree with Pinocchio's",
             where=f"{path.robot}, {path.base} to {path.tip}",
             found=f"an origin {metres:.3g} m off, a direction {turned:.3g}",
             remedy="please report this as an error of urdfkin, with the URDF",
@@ -70,7 +76,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
 
 
 def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
-    """One line on how far the solver's forward kinematics is off; None where Pinocchio cannot check."""
+    """Return a line about the error of the solver's forward kinematics; None if Pinocchio cannot check."""
     if verifier.cannot() is not None:
         return None
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
@@ -84,10 +90,17 @@ def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
 
 
 def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | None:
-    """One line on how close they are; None where Pinocchio cannot check the robot.
+    """Compare a product of exponentials with Pinocchio; return a line about the agreement.
+
+    Args:
+        verifier: Verifier of the robot.
+        screws: The product of exponentials.
+
+    Returns:
+        The line; None if Pinocchio cannot check the robot.
 
     Raises:
-        TableError: they differ by more than rounding.
+        TableError: the two differ by more than rounding.
     """
     if verifier.cannot() is not None:
         return None
@@ -96,7 +109,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     own = screws.coupling.select(verifier.tree, q)
     off = np.abs(base @ screws.placement(own) - tip)[:, :3]
     path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio goes from the root to both ends, screws from one to the other.
+    # Pinocchio computes from the root to both ends, the product from one end to the other.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (of_joints(joints) + np.abs(own).sum(axis=-1)) + left_out(path)
@@ -105,7 +118,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     turn = float((off[..., :3].max(axis=(-1, -2)) / (unit + EPS * screws.roundings)).max())
     if max(share, turn) > 1.0:
         raise TableError(
-            "the product of exponentials disagrees",
+            "the product of exponentials disagrees with Pinocchio",
             where=f"{screws.robot}, {screws.base_frame} to {screws.tip_frame}",
             found=f"a tip {off[..., 3].max():.3g} m off",
             remedy="please report this as an error of urdfkin, with the URDF",

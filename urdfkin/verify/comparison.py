@@ -1,6 +1,6 @@
-"""The largest disagreement of each result, in one pass over the numbers.
+"""Kernel for the largest difference of each result, in one pass over the numbers.
 
-`bounds.disagreement` says what is computed; as array expressions it took as long as Pinocchio itself.
+`bounds.disagreement` defines the difference. As NumPy expressions it took as long as Pinocchio itself.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from urdfkin.model.tree import FloatArray
 
 
 def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
-    """The largest `bounds.disagreement` of each result.
+    """Return the largest `bounds.disagreement` of each result.
 
     Args:
-        ours: Results with `axes` leading axes; what is left is one result.
-        theirs: The same from Pinocchio.
-        scale: Of a bound, broadcastable against them.
-        axes: How many leading axes count results.
+        ours: urdfkin's results. The first `axes` axes count results, the others belong to one result.
+        theirs: The oracle's results, of the same shape.
+        scale: Scale of the bound; it broadcasts against the results.
+        axes: Number of leading axes that count results.
 
     Returns:
         An array of the leading axes' shape, in eps * scale.
@@ -38,7 +38,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
 
 @helper(fastmath={"reassoc"})
 def _finite(x, i):
-    """Whether a row is: 0 times what is not is no number, and stays so in a sum in any order."""
+    """Return whether a row is finite: 0 * x is NaN if x is not, and NaN remains in a sum in any order."""
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * x[i, j]
@@ -47,7 +47,7 @@ def _finite(x, i):
 
 @helper(fastmath={"nnan", "nsz"})
 def _largest(ours, theirs, scale, i):
-    """The largest of a row of finite numbers, which the compiler may look for in any order."""
+    """Return the largest difference in a row of finite numbers; the compiler may reorder the comparisons."""
     largest = 0.0
     for j in range(ours.shape[1]):
         size, difference = scale[i, j], abs(ours[i, j] - theirs[i, j])
@@ -66,5 +66,5 @@ def _worst(ours, theirs, scale, worst):
 
 
 def load_kernel() -> None:
-    """Have it compiled, or read from disk, before it is needed."""
+    """Compile the kernel or read it from disk, before its first use."""
     _ = _worst.compiled

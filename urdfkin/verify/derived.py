@@ -1,11 +1,13 @@
-"""Pinocchio's opinion of an analytical Jacobian: from its rotation and Jacobian, by `line_of_nodes`.
+"""Checks of quantities that are derived from several results of an oracle.
 
-A frame's placement in another frame, by a witness: of both placements in the world.
+| Quantity | Computed from the oracle's |
+|---|---|
+| analytical Jacobian | rotation and Jacobian, with `urdfkin.verify.analytical_reference` |
+| relative placement | placements of both frames in the world |
+| IMU reading | acceleration, placement and velocity |
 
-What an accelerometer and a gyroscope read, by a witness: its accelerations, placements and velocities.
-
-The walk has the base accelerated against gravity; here gravity is taken from the acceleration at the end, in
-the sensor's axes, so that the two share neither the sign nor the way.
+The forward recursion includes gravity as an acceleration of the base. The check of an IMU reading subtracts
+gravity at the end, in the sensor's axes, so a wrong sign or a wrong order cannot agree on both sides.
 """
 
 from __future__ import annotations
@@ -29,14 +31,14 @@ from urdfkin.verify.pinocchio import Oracle
 def check_analytical_jacobian(
     bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: Witness
 ) -> tuple[FloatArray, Bound]:
-    """(n, frames, 6 or 7, nv) the same results by Pinocchio, and what the two are measured against.
+    """Return analytical Jacobians (n, frames, 6 or 7, nv) from an oracle, and their bound.
 
     Args:
-        bound_of: The bound of the Jacobian that they are made from.
-        oracle: Pinocchio.
-        x: What was asked.
-        ours: What was handed out.
-        by: Whose the oracle is.
+        bound_of: Function for the bound of the velocity Jacobian.
+        oracle: The oracle's model of the robot.
+        x: The configurations.
+        ours: urdfkin's results; they determine the sign of a quaternion where rounding hides it.
+        by: The oracle.
     """
     aligned = Reference.LOCAL_WORLD_ALIGNED
     q, frames, base = x.asked.inputs[0], x.asked.frames, x.asked.base
@@ -48,7 +50,7 @@ def check_analytical_jacobian(
         quat = oracle.quaternions(q, frames, base)
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs, hidden = quaternion_jacobian(quat, J_v), bounds.hidden_scalar(bound, quat.shape[:-1])
-        # Of q and -q the one with qw >= 0 counts; where rounding hides the sign of qw, either does.
+        # q and -q are the same rotation. The one with qw >= 0 is used, or either if rounding hides the sign.
         with_other = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
         turned = with_other & (np.abs(quat[..., 3]) <= hidden)
         theirs[..., 3:, :] *= np.where(turned, -1.0, 1.0)[..., np.newaxis, np.newaxis]
@@ -61,20 +63,20 @@ def check_analytical_jacobian(
 def check_relative_placement(
     bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: Witness
 ) -> tuple[FloatArray, Bound]:
-    """(n, frames, 4, 4) the same placements by a witness, and what the two are measured against.
+    """Return relative placements (n, frames, 4, 4) from an oracle, and their bound.
 
-    With a the frame that is looked from, s_a and s_b the lengths of both paths and k_a and k_b the roundings
-    of each, R_a^T (p_b - p_a) is off by k_b s_b + k_a s_a for the positions and by k_a |p_b - p_a| for R_a:
-    with |p_b - p_a| up to s_a + s_b, no more than (2 k_a + k_b) (s_a + s_b). The product of the rotations is
-    off by k_a + k_b. The difference and the products themselves round some 5 eps more, which the joint that
-    each k counts more than there is has room for.
+    Let a be the other frame and b the frame. Let s_a and s_b be the lengths of their paths, and k_a and k_b
+    their roundings. The position is R_a^T (p_b - p_a). Its error is k_b s_b + k_a s_a from the positions and
+    k_a |p_b - p_a| from R_a. Since |p_b - p_a| <= s_a + s_b, the sum is at most (2 k_a + k_b) (s_a + s_b).
+    The error of the product of rotations is k_a + k_b. The difference and the products round about 5 eps
+    more, which the additional joint in each k covers.
 
     Args:
-        bound_of: The bound of placements in the world.
-        oracle: The witness's.
-        x: What was asked; its plan meets the frames, and after them the one that is looked from.
-        ours: What was handed out; the witness does not need it.
-        by: Whose the oracle is.
+        bound_of: Function for the bound of placements in the world.
+        oracle: The oracle's model of the robot.
+        x: The configurations; the last frame of its compiled tree is the other frame.
+        ours: urdfkin's results; not used.
+        by: The oracle.
     """
     (q,), other = x.asked.inputs, cast("str", x.options["relative_to"])
     T = oracle.placements(q, [*x.asked.frames, other])
@@ -92,13 +94,13 @@ _LOCAL = Reference.LOCAL
 
 
 def check_imu(oracle: Oracle, x: Part, ours: FloatArray, by: Witness) -> tuple[FloatArray, Bound]:
-    """(n, frames, 6) the same readings by a witness, and what the two are measured against.
+    """Return IMU readings (n, frames, 6) from an oracle, and their bound.
 
     Args:
-        oracle: The witness's.
-        x: What was asked.
-        ours: What was handed out; the witness does not need it.
-        by: Whose the oracle is.
+        oracle: The oracle's model of the robot.
+        x: The configurations.
+        ours: urdfkin's results; not used.
+        by: The oracle.
     """
     (q, v, a), frames, base = x.asked.inputs, x.asked.frames, x.asked.base
     v_flat, a_flat = x.rates

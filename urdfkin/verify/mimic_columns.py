@@ -1,7 +1,7 @@
-"""Columns of followers added to their leaders', in one pass over the numbers.
+"""Kernel that adds the columns of mimic joints to those of the mimicked joints, in one pass.
 
-Column by column, as array expressions do it, each pass fetches the whole Jacobians anew: on robots with
-mimic joints that took longer than all of Pinocchio's own work.
+NumPy expressions read all Jacobians from memory once for each column. On robots with mimic joints that took
+longer than Pinocchio's own computation.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ import numpy as np
 from urdfkin.compiled.compiling import NUMBERS, PLACES, ROWS, SCRATCH, kernel
 from urdfkin.model.tree import FloatArray
 
-#: For each of Pinocchio's rates, which of v it is.
+#: Index in v of each of Pinocchio's joint velocities.
 Places = np.ndarray[Any, np.dtype[np.int64]]
 
 
 def coupled(full: FloatArray, columns: Places, index: Places, factor: FloatArray, nv: int) -> FloatArray:
-    """J_full G.
+    """Return J_full G, the columns for the robot's own joint velocities.
 
     Args:
-        full: (..., Pinocchio's nv) numbers.
-        columns: Which of Pinocchio's columns count, in the order in which they are added up.
-        index: (Pinocchio's nv) which of the robot's rates each is.
-        factor: (Pinocchio's nv) its factor in G.
-        nv: How many rates the robot has.
+        full: (..., Pinocchio's nv) columns for all joints.
+        columns: Pinocchio's columns to use, in the order of summation.
+        index: (Pinocchio's nv,) index in v of each column.
+        factor: (Pinocchio's nv,) factor of each column in G.
+        nv: Length of v.
 
     Returns:
-        (..., nv) numbers.
+        (..., nv).
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     out = np.zeros(len(rows) * nv)
@@ -47,5 +47,5 @@ def _coupling(full, columns, index, factor, out):
 
 
 def load_kernel() -> None:
-    """Have it compiled, or read from disk, before it is needed."""
+    """Compile the kernel or read it from disk, before its first use."""
     _ = _coupling.compiled

@@ -1,9 +1,9 @@
-"""An MJCF file read in a confined process, and whether the robot that was made of it is the file's.
+"""Read an MJCF file in a confined process, and compare the resulting robot with MuJoCo's model of the file.
 
-Every result is checked on the URDF that was written of the tree. What that leaves open is whether the tree is
-the file's. So MuJoCo's own model of the file is held against it when it is loaded: the places of bodies and
-sites, and the equalities that became mimic rules. Pinocchio's MJCF reader reads the file itself, and is known
-to read some otherwise: what it says is told, and decides nothing.
+Pinocchio checks every result with the URDF text that urdfkin writes for the tree. That does not check the
+conversion from the file to the tree. Therefore `load` compares the tree with MuJoCo's own model: the
+placements of bodies and sites, and the equalities that became mimic rules. Pinocchio's MJCF reader is
+compared too. It is known to read some files differently, so its result is reported only.
 """
 
 from __future__ import annotations
@@ -34,27 +34,27 @@ from urdfkin.verify.mjcf_process import TOO_MUCH, unpacked
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
 
-#: Configurations that the two are compared in, besides the neutral one.
+#: Random configurations for the comparison, besides the zero configuration.
 _SAMPLES = 8
-#: Seconds after which reading is given up.
+#: Time limit for reading, seconds.
 PATIENCE = 60.0
-#: Letters of an error of MuJoCo's that a certificate quotes.
-_SAID = 300
-#: Bytes of answers after which they are not read on.
+#: Longest quotation of a MuJoCo error in a certificate, characters.
+_QUOTED = 300
+#: Largest answer of the process, bytes.
 MOST = 400_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class MjcfReading:
-    """What the confined process has read of an MJCF file, as plain data.
+    """The result of the confined process for an MJCF file, as plain data.
 
     Attributes:
-        urdf: The tree, written as a URDF.
-        listed: What the tree does not hold.
-        path: The file; None where it was text.
-        answer: The process's answer about the robot: frames, and what MuJoCo has computed.
-        not_whole: Why MuJoCo was asked without the file's shapes and inertias; None where it was with them.
-        pinocchio: The answer about Pinocchio's reader; None where there is none.
+        urdf: The tree as a URDF text.
+        listed: Elements of the file that the tree does not contain.
+        path: The file; None for a text.
+        answer: The process's answer about the robot: frames, and MuJoCo's results.
+        not_whole: Reason why MuJoCo compiled the file without shapes and inertias; None if with them.
+        pinocchio: The answer about Pinocchio's reader; None if there is none.
     """
 
     urdf: str
@@ -68,16 +68,16 @@ class MjcfReading:
 def read_mjcf(
     source: str | bytes | os.PathLike[str], *, check: bool = True, patience: float = PATIENCE
 ) -> MjcfReading:
-    """The robot of an MJCF file or text, compiled in a process with limits on time and memory.
+    """Read the robot of an MJCF file or text in a process with limits on time and memory.
 
     Args:
-        source: A path, or text, or its bytes; files that it includes are read.
-        check: Whether MuJoCo places what it has read, for `check_mjcf_source`.
-        patience: Seconds to wait.
+        source: A path, a text or its bytes; included files are read too.
+        check: Also compute placements with MuJoCo, for `check_mjcf_source`.
+        patience: Time limit, seconds.
 
     Raises:
-        InputError: MuJoCo is not installed, does not accept the file, takes too much time or memory, or the
-            robot has a ball joint.
+        InputError: MuJoCo is not installed, does not accept the file, or takes too much time or memory; or
+            the robot has a ball joint.
     """
     version()
     name = name_of(source)
@@ -100,15 +100,15 @@ def read_mjcf(
             "MuJoCo cannot compile this MJCF",
             where=name,
             found=ending,
-            remedy="does it replicate, or ask for, more than a robot has?",
+            remedy="check it for very large numbers, for example in <replicate>",
         )
-    said = [answer["not_whole"] for answer in answers if "not_whole" in answer]
+    reasons = [answer["not_whole"] for answer in answers if "not_whole" in answer]
     return MjcfReading(
         read[-1]["urdf"],
         tuple(Listed(*one) for one in read[-1]["listed"]),
         path,
         read[-1],
-        None if read[-1]["whole"] else printable((said or [ending])[0])[:_SAID],
+        None if read[-1]["whole"] else printable((reasons or [ending])[0])[:_QUOTED],
         next((answer["pinocchio"] for answer in answers if "pinocchio" in answer), None),
     )
 
@@ -121,40 +121,44 @@ def _text(source: str | bytes | os.PathLike[str], name: str) -> str:
 
 
 def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
-    """The process's answers, and in words why there are no more."""
+    """Return the process's answers, and the reason why they end."""
     command = own_python(
         "from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8")
     )
     output, status = ask_python(command, json.dumps(request).encode(), patience, MOST)
     answers = [json.loads(line) for line in output.splitlines(keepends=True) if _is_answer(line)]
     if status is None:
-        return answers, f"no end within {patience:g} s"
+        return answers, f"it did not finish within {patience:g} s"
     if len(output) > MOST:
         return answers, f"an answer of more than {MOST} bytes"
     return answers, f"its process ended with status {status}: perhaps {TOO_MUCH}"
 
 
 def _is_answer(line: bytes) -> bool:
-    """Whether a line is a whole answer: libraries may print, and a process that is killed stops anywhere."""
+    """Return whether a line is a complete answer; libraries may print, and a killed process leaves a part."""
     return line.startswith(b"{") and line.endswith(b"}\n")
 
 
 def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
-    """Who vouches for the reading of an MJCF file, in words.
+    """Compare a robot with MuJoCo's model of the MJCF file that it was made of.
 
     Args:
-        verifier: Of the robot that was made of it.
-        read: What was read.
+        verifier: Verifier of the robot.
+        read: The result of `read_mjcf`.
+
+    Returns:
+        A line about the result, for the certificate.
 
     Raises:
-        OracleError: MuJoCo places a body or a site elsewhere than the tree does, or couples other joints.
+        OracleError: MuJoCo's placement of a body or site differs by more than the bound, or MuJoCo couples
+            other joints.
     """
     tree, answer = verifier.tree, read.answer
     q = unpacked(answer["q"])
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
-    # Both readings round, and so do the angles of the URDF between them: twice MuJoCo's bound.
+    # Both computations round, and so do the angles of the URDF: twice MuJoCo's bound.
     size = about_the_root(magnitudes(plan, q, None, None, STILL_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
@@ -163,30 +167,30 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     if not (share <= 1.0).all():
         k, f = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)
         raise _error(
-            f"{tree.name}, {frames[f]}", f"{share[k, f]:.3g} times what rounding allows, MuJoCo {version()}"
+            f"{tree.name}, {frames[f]}", f"{share[k, f]:.3g} times the bound of rounding, MuJoCo {version()}"
         )
     coupled = _demand_the_rules(tree.name, answer)
-    said = (
-        f"MuJoCo {version()} places {len(frames)} bodies and sites of the MJCF likewise in {len(q)}"
+    line = (
+        f"compared with MuJoCo {version()}: {len(frames)} bodies and sites of the MJCF agree in {len(q)}"
         f" configurations ({share.max(initial=0.0):.1%} of the bound)"
     )
     if coupled is not None:
-        said += f", and holds its {len(answer['rules'])} mimic rules there ({coupled:.1%})"
+        line += f", and {len(answer['rules'])} mimic rules agree ({coupled:.1%})"
     if read.not_whole is not None:
-        said += f", without the file's shapes and inertias, with which it does not compile: {read.not_whole}"
-    return f"{said}; {_pinocchios(read, ours, bound)}"
+        line += f", without shapes and inertias: with them the file does not compile: {read.not_whole}"
+    return f"{line}; {_pinocchios(read, ours, bound)}"
 
 
 def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Whether MuJoCo's own equalities hold where the mimic rules put the joints: the worst share, if any."""
-    rules = {int(i): str(follower) for i, follower in answer["rules"]}
+    """Check the mimic rules with MuJoCo's equalities; return the worst ratio to the bound, or None."""
+    rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpacked(answer["residuals"]), unpacked(answer["rule_sizes"])
-    held = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())
-    if odd := held.symmetric_difference(rules.keys() | set(answer["apart"])):
-        first = min(odd)
+    active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())
+    if different := active.symmetric_difference(rules.keys() | set(answer["apart"])):
+        first = min(different)
         what = f"mimic joint {rules[first]}" if first in rules else f"equality {first}"
         raise _error(
-            f"{name}, {what}", f"MuJoCo {version()} {'holds' if first in held else 'does not hold'} it"
+            f"{name}, {what}", f"MuJoCo {version()} {'has' if first in active else 'does not have'} it"
         )
     if not rules:
         return None
@@ -197,13 +201,13 @@ def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
     if not (share <= 1.0).all():
         k, i = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)
         off = abs(residuals[k, own[i]])
-        raise _error(f"{name}, mimic joint {rules[own[i]]}", f"MuJoCo {version()} has it {off:.3g} elsewhere")
+        raise _error(f"{name}, mimic joint {rules[own[i]]}", f"MuJoCo {version()} differs by {off:.3g}")
     return float(share.max())
 
 
 def _error(where: str, found: str) -> OracleError:
     return OracleError(
-        "the robot that was made of an MJCF file is not the file's",
+        "the robot made of an MJCF file differs from the file",
         where=where,
         found=found,
         remedy="please report this as an error of urdfkin, with the file",
@@ -211,7 +215,7 @@ def _error(where: str, found: str) -> OracleError:
 
 
 def _whole(found: Mapping[str, Any]) -> FloatArray:
-    """(n, frames, 4, 4) from the three rows that were sent."""
+    """Return (n, frames, 4, 4) from the three rows in an answer."""
     rows = unpacked(found)
     T = np.zeros((*rows.shape[:2], 4, 4))
     T[..., :3, :], T[..., 3, 3] = rows, 1.0
@@ -225,12 +229,12 @@ def _shares(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
 
 
 def _pinocchios(read: MjcfReading, ours: FloatArray, bound: Bound) -> str:
-    """What Pinocchio's MJCF reader says of the same bodies."""
+    """Return a phrase about the placements by Pinocchio's MJCF reader."""
     if read.path is None:
-        return "Pinocchio's MJCF reader, which takes files, was not asked"
+        return "not compared with Pinocchio's MJCF reader, which needs a file"
     found = read.pinocchio or {"error": "its process ended"}
     if "error" in found:
-        return f"Pinocchio's MJCF reader does not vouch for it ({found['error']})"
+        return f"not compared with Pinocchio's MJCF reader ({found['error']})"
     names = list(found["bodies"])
     if not names:
         return "Pinocchio's MJCF reader finds no body either"
@@ -238,10 +242,10 @@ def _pinocchios(read: MjcfReading, ours: FloatArray, bound: Bound) -> str:
     bodies, theirs = [places.index(name) for name in names], _whole(found["placements"])
     share = _shares(ours[:, bodies], theirs, Bound(bound.scale[:, bodies], bound.k[:, bodies]))
     if (share <= 1.0).all():
-        return "Pinocchio's MJCF reader places the bodies likewise"
+        return "Pinocchio's MJCF reader agrees on the bodies"
     f = int(share.max(axis=0).argmax())
     off = np.abs(ours[:, bodies[f]] - theirs[:, f])[:, :3]
     return (
-        f"Pinocchio's MJCF reader stands alone: it has {names[f]} up to {off[..., 3].max():.3g} m away,"
-        f" and its axes {off[..., :3].max():.3g}"
+        f"Pinocchio's MJCF reader disagrees: its {names[f]} differs by up to {off[..., 3].max():.3g} m,"
+        f" and its axes by {off[..., :3].max():.3g}"
     )

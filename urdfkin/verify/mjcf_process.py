@@ -1,9 +1,14 @@
-"""The process that compiles an MJCF file: MuJoCo and Pinocchio's MJCF reader run here, within limits.
+"""Program of the confined process that compiles an MJCF file with MuJoCo and with Pinocchio's MJCF reader.
 
-A few lines of MJCF may ask for any time and memory (nested `<replicate>`, `nuser_body`), and a defect of a
-parser may do anything; so the caller's process sees plain data only. A request comes on standard input, each
-answer is a line of JSON on standard output: the robot without its shapes; the robot of the file as it is;
-where Pinocchio's reader places the bodies. Should the process end early, the answers before stand.
+A few lines of MJCF can require any time and memory (nested `<replicate>`, `nuser_body`), and a defect of a
+parser can crash the process. Therefore the caller's process receives plain data only. The request comes on
+standard input. Each answer is a line of JSON on standard output:
+
+1. the robot without its shapes
+2. the robot of the complete file
+3. the placements of the bodies by Pinocchio's reader
+
+If the process ends early, the answers before that remain valid.
 """
 
 from __future__ import annotations
@@ -29,19 +34,19 @@ from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.pinocchio_module import pinocchio
 from urdfkin.verify.sampling import sample
 
-#: Coordinates of a joint that moves freely.
+#: Number of coordinates of a free joint.
 _CARTESIAN = 7
-#: Names that an error lists at most.
+#: Most names that an error lists.
 _NAMED = 5
 
 TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
-    """A request on standard input, answers on standard output."""
+    """Read a request from standard input and write the answers to standard output."""
     request = json.load(sys.stdin)
     try:
-        library().set_mju_user_warning(lambda said: None)  # of dynamics; else it opens a log file
+        library().set_mju_user_warning(lambda message: None)  # else MuJoCo writes a log file
         if request["path"] is not None and request["samples"]:
             with suppress(InstallationError):
                 pinocchio()
@@ -54,13 +59,13 @@ def serve() -> None:
         words = {key: getattr(error, key) for key in ("what", "where", "remedy")}
         _say({"error": words | {"found": _plain(error.found)}})
     except Exception as error:
-        said = f"{type(error).__name__}: {error}"
-        _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": said[:2000]}})
-    os._exit(0)  # libraries may not do what they would at their end
+        message = f"{type(error).__name__}: {error}"
+        _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": message[:2000]}})
+    os._exit(0)  # skip the exit handlers of libraries
 
 
 def _plain(found: str | None) -> str | None:
-    """What MuJoCo says; where memory ends it says no more than that something is unknown."""
+    """Return MuJoCo's message; add a hint to "unknown exception", which it reports when memory runs out."""
     return f"{found} Perhaps {TOO_MUCH}" if found and found.endswith("unknown exception!") else found
 
 
@@ -70,11 +75,11 @@ def _say(answer: Mapping[str, Any]) -> None:
 
 
 def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """What is answered to a request, one after the other.
+    """Yield the answers to a request.
 
     Args:
-        request: `path` or `text`; `name`, what to call it in messages; `samples`, how many configurations
-            MuJoCo places besides the neutral one, 0 for none at all.
+        request: `path` or `text`; `name`, the file's name in messages; `samples`, the number of random
+            configurations for MuJoCo besides the zero configuration, or 0 for no configuration at all.
     """
     path, samples = request["path"], int(request["samples"])
     source = path if path is not None else request["text"]
@@ -89,7 +94,7 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             read = whole
         except (MemoryError, InputError, library().FatalError) as error:
             if isinstance(error, InputError) and error.remedy is not None:
-                raise  # MuJoCo does compile it, and no tree can hold what it makes of it
+                raise  # MuJoCo compiles the file, but the result is not a tree
             found = error.found if isinstance(error, InputError) else str(error)
             yield {"not_whole": _plain(found) or TOO_MUCH}
     if samples and path is not None:
@@ -97,7 +102,7 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _configurations(read: Mjcf, samples: int) -> FloatArray:
-    """(n, nq): the neutral one and random ones; none where none are asked for."""
+    """Return (n, nq): the zero configuration and `samples` random ones, or none if `samples` is 0."""
     if not samples:
         return np.empty((0, read.tree.nq))
     drawn = sample(read.tree, samples, np.random.default_rng(0))
@@ -126,13 +131,13 @@ def _answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
 
 
 def packed(numbers: FloatArray) -> dict[str, Any]:
-    """An array as plain data for JSON."""
+    """Return an array as plain data for JSON."""
     data = np.ascontiguousarray(numbers, dtype="<f8")
     return {"shape": data.shape, "base64": base64.b64encode(data.tobytes()).decode("ascii")}
 
 
 def unpacked(found: Mapping[str, Any]) -> FloatArray:
-    """The array again."""
+    """Return the array of `packed`."""
     numbers = np.frombuffer(base64.b64decode(found["base64"]), dtype="<f8")
     return numbers.reshape([int(n) for n in found["shape"]]).astype(np.float64)
 
@@ -149,21 +154,21 @@ def _pinocchios(path: str, read: Mjcf, q: FloatArray) -> dict[str, Any]:
 def _pinocchio_placements(
     path: str, qpos: FloatArray, coordinates: Mapping[str, int], bodies: Sequence[str]
 ) -> FloatArray:
-    """(n, bodies, 4, 4) by Pinocchio's own reader of MJCF, which takes joints and bodies by name.
+    """Return placements (n, bodies, 4, 4) by Pinocchio's MJCF reader; joints and bodies match by name.
 
     Args:
         path: The file.
-        qpos: (n, MuJoCo's nq).
-        coordinates: Where each joint's first number stands in them.
+        qpos: (n, MuJoCo's nq) configurations.
+        coordinates: Index of each joint's first number in `qpos`.
         bodies: Names of bodies.
 
     Raises:
-        OracleError: it does not accept the file, or finds other joints or bodies in it.
+        OracleError: Pinocchio does not accept the file, or reads other joints or bodies from it.
     """
     pin = pinocchio()
     try:
         model = pin.buildModelFromMJCF(path)
-    except Exception as error:  # it raises what its parsers do
+    except Exception as error:  # the exceptions of its parsers
         raise OracleError("it does not accept the file", found=str(error).strip()) from error
     joints = dict(_numbered(model, list(coordinates)))
     if joints.keys() != coordinates.keys():
@@ -181,7 +186,7 @@ def _pinocchio_placements(
                 q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
             elif count == 1:
                 q[first] = x
-            else:  # a turn without limits
+            else:  # a revolute joint without limits
                 q[first : first + 2] = np.cos(x), np.sin(x)
         pin.framesForwardKinematics(model, data, q)
         out[k] = [data.oMf[i].homogeneous for i in ids]
@@ -189,9 +194,10 @@ def _pinocchio_placements(
 
 
 def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
-    """Where each joint's numbers begin in q, and how many there are.
+    """Yield the name of each joint with its index in q and its number of coordinates.
 
-    A body's joints are one to Pinocchio, `Composite_` and the first one's name, with a number for each.
+    Pinocchio combines several joints of a body into one with the name `Composite_` plus the first joint's
+    name. It has one number for each of them.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

@@ -1,4 +1,4 @@
-"""Whether the robot that was made of a `pinocchio.Model` is the model's: the model itself is asked."""
+"""Check a robot that was made of a `pinocchio.Model`: compare its placements with the model's own."""
 
 from __future__ import annotations
 
@@ -21,47 +21,50 @@ from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.sampling import sample
 from urdfkin.verify.verifier import Verifier
 
-#: Configurations that the two are compared in, besides the neutral one.
+#: Random configurations for the comparison, besides the zero configuration.
 _SAMPLES = 8
 
 
 def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
-    """Who vouches for the reading of a model, in words.
+    """Compare the placements of a robot with those of the model it was made of.
 
     Args:
-        verifier: Of the robot that was made of it.
-        made: What was read.
-        source: The model, or what wraps it.
+        verifier: Verifier of the robot.
+        made: The tree that was read from the model, and its names.
+        source: The model, or a RobotWrapper of it.
+
+    Returns:
+        A line about the result, for the certificate.
 
     Raises:
-        OracleError: the model places a frame elsewhere than the tree does.
+        OracleError: a placement differs by more than the bound.
     """
     model, tree = getattr(source, "model", source), verifier.tree
-    if model.nv > MOST_RATES:  # its workspace grows with the cube
-        return f"the model itself was not asked: it has {model.nv} rates, more than {MOST_RATES}"
+    if model.nv > MOST_RATES:  # the workspace grows with the cube of nv
+        return f"not compared with the model itself: nv is {model.nv}, more than {MOST_RATES}"
     q = np.vstack((neutral(tree), sample(tree, _SAMPLES, np.random.default_rng(0))))
     names = [*made.joints, *made.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
     theirs = _placements(model, _configurations(model, tree, q), made)
-    # Both readings round, and so do the angles of the URDF between them.
+    # Both computations round, and so do the angles of the URDF: twice the bound.
     bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
         raise OracleError(
-            "the robot that was made of a pinocchio.Model is not the model's",
+            "the robot made of a pinocchio.Model differs from the model",
             where=f"{tree.name}, {names[found.index[1]]}",
-            found=f"{found.share:.3g} times what rounding allows, Pinocchio {version()}",
+            found=f"{found.share:.3g} times the bound of rounding, Pinocchio {version()}",
             remedy="please report this as an error of urdfkin, with the model",
         )
     return (
-        f"the model itself places {len(names)} links likewise in {len(q)} configurations"
+        f"compared with the model itself: {len(names)} links agree in {len(q)} configurations"
         f" ({found.share:.1%} of the bound)"
     )
 
 
 def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
-    """(n, links, 4, 4) of joints, then of frames."""
+    """Return the model's placements (n, links, 4, 4), first of joints, then of frames."""
     pin = pinocchio()
     data = model.createData()
     out = np.empty((len(q), len(made.joints) + len(made.frames), 4, 4))
@@ -73,7 +76,7 @@ def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
 
 
 def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """(n, the model's nq), joint for joint by their names: the model may have them in another order."""
+    """Return the model's configurations (n, model.nq); joints are matched by name."""
     full = np.zeros((len(q), int(model.nq)))
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.nq:

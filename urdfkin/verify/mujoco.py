@@ -1,17 +1,19 @@
-"""Everything that asks MuJoCo, the second witness.
+"""The oracle MuJoCo.
 
-MuJoCo reads the links' and joints' places and axes from the URDF's text with its own parser, goes through
-unit quaternions, and keeps six-vectors about a centre of mass: neither urdfkin nor Pinocchio does either.
-What its kinematics does not need, or what it has no words for, is settled before it reads, on the text:
+MuJoCo reads the positions and axes of links and joints from the URDF text with its own parser. It computes
+with unit quaternions and stores six-vectors for a centre of mass; urdfkin and Pinocchio do neither. Before
+MuJoCo reads the text, this module changes the following:
 
-- meshes and inertials are left out. Each link gets a body of its own; only the root's keeps a mass, so that
-  the centre of mass, about which MuJoCo measures, is the root's origin.
-- links and joints are called by numbers, so that no name of MuJoCo's is taken.
-- floating and planar joints are added as slides and a ball or a hinge: a free one stands on the world only.
-- followers are coupled by `rules_of_text`: MuJoCo makes constraints of them that kinematics never feels.
+- Meshes and inertials are removed. Each link becomes a body. Only the root has a mass, so that the centre of
+  mass, MuJoCo's point of reference, is the root's origin.
+- Links and joints get numbers as names, because MuJoCo reserves some names.
+- Floating and planar joints become slides with a ball or a hinge, because MuJoCo's free joint can connect a
+  body to the world only.
+- Mimic joints are coupled by `rules_of_text`. MuJoCo would make constraints of them, which its kinematics
+  ignores.
 
-q, v and a become MuJoCo's by qpos(q), qvel = S v, qacc = S a + S' v, and Jacobians come back as J S: S holds
-the followers' factors, and the rotation that takes a floating joint's rates, in its own axes, to its slides.
+MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, and the robot's Jacobian is J S. S contains the
+factors of mimic joints, and the rotation from a floating joint's own axes to the axes of its slides.
 """
 
 from __future__ import annotations
@@ -34,22 +36,22 @@ from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.verify.pinocchio import demand_the_same, depth_of
 from urdfkin.verify.pinocchio_inputs import BaseNumbers, nearest_quaternion, rules_of_text
 
-#: What a root joint, or a base that moves, hangs from.
+#: Parent of a root joint or of a moving base.
 WORLD = "universe"
-#: Of each link while MuJoCo reads it: kg, and kg m^2.
+#: Mass (kg) and moments of inertia (kg m^2) of each link while MuJoCo reads it.
 _MASS = "1"
-#: Links one behind the other: MuJoCo refuses more than 1,023, after a time that grows with their square.
+#: Longest chain of links. MuJoCo refuses more than 1,023, after a time that grows with their square.
 _DEEPEST = 1_000
-#: What each kind of joint is in MuJoCo, in the order of its coordinates: slides along the axes, then turns.
+#: MuJoCo's joints for a planar or floating joint, in the order of its coordinates.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: A joint's coordinates and rates in urdfkin's layout.
+#: Numbers of coordinates and of joint velocities of a joint in urdfkin's layout; other kinds have (1, 1).
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
 
 @dataclass(frozen=True, slots=True)
 class _Joint:
-    """A joint as the text has it, and the link that it carries."""
+    """A joint of the text, with the names of its parent and child links."""
 
     name: str
     kind: str
@@ -60,7 +62,7 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """A moving joint: where its numbers are in MuJoCo's q and v, and in urdfkin's; its rule if it follows."""
+    """Indices of a moving joint in MuJoCo's and in urdfkin's vectors, with its mimic rule."""
 
     kind: str
     their_q: int
@@ -72,17 +74,17 @@ class _Place:
 
 
 class MujocoOracle:
-    """MuJoCo's answers for one robot, in urdfkin's layout: what `pinocchio.Oracle` is for Pinocchio.
+    """MuJoCo's results for one robot in urdfkin's layout, with the methods of `pinocchio.Oracle`.
 
     Args:
-        text: The URDF.
-        tree: urdfkin's reading: it must have the same joints in the same order; nothing is taken from it.
-        mimic: Whether followers follow.
-        moving_base: Hang the root from a floating joint that is given the base's motion.
-        root_joint: `"floating"` or `"planar"` when the tree hangs from such a joint.
+        text: The URDF text.
+        tree: urdfkin's tree, only for a comparison of the joints and their order.
+        mimic: True: couple mimic joints. False: each moves freely.
+        moving_base: Connect the root to the world by a floating joint, which receives the base's motion.
+        root_joint: "floating" or "planar" if the tree has such a root joint.
 
     Raises:
-        OracleError: MuJoCo does not accept the text, or it holds what MuJoCo does not know.
+        OracleError: MuJoCo does not accept the text, or the text has a feature that MuJoCo lacks.
     """
 
     def __init__(
@@ -97,7 +99,7 @@ class MujocoOracle:
         self._mujoco, self._name, self._moving_base = library(), tree.name, moving_base
         if (depth := depth_of(tree)) > _DEEPEST:
             raise OracleError(
-                f"MuJoCo is asked about chains of up to {_DEEPEST:,} links",
+                f"MuJoCo checks chains of up to {_DEEPEST:,} links",
                 where=tree.name,
                 found=f"{depth:,}",
             )
@@ -107,7 +109,7 @@ class MujocoOracle:
             moving = [joint.name for joint in joints if joint.kind != "fixed"]
             rules = rules_of_text(text, set(moving)) if mimic else {}
         except (ValueError, KeyError, ExpatError) as error:
-            raise OracleError("the text reads differently", where=tree.name, found=str(error)) from error
+            raise OracleError("the oracle cannot read the text", where=tree.name, found=str(error)) from error
         self._children = {joint.name: joint.child for joint in joints}
         carrier = [_Joint("", "floating", "", self._links[0])] if moving_base else []
         self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if carrier else []), *self._links])}
@@ -122,7 +124,7 @@ class MujocoOracle:
     # -- the model -----------------------------------------------------------------------------------
 
     def _compiled(self, joints: Sequence[_Joint]) -> Any:
-        """MuJoCo's model of the links and joints."""
+        """Return MuJoCo's model of the links and joints."""
         mujoco = self._mujoco
         robot = Element("robot", name="r")
         options = {"fusestatic": "false", "boundmass": "0", "boundinertia": "0"}
@@ -149,23 +151,23 @@ class MujocoOracle:
             raise OracleError("MuJoCo does not accept this robot", where=self._name, found=first) from error
 
     def _joint(self, i: int, joint: _Joint) -> Element:
-        """A joint for MuJoCo to read: its place and axis in the words of the text, and no more."""
+        """Return a joint element for MuJoCo with the original text of origin and axis only."""
         kind = "fixed" if joint.kind in _PARTS else joint.kind
-        made = Element("joint", name=f"j{i}", type="continuous" if kind == "revolute" else kind)
-        SubElement(made, "parent", link=self._bodies[joint.parent])
-        SubElement(made, "child", link=self._bodies[joint.child])
+        element = Element("joint", name=f"j{i}", type="continuous" if kind == "revolute" else kind)
+        SubElement(element, "parent", link=self._bodies[joint.parent])
+        SubElement(element, "child", link=self._bodies[joint.child])
         for tag, names in (("origin", ("xyz", "rpy")), ("axis", ("xyz",))):
             found = None if joint.element is None else joint.element.find(tag)
             if found is not None and found.get("quat_xyzw") is not None:
                 raise OracleError("MuJoCo does not know quat_xyzw", where=f"joint {joint.name}")
             if found is not None and (tag == "origin" or kind != "fixed"):
-                SubElement(made, tag, {name: x for name in names if (x := found.get(name)) is not None})
-        if kind == "prismatic":  # MuJoCo asks for one, and its kinematics does not look at it
-            SubElement(made, "limit", lower="-1", upper="1")
-        return made
+                SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
+        if kind == "prismatic":  # required by MuJoCo, not used by its kinematics
+            SubElement(element, "limit", lower="-1", upper="1")
+        return element
 
     def _laid_out(self, joints: Sequence[_Joint], rules: Mapping[str, Mimic]) -> Iterator[_Place]:
-        """Where each moving joint's numbers are, in urdfkin's layout and in MuJoCo's."""
+        """Yield the indices of each moving joint in urdfkin's layout and in MuJoCo's."""
         leaders, q, v = dict[str, tuple[int, int]](), 0, 0
         for joint in joints:
             sizes = _SIZES.get(joint.kind, (1, 1))
@@ -180,15 +182,15 @@ class MujocoOracle:
             rule = rules.get(joint.name, Mimic(joint.name, 1.0, 0.0))
             if joint.name and rule.leader not in leaders:
                 raise OracleError(
-                    "there is no joint to follow", where=f"joint {joint.name}", found=rule.leader
+                    "the mimicked joint does not exist", where=f"joint {joint.name}", found=rule.leader
                 )
-            at = leaders.get(rule.leader, (-1, -1))  # the carrier's numbers are the base's
+            at = leaders.get(rule.leader, (-1, -1))  # the carrier's numbers come from the base's motion
             yield _Place(
                 joint.kind, int(own.qposadr[0]), int(own.dofadr[0]), *at, rule.multiplier, rule.offset
             )
 
     def _ids(self, frames: Sequence[str]) -> list[int]:
-        """MuJoCo's bodies: a link's own; a joint's frame is that of the link that it carries."""
+        """Return the indices of MuJoCo's bodies; a joint's frame is that of its child link."""
         return [self._model.body(self._bodies[self._link(name)]).id for name in frames]
 
     def _link(self, name: str) -> str:
@@ -209,13 +211,13 @@ class MujocoOracle:
     # -- quantities ----------------------------------------------------------------------------------
 
     def placements(self, q: FloatArray, frames: Sequence[str], base: BaseNumbers | None = None) -> FloatArray:
-        """(n, frames, 4, 4) T_world_frame: `mj_kinematics`, a body's `xpos` and `xmat`."""
+        """Return T_world_frame (n, frames, 4, 4) by `mj_kinematics`: `xpos` and `xmat` of the bodies."""
         return self._poses(q, None, None, frames, base, lambda data, body, k: None)
 
     def quaternions(
         self, q: FloatArray, frames: Sequence[str], base: BaseNumbers | None = None
     ) -> FloatArray:
-        """(n, frames, 4) orientations, a body's `xquat`, scalar last, with qw >= 0."""
+        """Return quaternions (n, frames, 4), `xquat` of the bodies, scalar last, with qw >= 0."""
         out = np.empty((len(q), len(frames), 4))
 
         def read(data: Any, body: int, at: tuple[int, int]) -> None:
@@ -232,17 +234,17 @@ class MujocoOracle:
         reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, 6): `mj_objectVelocity`, which gives [angular; linear]."""
+        """Return velocities (n, frames, 6) by `mj_objectVelocity`, which returns [angular; linear]."""
         poses, velocity = self._moved(q, v, None, frames, base)[:2]
         return _referred(reference, poses, velocity)
 
     def hessians(self, *asked: object) -> FloatArray:
-        """None: MuJoCo has no derivative of a Jacobian by the coordinates.
+        """Raise an error: MuJoCo has no derivative of a Jacobian by the coordinates.
 
         Raises:
             OracleError: always.
         """
-        raise OracleError("MuJoCo computes no Hessian", where=self._name, remedy="ask Pinocchio about it")
+        raise OracleError("MuJoCo computes no Hessian", where=self._name, remedy="use oracle='pinocchio'")
 
     def accelerations(
         self,
@@ -253,11 +255,11 @@ class MujocoOracle:
         reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, 6): `mj_objectAcceleration`, classical; gravity is set to zero."""
+        """Return classical accelerations (n, frames, 6) by `mj_objectAcceleration` without gravity."""
         poses, velocity, acceleration = self._moved(q, v, a, frames, base)
         if Reference.of(reference) is not Reference.WORLD:
             return _referred(reference, poses, acceleration)
-        # Of the point of the body at the world's origin: spatial there, then classical again.
+        # Move the spatial acceleration to the world origin, then convert it to the classical one.
         spatial = acceleration.copy()
         spatial[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
         out, there = _referred(reference, poses, spatial), _referred(reference, poses, velocity)
@@ -271,7 +273,7 @@ class MujocoOracle:
         reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, 6, nv): `mj_jac` at the body's origin."""
+        """Return Jacobians (n, frames, 6, nv) by `mj_jac` at the body's origin."""
         J = np.empty((len(q), len(frames), 6, self.nv))
         spread = self._spread(q)
 
@@ -289,7 +291,7 @@ class MujocoOracle:
         reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, 6, nv): `mj_jacDot` at the body's origin, which is the rate of `mj_jac`'s numbers."""
+        """Return J-dot (n, frames, 6, nv) by `mj_jacDot` at the body's origin, the derivative of `mj_jac`."""
         J, rate = np.empty((2, len(q), len(frames), 6, self.nv))
         velocity = np.empty((len(q), len(frames), 6))
         spread, spread_rate = self._spread(q), self._spread_rate(q, v)
@@ -304,7 +306,7 @@ class MujocoOracle:
         poses = self._poses(q, v, None, frames, base, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         which = Reference.of(reference)
-        if which is Reference.LOCAL:  # the rate of the numbers in turning axes
+        if which is Reference.LOCAL:  # the derivative in rotating axes
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _referred(reference, poses, rate, columns=True)
@@ -313,13 +315,13 @@ class MujocoOracle:
         return out
 
     def joint_jacobians(self, q: FloatArray, among: slice, reference: Reference | str) -> FloatArray:
-        """(n, joints, 6, nv): of the bodies that a run of the moving joints carry, in the tree's order."""
+        """Return Jacobians (n, joints, 6, nv) of a slice of the moving joints, in tree order."""
         return self.jacobians(q, self._moving[among], reference)
 
     def joint_jacobian_rates(
         self, q: FloatArray, v: FloatArray, among: slice, reference: Reference | str
     ) -> FloatArray:
-        """(n, joints, 6, nv), likewise."""
+        """Return J-dot (n, joints, 6, nv) of a slice of the moving joints, in tree order."""
         return self.jacobian_rates(q, v, self._moving[among], reference)
 
     def _moved(
@@ -330,7 +332,7 @@ class MujocoOracle:
         frames: Sequence[str],
         base: BaseNumbers | None,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(n, frames, ...) placements, velocities and classical accelerations, in LOCAL_WORLD_ALIGNED."""
+        """Return placements, velocities, classical accelerations (n, frames, ...) in LOCAL_WORLD_ALIGNED."""
         velocity, acceleration = np.empty((2, len(q), len(frames), 6))
 
         def read(data: Any, body: int, at: tuple[int, int]) -> None:
@@ -349,7 +351,7 @@ class MujocoOracle:
         base: BaseNumbers | None,
         read: Callable[[Any, int, tuple[int, int]], None],
     ) -> FloatArray:
-        """(n, frames, 4, 4) placements; `read` sees MuJoCo's workspace at each sample and frame."""
+        """Return placements (n, frames, 4, 4); call `read` with MuJoCo's data at each sample and frame."""
         mujoco, model, data, bodies = self._mujoco, self._model, self._data, self._ids(frames)
         out = np.zeros((len(q), len(bodies), 4, 4))
         out[..., 3, 3] = 1.0
@@ -370,7 +372,7 @@ class MujocoOracle:
         return out
 
     def _columns(self, function: Callable[..., None], data: Any, body: int) -> FloatArray:
-        """(6, MuJoCo's nv) of the body's origin, [linear; angular]."""
+        """Return the Jacobian (6, MuJoCo's nv) of the body's origin, [linear; angular]."""
         J = np.zeros((6, self._model.nv))
         linear, angular = np.zeros((3, self._model.nv)), np.zeros((3, self._model.nv))
         function(self._model, data, linear, angular, data.xpos[body], body)
@@ -378,14 +380,14 @@ class MujocoOracle:
         return J
 
     def _six(self, function: Callable[..., None], data: Any, body: int) -> FloatArray:
-        """(6,) [linear; angular] of the body's origin in world axes; MuJoCo gives [angular; linear]."""
+        """Return [linear; angular] (6,) of the body's origin in world axes; MuJoCo has [angular; linear]."""
         six = np.empty(6)
         function(self._model, data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
         return np.roll(six, 3)
 
     @property
     def _data(self) -> Any:
-        """MuJoCo's workspace; each thread has its own."""
+        """MuJoCo's data structure; each thread has its own."""
         if not hasattr(self._local, "data"):
             self._local.data = self._mujoco.MjData(self._model)
         return self._local.data
@@ -395,7 +397,7 @@ class MujocoOracle:
     def _states(
         self, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: BaseNumbers | None
     ) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
-        """(n, ...) MuJoCo's qpos, qvel and qacc."""
+        """Return MuJoCo's qpos, qvel and qacc (n, ...)."""
         n = len(q)
         qpos = np.zeros((n, self._model.nq))
         for place in self._places:
@@ -422,7 +424,7 @@ class MujocoOracle:
             second = (S @ a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self._moving_base and base is not None:
-            # Slides along the world's axes, and a ball in the base's own.
+            # The slides are along world axes; the ball is in the base's own axes.
             at, back = self._places[0].their_v, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]
@@ -433,7 +435,7 @@ class MujocoOracle:
         return qpos, rates, second
 
     def _spread(self, q: FloatArray) -> FloatArray:
-        """(n or 1, MuJoCo's nv, nv) S: MuJoCo's rates are S v."""
+        """Return S (n or 1, MuJoCo's nv, nv), with qvel = S v."""
         S = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for place in self._places:
             at, own = place.their_v, place.v
@@ -449,7 +451,7 @@ class MujocoOracle:
         return S
 
     def _spread_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """(n or 1, MuJoCo's nv, nv) S': a floating or planar joint's slides turn, R' = R [w]x."""
+        """Return S' (n or 1, MuJoCo's nv, nv), from R' = R [w]x of floating and planar joints."""
         S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for place in self._places:
             at, own = place.their_v, place.v
@@ -462,7 +464,7 @@ class MujocoOracle:
         return S_rate
 
     def _turn(self, place: _Place, q: FloatArray) -> tuple[FloatArray, int]:
-        """(n, slides, slides) from the axes of a planar or floating joint to those that its slides have."""
+        """Return the rotation (n, slides, slides) from a joint's own axes to those of its slides."""
         own = q[:, place.q : place.q + 7]
         if place.kind == "floating":
             unit = own[:, 3:] / np.linalg.norm(own[:, 3:], axis=1, keepdims=True)
@@ -472,9 +474,9 @@ class MujocoOracle:
 
 
 def _weighing_its_root(model: Any, root: str) -> Any:
-    """The model without mass but for its root, where the centre of mass then is, exactly.
+    """Set all masses to zero except that of the root, so that the root's origin is the centre of mass.
 
-    MuJoCo measures from there, and a lever that should be nothing has to be nothing.
+    MuJoCo computes velocities for that point. Lever arms that should be zero are then exactly zero.
     """
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
@@ -488,7 +490,7 @@ def _weighing_its_root(model: Any, root: str) -> Any:
 
 
 def _ordered(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
-    """The text's joints depth first, siblings by name, and the links, root first."""
+    """Return the joints of the text, depth first with siblings by name, and the links, root first."""
     robot = plain_xml(text)
     links = [element.get("name", "") for element in robot.iterfind("link")]
     below, carried = dict[str, list[_Joint]](), set[str]()
@@ -521,12 +523,12 @@ def _name(joint: _Joint) -> bytes:
 
 
 def _scalar_first(quaternion: FloatArray) -> FloatArray:
-    """MuJoCo's quaternions are (w, x, y, z)."""
+    """Return quaternions in MuJoCo's order (w, x, y, z)."""
     return np.roll(quaternion, 1, axis=-1)
 
 
 def _rotation(quaternion: FloatArray) -> FloatArray:
-    """(..., 3, 3) of unit quaternions (w, x, y, z)."""
+    """Return rotations (..., 3, 3) of unit quaternions (w, x, y, z)."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -539,7 +541,7 @@ def _rotation(quaternion: FloatArray) -> FloatArray:
 def _referred(
     reference: Reference | str, poses: FloatArray, values: FloatArray, *, columns: bool = False
 ) -> FloatArray:
-    """Six-vectors, or Jacobians' columns, of LOCAL_WORLD_ALIGNED in another reference."""
+    """Convert six-vectors, or Jacobian columns, from LOCAL_WORLD_ALIGNED to another reference frame."""
     which = Reference.of(reference)
     if which is Reference.LOCAL_WORLD_ALIGNED:
         return values

@@ -1,10 +1,10 @@
-"""What a call was asked, as its user gave it: the oracle's way from arguments to flat batches.
+"""Convert the arguments of a call to flat batches for the oracle, independently of `urdfkin.verify.call`.
 
-`urdfkin.verify.call` brings the same arguments into shape for the recursion. The two share no code, so that a
-batch that is broadcast, reordered or read wrongly on the one way does not come out the same on the other.
+`urdfkin.verify.call` converts the same arguments for the recursion. The two modules share no code. A wrong
+broadcast, order or name in one of them therefore leads to a disagreement.
 
-So are names: each is looked up again among the joints in their order, which the oracle compares with its own.
-The numbers of a pose, and how a number with a unit reads (`urdfkin.errors.numbers`), are found once.
+Names are looked up here a second time, among the joints in their order. The oracle compares that order with
+its own. Only the numbers of a pose and the parser of units (`urdfkin.errors.numbers`) are shared.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.pinocchio_inputs import BaseNumbers
 
-#: For so many rates of a joint: what its coordinates, or its rates, are called behind its name.
+#: Suffixes of the names of coordinates and joint velocities, by the number of joint velocities of a joint.
 _OF_Q = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
 _OF_RATES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
 
 class _Names:
-    """Where the number of each name is, in q or in v.
+    """Lookup from names to indices in q or v.
 
     Args:
-        joints: The names of the joints, in order, and how many rates each has.
+        joints: Name and number of joint velocities of each joint, in order.
         of: `_OF_Q` or `_OF_RATES`.
 
     >>> names = _Names([("base", 3), ("elbow", 1)], _OF_Q)
@@ -52,7 +52,7 @@ class _Names:
             at += len(own) or 1
 
     def place(self, name: str) -> int | slice:
-        """The index of a number, or of a joint's; raises OracleError where nothing is called so."""
+        """Return the index of a number, or the slice of a joint; raise OracleError for an unknown name."""
         if name in self._joints:
             at, own = self._joints[name]
             return slice(at, at + len(own)) if own else at
@@ -60,10 +60,10 @@ class _Names:
             suffix = name.removeprefix(joint).lstrip(".:")
             if name.startswith(joint) and suffix in own:
                 return at + own.index(suffix)
-        raise OracleError("no number is called so", found=repr(name[:60]))
+        raise OracleError("no number has this name", found=repr(name[:60]))
 
     def pairs(self, text: str) -> list[tuple[str, str]]:
-        """Each name that an equals sign follows in a text, and the number behind it."""
+        """Return the pairs (name, number) of a text with `NAME=NUMBER`."""
         plain = " ".join(text.split())
         plain = plain[1:-1].strip() if plain[:1] + plain[-1:] in ("[]", "()", "{}") else plain
         names = [
@@ -77,7 +77,7 @@ class _Names:
 
 
 def _number(text: str) -> float:
-    """In SI units."""
+    """Return the number in SI units."""
     found = parse_quantity(text)
     value = parse_float(text) if found is None else found.value
     if value is None:
@@ -86,7 +86,7 @@ def _number(text: str) -> float:
 
 
 class BaseRows(NamedTuple):
-    """A base's motion, one row for each configuration: (n, 4, 4), (n, 6), (n, 6)."""
+    """Motion of the base, one row for each configuration: (n, 4, 4), (n, 6), (n, 6)."""
 
     placement: FloatArray
     velocity: FloatArray
@@ -94,13 +94,13 @@ class BaseRows(NamedTuple):
 
 
 class QueryBatch(NamedTuple):
-    """Some configurations of a question, flat.
+    """Some configurations of a query as a flat batch.
 
     Attributes:
-        frames: As the user named them.
-        reference: As the user named it.
-        inputs: q (n, nq), then v and a (n, nv) as far as they were given.
-        base: How the base moves; None if it stands still.
+        frames: Names of the frames, as the user gave them.
+        reference: The reference frame, as the user gave it.
+        inputs: q (n, nq), or q and v (n, nv), or q, v and a (n, nv).
+        base: Motion of the base; None: fixed at the world origin.
     """
 
     frames: tuple[str, ...]
@@ -113,12 +113,12 @@ class OracleQuery:
     """The arguments of one call.
 
     Args:
-        frame: A name or several.
-        reference: A member or its name.
-        base: None if it stands still.
-        inputs: q, v, a as far as they were given: numbers that broadcast.
-        named: What of them was given by name, as it was given; None for the others.
-        joints: The names of the joints that have coordinates, in order, and how many rates each has.
+        frame: Name of a frame, or several names.
+        reference: A `Reference` or its name.
+        base: Motion of the base; None: fixed at the world origin.
+        inputs: q, or q and v, or q, v and a, as numbers that broadcast.
+        named: The original argument of each input that was given by names; None for the others.
+        joints: Name and number of joint velocities of each joint with coordinates, in order.
     """
 
     def __init__(
@@ -136,7 +136,7 @@ class OracleQuery:
         self._given, self._named, self._joints = inputs, named or [None] * len(inputs), joints
 
     def read(self) -> None:
-        """Read the numbers now, before what they may be views of is written to."""
+        """Convert the inputs now, before `out` is written, of which they may be views."""
         _ = self._inputs
 
     @cached_property
@@ -149,7 +149,7 @@ class OracleQuery:
     def _by_name(
         self, x: FloatArray, given: str | Mapping[str, ArrayLike], of: Mapping[int, tuple[str, ...]]
     ) -> FloatArray:
-        """`x` with each number that was given by a name where that name's coordinate or rate is."""
+        """Return `x` with each named number at the index of its name."""
         names = _Names(self._joints, of)
         for name, value in given.items() if isinstance(given, Mapping) else names.pairs(given):
             x[..., names.place(name)] = _number(value) if isinstance(value, str) else np.asarray(value, float)
@@ -157,7 +157,7 @@ class OracleQuery:
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """The batch shape of the result."""
+        """Batch shape of the result."""
         axes = [x.shape[:-1] for x in self._inputs]
         if self.base is not None:
             axes += [self.base.placement.shape[:-2], self.base.velocity.shape[:-1]]
@@ -166,11 +166,11 @@ class OracleQuery:
 
     @cached_property
     def n(self) -> int:
-        """How many configurations it is about."""
+        """Number of configurations."""
         return math.prod(self.shape)
 
     def rows(self, part: slice | IntArray) -> QueryBatch:
-        """Some of the configurations, counted through the batch with its last axis first."""
+        """Return some of the configurations, by index in the flat batch (C order)."""
         numbers = np.arange(part.start, part.stop) if isinstance(part, slice) else part
         places = np.unravel_index(numbers, self.shape) if self.shape else (np.zeros(1, dtype=np.int64),)
 
@@ -184,12 +184,12 @@ class OracleQuery:
         return QueryBatch(self.frames, self.reference, tuple(map(pick, self._inputs)), base)
 
     def flat(self, result: FloatArray, axes: int) -> FloatArray:
-        """(n, frames, ...) of a result as it is handed out, each matrix or six-vector of `axes` axes.
+        """Return (n, frames, ...) of a result in the user's shape; one result has `axes` axes.
 
         Raises:
-            OracleError: it has another shape than the question.
+            OracleError: the shape does not match the query.
         """
         own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
         if result.shape != (*self.shape, *several, *own):
-            raise OracleError("a result has another batch shape than what was asked", found=str(result.shape))
+            raise OracleError("a result's batch shape does not match the arguments", found=str(result.shape))
         return result.reshape(self.n, len(self.frames), *own)

@@ -1,7 +1,7 @@
-"""Who can be asked whether a result is true: Pinocchio, which is asked by default, and MuJoCo.
+"""The oracles: Pinocchio, the default, and MuJoCo.
 
->>> WITNESSES["mujoco"].title
-'MuJoCo'
+>>> witness_of("pinocchio").title
+'Pinocchio'
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from urdfkin.errors import UnknownNameError
 from urdfkin.errors.validators import as_str
 from urdfkin.system.lazy_import import lazy_import
 
-#: By which name a witness is asked for.
+#: Name of an oracle in arguments.
 WitnessName = Literal["pinocchio", "mujoco"]
 
 
 @dataclass(frozen=True, slots=True)
 class Witness:
-    """A library that computes the same from its own reading of the text.
+    """An oracle: a library that reads the URDF text itself and computes the same quantities.
 
     Attributes:
-        name: As it is asked for.
-        title: As a sentence has it.
-        package: As Python's packages have it.
-        version: The version that is installed, found without importing it.
-        oracle: Makes its model of a robot, (text, tree, mimic=, moving_base=, root_joint=).
-        size: The magnitudes that its bound is made of: see `urdfkin.verify.bounds`.
+        name: Its name in arguments.
+        title: Its name in sentences.
+        package: Name of its Python package.
+        version: Function that returns the installed version without importing the library.
+        oracle: Function that makes its model of a robot, (text, tree, mimic=, moving_base=, root_joint=).
+        size: Function that converts magnitudes to those of its bound (`urdfkin.verify.bounds`).
     """
 
     name: WitnessName
@@ -43,7 +43,7 @@ class Witness:
 
     @property
     def words(self) -> str:
-        """Name and version, for certificates."""
+        """Name and version, such as "Pinocchio 4.1.0"."""
         return f"{self.title} {self.version()}"
 
 
@@ -63,7 +63,7 @@ MUJOCO = Witness(
     lazy_import("urdfkin.verify.mujoco:MujocoOracle"),
     lazy_import("urdfkin.verify.bounds:about_the_root"),
 )
-WITNESSES: dict[str, Witness] = {witness.name: witness for witness in (PINOCCHIO, MUJOCO)}
+WITNESSES: dict[str, Witness] = {oracle.name: oracle for oracle in (PINOCCHIO, MUJOCO)}
 
 
 def _known(name: str) -> Witness:
@@ -71,16 +71,16 @@ def _known(name: str) -> Witness:
 
 
 def witness_of(name: object) -> Witness:
-    """The witness of that name.
+    """Return the oracle of a name.
 
     Raises:
-        UnknownNameError: there is none.
+        UnknownNameError: there is no such oracle.
         InputError: it is not installed.
     """
-    asked = as_str(name, "oracle")
-    witness = next((one for one in WITNESSES.values() if one.name == asked), None)
-    if witness is None:
-        raise UnknownNameError("oracle", asked, WITNESSES)
-    if witness is not PINOCCHIO:
-        witness.version()  # now rather than in the middle of something
-    return witness
+    wanted = as_str(name, "oracle")
+    oracle = next((one for one in WITNESSES.values() if one.name == wanted), None)
+    if oracle is None:
+        raise UnknownNameError("oracle", wanted, WITNESSES)
+    if oracle is not PINOCCHIO:
+        oracle.version()  # raises now, not at the first check
+    return oracle

@@ -1,7 +1,7 @@
-"""Whether the numbers that write a rotation down mean that rotation: Pinocchio makes a matrix of them again.
+"""Check roll-pitch-yaw angles and quaternions: Pinocchio converts them back to rotation matrices.
 
-Numbers are not compared with numbers: where roll and yaw turn about one axis, or a quaternion may have either
-sign, two correct programs write the same rotation differently.
+The matrices are compared, not the numbers. Two correct programs may return different numbers for the same
+rotation, at gimbal lock or with a quaternion of the other sign.
 """
 
 from __future__ import annotations
@@ -15,24 +15,25 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.pinocchio_module import pinocchio
 
-#: On either side: angles by arctan2, their sines and cosines, products of three of them; or a square root, a
-#: quotient, products of two of four numbers. Less than 8 eps each, as of a joint's constant (`roundings`).
+#: Roundings of both sides, less than 8 eps each, like a joint's constant (`roundings`). For angles: arctan2,
+#: sines, cosines and products of three. For quaternions: a square root, a quotient and products of two.
 _ROUNDINGS = 16.0
 
 
 def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Callable[[int], str]) -> None:
-    """Hold Pinocchio's rotations of the numbers against those that they are of.
+    """Compare Pinocchio's rotations of some numbers with the rotations they were computed from.
 
-    A matrix that is rotated by d from the nearest rotation has no numbers that mean it to less than d.
+    The bound includes the distance of `R` from the nearest rotation, because no angles or quaternion can
+    represent `R` more closely.
 
     Args:
-        numbers: (n, 3) roll, pitch, yaw, or (n, 4) quaternions, scalar last.
+        numbers: (n, 3) roll, pitch, yaw in rad, or (n, 4) quaternions, scalar last.
         R: (n, 3, 3) checked rotations.
-        frame: Whose they are, for the message.
-        again: The line that computes one of them again.
+        frame: Name of the frame, for the message.
+        again: Function that returns the line that reproduces a sample.
 
     Raises:
-        VerificationError: Pinocchio's are others.
+        VerificationError: a rotation differs by more than the bound.
     """
     pin = pinocchio()
     if numbers.shape[-1] == 3:

@@ -1,14 +1,12 @@
-"""Everything that asks Pinocchio.
+"""The oracle Pinocchio.
 
-The oracle reads the URDF text itself, with its own parser, so that nothing of urdfkin's reading is shared.
-Nor is anything between a user's arguments and the result: which frame a name means
-(`urdfkin.verify.pinocchio_inputs`), which number of q is whose (`urdfkin.verify.pinocchio_inputs`), how the
-base moves (`urdfkin.verify.pinocchio_inputs`) are all found here anew, from Pinocchio's model and the numbers
-as they were given.
+The oracle shares no code with urdfkin's computation. It reads the URDF text with its own parser. The frame of
+a name, the joint of each number of q, and the motion of the base are determined a second time
+(`urdfkin.verify.pinocchio_inputs`), from Pinocchio's model and the user's original numbers.
 
-Its model is built without mimic joints (with them, Pinocchio 4.1 refuses four of the robots it ships with);
-followers are coupled by the rules as `urdfkin.verify.pinocchio_inputs` reads them from the text once more:
-q_full = G q + g_0, v_full = G v, J = J_full G.
+Pinocchio's model is built without mimic joints, because Pinocchio 4.1 with mimic joints refuses four of the
+robots it ships with. `urdfkin.verify.pinocchio_inputs` reads the mimic rules from the text a second time.
+They give q_full = G q + g_0, v_full = G v and J = J_full G.
 """
 
 from __future__ import annotations
@@ -37,38 +35,40 @@ from urdfkin.verify.pinocchio_module import pinocchio, version
 
 __all__ = ["MOST_RATES", "Oracle", "OracleError", "depth_of", "version"]
 
-#: Pinocchio recurses over links: less than 4 kB of stack for each was measured (4.1.0), room for more.
+#: Bytes of stack for each link. Pinocchio recurses over links; 4.1.0 needs less than 4 kB for each.
 _STACK_FOR_A_LINK = 16_384
-#: A chain shorter than this fits any stack.
+#: A chain of fewer links fits into any stack.
 _SHALLOW = 100
-#: Pinocchio's workspace takes about 64 bytes times the cube of the rates (4.1.0 measured): at most 2 GB.
+#: Largest nv. Pinocchio 4.1.0 needs about 64 bytes * nv^3 (measured); this limits it to 2 GB.
 MOST_RATES = 315
 
-#: Names that an error lists at most.
+#: Most names that an error lists.
 _NAMED = 5
-#: What carries a robot whose base moves.
+#: Name of the free-flyer of a moving base.
 _BASE = "base"
 
 
 def build_model(text: str, tree: KinematicTree, root_joint: str | None = None, *, mimic: bool = False) -> Any:
-    """Pinocchio's model of a text; what would end the process, for want of memory or stack, never happens.
+    """Return Pinocchio's model of a URDF text.
+
+    Robots that would exhaust memory or stack, and so crash the process, are rejected or get a larger stack.
 
     Args:
-        text: The URDF.
-        tree: urdfkin's reading of it, for its size.
-        root_joint: `"floating"` or `"planar"` to stand it on such a joint.
-        mimic: Whether followers follow in the model.
+        text: The URDF text.
+        tree: urdfkin's tree of it, for the size.
+        root_joint: "floating" or "planar" to connect the root to the world by such a joint.
+        mimic: True: the model couples its mimic joints.
 
     Raises:
-        OracleError: Pinocchio does not accept the text.
-        InstallationError: Pinocchio is missing, or another project goes by its name.
+        OracleError: Pinocchio does not accept the text, or the robot is too large.
+        InstallationError: Pinocchio is missing, or a different project has its name.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MOST_RATES:
         raise OracleError(
-            f"Pinocchio's memory grows with the cube of the rates; urdfkin asks it up to {MOST_RATES}",
+            f"too many joint velocities for Pinocchio: its memory grows with nv^3; the limit is {MOST_RATES}",
             where=tree.name,
-            found=f"{rates}, which would take {64e-9 * rates**3:.0f} GB",
+            found=f"nv = {rates}, which needs {64e-9 * rates**3:.0f} GB",
         )
     depth = depth_of(tree)
     if depth < _SHALLOW:
@@ -84,34 +84,33 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # What `check` knows to be refused is not asked about: this, it has overlooked.
+        # `check` reports the known reasons before this point, so it has overlooked this one.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
             found=str(error).strip(),
-            remedy="with mimic=False it may"
+            remedy="try mimic=False"
             if mimic
-            else "`urdfkin check` knows no reason: please report this as its error, with the URDF",
+            else "`urdfkin check` found no reason: please report this as an error of urdfkin, with the URDF",
         ) from error
 
 
 class Oracle:
-    """Pinocchio's answers for one robot, in urdfkin's layout of q, v and Jacobian columns.
+    """Pinocchio's results for one robot, in urdfkin's layout of q, v and Jacobian columns.
 
-    Every method takes flat batches (n, nq), (n, nv) and frames by name, as the user gave them.
+    Each method takes flat batches (n, nq), (n, nv) and the names of frames, as the user gave them.
 
     Args:
-        text: The URDF, as Pinocchio is to read it.
-        tree: urdfkin's reading of the same text: it must have the same joints in the same order, the same
-            ones following; nothing is taken from it.
-        mimic: Whether followers follow; False: the user wants them free.
-        moving_base: Build the model on a free-flyer, so that a base's motion can be given.
-        root_joint: `"floating"` or `"planar"` when the tree was hung from such a joint, which the text does
-            not know. The names alone do not tell: a file may use them itself.
+        text: The URDF text.
+        tree: urdfkin's tree of the same text, only for a comparison of the joints, their order and the mimic
+            joints.
+        mimic: True: couple mimic joints. False: each moves freely.
+        moving_base: Build the model on a free-flyer, which receives the base's motion.
+        root_joint: "floating" or "planar" if the tree has such a root joint, which the text does not contain.
 
     Raises:
-        OracleError: Pinocchio does not accept the text, or finds other joints in it.
-        InstallationError: Pinocchio is missing, or another project goes by its name.
+        OracleError: Pinocchio does not accept the text, or reads other joints from it.
+        InstallationError: Pinocchio is missing, or a different project has its name.
     """
 
     def __init__(
@@ -138,22 +137,22 @@ class Oracle:
         self._local = threading.local()
 
     def _rules(self, text: str, joints: Sequence[str]) -> dict[str, Mimic]:
-        """The text's own mimic rules; urdfkin's reading of them is under test too."""
+        """Return the mimic rules of the text, read independently of urdfkin's reader."""
         try:
             return rules_of_text(text, set(joints))
         except (ValueError, ExpatError) as error:
             raise OracleError(
-                "the mimic rules read differently", where=self._tree.name, found=str(error)
+                "the oracle's reader cannot read the mimic rules", where=self._tree.name, found=str(error)
             ) from error
 
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
-        """Have the model carried by a joint that can be given the base's motion; a root joint moves on top.
+        """Put the model on a free-flyer for the base's motion; a root joint of the robot remains.
 
         Returns:
-            Where its joints and its frames have gone to; the world has gone to the base.
+            The new indices of the joints and of the frames; the world's becomes the base's.
         """
         pin, model, nowhere = self._pin, self._model, self._pin.SE3.Identity()
-        # Numbers for names: a link may be called as a joint, or as the carrier, and appendModel refuses both.
+        # appendModel rejects equal names of a link and a joint or the free-flyer, so use numbers as names.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):
@@ -170,24 +169,24 @@ class Oracle:
 
     @property
     def _data(self) -> Any:
-        """Pinocchio's workspace; each thread has its own."""
+        """Pinocchio's data structure; each thread has its own."""
         if not hasattr(self._local, "data"):
             self._local.data = self._model.createData()
         return self._local.data
 
     def _ids(self, frames: Sequence[str]) -> list[int]:
-        """Pinocchio's indices of frames."""
+        """Return Pinocchio's indices of frames."""
         return [self._index[self._frames.index(name)] for name in frames]
 
     def _reference(self, reference: Reference | str) -> Any:
-        """Pinocchio's own member of that name."""
+        """Return Pinocchio's ReferenceFrame of a reference or its name."""
         name = reference.name if isinstance(reference, Reference) else str(reference).upper()
         return self._pin.ReferenceFrame.names[name]
 
     # -- quantities ----------------------------------------------------------------------------------
 
     def placements(self, q: FloatArray, frames: Sequence[str], base: BaseNumbers | None = None) -> FloatArray:
-        """(n, frames, 4, 4) T_world_frame: `updateFramePlacements`."""
+        """Return T_world_frame (n, frames, 4, 4) by `updateFramePlacement`."""
         pin, model, data, ids = self._pin, self._model, self._data, self._ids(frames)
         out = np.empty((len(q), len(ids), 4, 4))
         for k, q_k in enumerate(self.configurations(q, base)):
@@ -199,7 +198,7 @@ class Oracle:
     def quaternions(
         self, q: FloatArray, frames: Sequence[str], base: BaseNumbers | None = None
     ) -> FloatArray:
-        """(n, frames, 4) orientations as Pinocchio's quaternions, scalar last, with qw >= 0."""
+        """Return Pinocchio's quaternions (n, frames, 4), scalar last, with qw >= 0."""
         R = self.placements(q, frames, base)[..., :3, :3]
         quats = [self._pin.Quaternion(np.array(one)).coeffs() for one in R.reshape(-1, 3, 3)]
         out: FloatArray = np.array(quats).reshape(*R.shape[:-2], 4)
@@ -213,7 +212,7 @@ class Oracle:
         reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, 6): `getFrameVelocity`."""
+        """Return velocities (n, frames, 6) by `getFrameVelocity`."""
         pin = self._pin
         return self._collected(
             (self.configurations(q, base), self.rates(v, base)),
@@ -232,7 +231,7 @@ class Oracle:
         reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, 6): `getFrameClassicalAcceleration`."""
+        """Return classical accelerations (n, frames, 6) by `getFrameClassicalAcceleration`."""
         pin = self._pin
         return self._collected(
             (self.configurations(q, base), self.rates(v, base), self.second_rates(a, base)),
@@ -249,7 +248,7 @@ class Oracle:
         reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, 6, nv): `computeJointJacobians`, then `getFrameJacobian`."""
+        """Return Jacobians (n, frames, 6, nv) by `computeJointJacobians` and `getFrameJacobian`."""
         pin, inputs = self._pin, (self.configurations(q, base),)
         compute, get = pin.computeJointJacobians, pin.getFrameJacobian
         return self._layout.couple(self._collected(inputs, compute, get, self._ids(frames), reference))
@@ -262,7 +261,7 @@ class Oracle:
         reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, 6, nv): `getFrameJacobianTimeVariation`."""
+        """Return J-dot (n, frames, 6, nv) by `getFrameJacobianTimeVariation`."""
         pin, inputs = self._pin, (self.configurations(q, base), self.rates(v, base))
         compute, get = pin.computeJointJacobiansTimeVariation, pin.getFrameJacobianTimeVariation
         return self._layout.couple(self._collected(inputs, compute, get, self._ids(frames), reference))
@@ -274,11 +273,13 @@ class Oracle:
         reference: Reference | str,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, 6, nv, nv): `computeJointKinematicHessians`, then `getFrameKinematicHessian`.
+        """Return Hessians (n, frames, 6, nv, nv) by `getFrameKinematicHessian`.
 
-        Two things in Pinocchio 4.1 are put right. Python is handed the numbers in Eigen's order, first index
-        fastest, in an array that calls them NumPy's. And in LOCAL, columns of one joint are said to change
-        each other where another joint comes before it; they do not: what a joint moves moves the frame too.
+        Two errors of Pinocchio 4.1 are corrected:
+
+        - Python receives the numbers in Eigen's order, first index fastest, in an array marked as C order.
+        - In LOCAL, entries [i, j] with i and j of the same joint are not 0 if another joint comes before it.
+          They must be 0, because the joint moves the frame together with its own axes.
         """
         pin, model, data = self._pin, self._model, self._data
         ids, wanted, nv = self._ids(frames), self._reference(reference), model.nv
@@ -298,7 +299,7 @@ class Oracle:
         return self._layout.couple(by_leaders.swapaxes(-1, -2)).swapaxes(-1, -2)
 
     def joint_jacobians(self, q: FloatArray, among: slice, reference: Reference | str) -> FloatArray:
-        """(n, joints, 6, nv): `getJointJacobian` of a run of the moving joints, in the tree's order."""
+        """Return `getJointJacobian` (n, joints, 6, nv) of a slice of the moving joints, in tree order."""
         pin, inputs, joints = self._pin, (self.configurations(q),), self._layout.joint_ids[among]
         compute, get = pin.computeJointJacobians, pin.getJointJacobian
         return self._layout.couple(self._collected(inputs, compute, get, joints, reference))
@@ -306,17 +307,17 @@ class Oracle:
     def joint_jacobian_rates(
         self, q: FloatArray, v: FloatArray, among: slice, reference: Reference | str
     ) -> FloatArray:
-        """(n, joints, 6, nv): `getJointJacobianTimeVariation`, likewise."""
+        """Return `getJointJacobianTimeVariation` (n, joints, 6, nv) of a slice of the moving joints."""
         pin, joints = self._pin, self._layout.joint_ids[among]
         inputs = self.configurations(q), self.rates(v)
         compute, get = pin.computeJointJacobiansTimeVariation, pin.getJointJacobianTimeVariation
         return self._layout.couple(self._collected(inputs, compute, get, joints, reference))
 
     def screws(self, q: FloatArray) -> FloatArray:
-        """(n, 6, rates): the whole `data.J` of `computeJointJacobians`, one column a rate, followers too."""
+        """Return `data.J` of `computeJointJacobians` (n, 6, columns), mimic joints included."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(q), 6, len(columns)))
-        # Without rates Pinocchio 4.1 kills the process; of one rate it hands out a plain vector.
+        # Pinocchio 4.1 crashes the process if nv is 0, and returns a vector if nv is 1.
         for k, q_k in enumerate(self.configurations(q) if columns else ()):
             J = self._pin.computeJointJacobians(model, self._data, q_k)
             out[k] = J.reshape(6, model.nv)[:, columns]
@@ -330,14 +331,14 @@ class Oracle:
         ids: Sequence[int],
         reference: Reference | str,
     ) -> FloatArray:
-        """(n, ids, ...): `compute` for each of the inputs, then `get` for each frame or joint.
+        """Return (n, ids, ...): call `compute` for each configuration, then `get` for each frame or joint.
 
-        A tight loop for one frame: what it takes beyond Pinocchio's own time is the price of a check.
+        The loop for one frame is separate, because its time beyond Pinocchio's own is the cost of a check.
         """
         model, data, n, wanted = self._model, self._data, len(inputs[0]), self._reference(reference)
         own = (6, model.nv) if compute is not self._pin.forwardKinematics else (6,)
         out = np.empty((n, len(ids), *own))
-        if not all(own):  # Pinocchio 4.1 kills the process when asked for a Jacobian without columns
+        if not all(own):  # Pinocchio 4.1 crashes the process for a Jacobian without columns
             return out
         flat = out.reshape(n, len(ids), *((6,) if model.nv == 1 else own))
         if len(ids) == 1:
@@ -355,21 +356,21 @@ class Oracle:
     # -- layout --------------------------------------------------------------------------------------
 
     def configurations(self, q: FloatArray, base: BaseNumbers | None = None) -> FloatArray:
-        """Pinocchio's configurations for urdfkin's, with the base as a free-flyer where there is one."""
+        """Return Pinocchio's configurations for `q`; the free-flyer receives the moving base."""
         full = self._layout.configurations(q)
         if self._moving_base:
             full[:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if base is None else free_flyer(base)
         return full
 
     def rates(self, v: FloatArray, base: BaseNumbers | None = None) -> FloatArray:
-        """Pinocchio's rates; a free-flyer's are those of the base in its own axes."""
+        """Return Pinocchio's joint velocities; those of a free-flyer are in the base's own axes."""
         full = self._layout.rates(v)
         if self._moving_base and base is not None:
             full[:, :6] = free_flyer_rates(base)
         return full
 
     def second_rates(self, a: FloatArray, base: BaseNumbers | None = None) -> FloatArray:
-        """Rates of the rates; a free-flyer's are spatial, in its own axes."""
+        """Return Pinocchio's joint accelerations; a free-flyer's are spatial, in the base's own axes."""
         full = self._layout.rates(a)
         if self._moving_base and base is not None:
             full[:, :6] = free_flyer_second_rates(base)
@@ -379,10 +380,12 @@ class Oracle:
 def demand_the_same(
     oracle: str, tree: KinematicTree, joints: Sequence[str], coordinates: Sequence[str]
 ) -> None:
-    """Names, order and who has coordinates: where these differ, a q does not mean the same to the two.
+    """Check that oracle and tree have the same joints and coordinates in the same order.
+
+    Otherwise the numbers of q would belong to different joints.
 
     Raises:
-        OracleError: they do.
+        OracleError: the names or their order differ.
     """
     for what, theirs, own in (
         ("joints", joints, [joint.name for joint in tree.joints if joint.kind.nv]),
@@ -394,7 +397,7 @@ def demand_the_same(
 
 
 def depth_of(tree: KinematicTree) -> int:
-    """How many joints lie one behind the other, at most."""
+    """Return the largest number of joints on a path from the root."""
     depths = [0]
     for joint in tree.joints:
         depths.append(depths[joint.parent] + 1)

@@ -1,30 +1,25 @@
-"""Mimic rules as the URDF's text states them, for the oracle: read apart from urdfkin's own reader.
+"""Convert a user's arguments to Pinocchio's, independently of urdfkin's own conversion.
 
-Pinocchio couples nothing here (see `urdfkin.verify.pinocchio`), so that a rule which the reader got wrong
-would be wrong on both sides, and agree. So nothing is taken from the document that `urdfkin.lint` read,
-neither its elements nor its records: who guards a reading must not read through it. Like Pinocchio, this
-takes the text, and only when a result is first checked; `load` reads it once.
+Everything here is determined from the URDF text, Pinocchio's model and the user's numbers, a second time. A
+mistake in urdfkin's conversion therefore leads to a disagreement.
 
+| Part | Here | urdfkin's own |
+|---|---|---|
+| mimic rules | `rules_of_text` | `urdfkin.lint`, `urdfkin.urdf.reader` |
+| order of q, v and a | `Layout` | `KinematicTree` |
+| frame of a name | `Frames` | `KinematicTree.frame_link` |
+| moving base | `free_flyer` and others | `BaseMotion` |
 
-Where each number of a user's q, v and a stands in Pinocchio's model, from that model and the text alone.
+Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`), so the rules come from here.
+The text is parsed again at the first check.
 
-The layout is the one that the README promises: joints in Pinocchio's order; one number for a revolute,
-continuous or prismatic joint, three for a planar and seven for a floating one; none for a follower. Nothing
-of `KinematicTree` enters, so that a coordinate that urdfkin gives to another joint is found.
+Layout of q: joints in Pinocchio's order; one number for a revolute, continuous or prismatic joint, three for
+a planar joint, seven for a floating joint, none for a mimic joint.
 
-
-Which of Pinocchio's frames a name means, from the names and kinds in Pinocchio's own model.
-
-`KinematicTree.frame_link` answers the same question from urdfkin's reading. The two share no code: a name
-that the one takes for another frame's is found by the comparison of the numbers.
-
-
-A moving base for Pinocchio, from the user's numbers: nothing of `BaseMotion`'s arithmetic is shared.
-
-What a base's rotation means is said in `urdfkin.kinematics.rotation.matrix`: the rotation nearest to the
-matrix that was given. urdfkin goes there by a step of Newton's; here it is Davenport's q-method: among unit
-quaternions q^T K q = trace(R(q)^T M) is largest for the nearest rotation, so that its quaternion, which a
-free-flyer takes, is the eigenvector of the largest eigenvalue of K.
+Moving base: its rotation is the one nearest to the given matrix M (`urdfkin.kinematics.rotation.matrix`).
+urdfkin computes it with a Newton step. This module uses Davenport's q-method: among unit quaternions,
+q^T K q = trace(R(q)^T M) is largest for the nearest rotation. So q is the eigenvector of K for the largest
+eigenvalue.
 """
 
 from __future__ import annotations
@@ -44,15 +39,15 @@ from urdfkin.verify.mimic_columns import Places, coupled
 
 
 def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
-    """Whom each follower follows as the text says, chains followed to the joint that moves by itself.
+    """Return the rule of each mimic joint; a chain of rules is resolved to the independent joint.
 
     Args:
-        text: The URDF.
-        joints: The joints that move; others follow nobody, whatever the text says.
+        text: The URDF text.
+        joints: Names of the moving joints; rules of other joints are ignored.
 
     Raises:
-        ValueError: a rule's numbers are no numbers.
-        expat.ExpatError: the text is not well-formed.
+        ValueError: a multiplier or offset is not a number.
+        expat.ExpatError: the text is not well-formed XML.
     """
     if "mimic" not in text:
         return {}
@@ -62,15 +57,16 @@ def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
         if (rule := joint.find("mimic")) is not None and (name := joint.get("name", "")) in joints
     }
     known: dict[str, Mimic] = {}
-    return {follower: _to_the_end(follower, rules, known) for follower in rules}
+    return {name: _resolved(name, rules, known) for name in rules}
 
 
-def _to_the_end(follower: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> Mimic:
-    """q_follower = m_1 (m_2 (... q_leader ... + o_2) + o_1, multiplied out from the leader's end.
+def _resolved(joint: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> Mimic:
+    """Return the resolved rule q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1.
 
-    What is found is kept in `known`: in a chain of followers, each is asked for once.
+    It is multiplied out from the independent joint. Results are stored in `known`, so each rule of a chain is
+    resolved once.
     """
-    chain = [follower]
+    chain = [joint]
     while (leader := rules[chain[-1]].leader) in rules and leader not in known and len(chain) <= len(rules):
         chain.append(leader)
     for name in reversed(chain):
@@ -78,16 +74,16 @@ def _to_the_end(follower: str, rules: dict[str, Mimic], known: dict[str, Mimic])
         end = known.get(rule.leader, Mimic(rule.leader, 1.0, 0.0))
         offset = rule.multiplier * end.offset + rule.offset
         known[name] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
-    return known[follower]
+    return known[joint]
 
 
-#: urdfkin's coordinates for a joint to which Pinocchio gives so many (nq, nv).
+#: Number of urdfkin's coordinates of a joint, by Pinocchio's (nq, nv) of it.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _Place(NamedTuple):
-    """A joint: its sizes and first places in Pinocchio's model, its first places in q and v, and its rule."""
+    """A joint: Pinocchio's (nq, nv), first indices in Pinocchio's and urdfkin's vectors, and mimic rule."""
 
     sizes: tuple[int, int]
     full_q: int
@@ -99,20 +95,20 @@ class _Place(NamedTuple):
 
 
 class Layout:
-    """The way from q, v and a to Pinocchio's, and from its columns back.
+    """Conversion of q, v and a to Pinocchio's vectors, and of Pinocchio's columns to urdfkin's.
 
     Args:
         model: Pinocchio's model.
-        joints: The robot's own joints, by Pinocchio's numbers, in order.
+        joints: Pinocchio's indices of the robot's joints, in order.
         names: Their names.
-        rules: Whom each follower follows.
+        rules: The resolved rule of each mimic joint.
 
     Attributes:
         nq: Length of q.
         nv: Length of v.
-        joint_ids: The robot's moving joints, followers too, by Pinocchio's numbers.
-        coordinates: Names of the joints that have coordinates of their own.
-        rate_columns: Pinocchio's columns of their rates, in that order.
+        joint_ids: Pinocchio's indices of the moving joints, mimic joints included.
+        coordinates: Names of the joints with coordinates.
+        rate_columns: Pinocchio's columns of the moving joints, in that order.
     """
 
     def __init__(
@@ -131,20 +127,20 @@ class Layout:
             rule = rules.get(name, Mimic(name, 1.0, 0.0))
             if rule.leader not in at:
                 raise OracleError(
-                    "Pinocchio knows no joint to follow", where=f"joint {name}", found=repr(rule.leader)
+                    "Pinocchio has no such mimicked joint", where=f"joint {name}", found=repr(rule.leader)
                 )
             full = int(model.joints[j].idx_q), int(model.joints[j].idx_v)
             self._places.append(_Place(own, *full, *at[rule.leader], rule.multiplier, rule.offset))
         self.rate_columns = [place.full_v + c for place in self._places for c in range(place.sizes[1])]
         self._index, self._factor = self._rates()
-        #: Whether Pinocchio's coordinates, and its rates, are the robot's as they stand.
+        #: True if Pinocchio's coordinates, or joint velocities, are equal to the robot's.
         plain = [(p.q, (1, 1), 1.0, 0.0) == (p.full_q, p.sizes, p.multiplier, p.offset) for p in self._places]
         self._same_q = all(plain) and model.nq == self.nq
         self._same_v = model.nv == self.nv and bool((self._factor == 1.0).all())
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
     def _rates(self) -> tuple[Places, FloatArray]:
-        """For each of Pinocchio's rates: which of v it is, and the factor (G); 0 where it is the base's."""
+        """Return index in v and factor in G of each Pinocchio joint velocity; factor 0 for the base."""
         index, factor = np.zeros(self._model.nv, dtype=np.int64), np.zeros(self._model.nv)
         for place in self._places:
             for c in range(place.sizes[1]):
@@ -153,7 +149,7 @@ class Layout:
         return index, factor
 
     def configurations(self, q: FloatArray) -> FloatArray:
-        """(n, Pinocchio's nq) for (n, nq); quaternions are brought to norm 1 here, as they are given."""
+        """Return Pinocchio's configurations (n, model.nq) for (n, nq); quaternions are normalized."""
         if self._same_q:
             return np.array(q)
         full = np.zeros((len(q), self._model.nq))
@@ -173,20 +169,20 @@ class Layout:
         return full
 
     def rates(self, v: FloatArray) -> FloatArray:
-        """(n, Pinocchio's nv) for (n, nv): v_full = G v."""
+        """Return v_full = G v, (n, model.nv) for (n, nv)."""
         if not self.nv:
             return np.zeros((len(v), self._model.nv))
         full: FloatArray = v[:, self._index] * self._factor
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """J_full G: columns of followers are added to their leaders'; a base's are left out."""
+        """Return J_full G: add the columns of mimic to mimicked joints, and omit those of the base."""
         if self._same_v:
             return full
         return coupled(full, np.array(self.rate_columns, dtype=np.int64), self._index, self._factor, self.nv)
 
 
-#: Pinocchio's name of the world, which is what a root joint hangs from.
+#: Pinocchio's name of the world, the parent of a root joint.
 WORLD = "universe"
 _PREFIXED = re.compile(r"(link|joint):(.*)", re.DOTALL)
 
@@ -195,9 +191,9 @@ class Frames:
     """Pinocchio's frames by name.
 
     Args:
-        model: Pinocchio's model, as its parser made it.
-        pin: The module.
-        stands_on_world: Whether the robot hangs from a root joint: then the world is a link of it.
+        model: Pinocchio's model, as its parser returned it.
+        pin: The module of Pinocchio.
+        stands_on_world: The robot has a root joint; the world then counts as a link.
     """
 
     def __init__(self, model: Any, pin: Any, *, stands_on_world: bool) -> None:
@@ -212,10 +208,10 @@ class Frames:
             self._bodies[WORLD] = 0
 
     def index(self, name: str) -> int:
-        """The frame that a name stands for, in the model as it was given.
+        """Return the index of the frame with a name.
 
         Raises:
-            OracleError: nothing is called so, or a body and a joint in another place both are.
+            OracleError: no frame has this name, or a body and an unrelated joint both have it.
         """
         if isinstance(name, LinkFrame):
             return self._known(self._bodies, name, str(name)[5:])
@@ -242,7 +238,7 @@ class Frames:
 
 
 class BaseNumbers(Protocol):
-    """A base's motion as the user gave it, each with one leading batch axis or none."""
+    """Motion of the base in the user's numbers, each with one leading batch axis or none."""
 
     @property
     def placement(self) -> FloatArray:
@@ -250,43 +246,43 @@ class BaseNumbers(Protocol):
 
     @property
     def velocity(self) -> FloatArray:
-        """(..., 6) [linear; angular] in world axes."""
+        """(..., 6) velocity, [linear; angular] in world axes."""
 
     @property
     def acceleration(self) -> FloatArray:
-        """(..., 6) likewise, classical."""
+        """(..., 6) classical acceleration, [linear; angular] in world axes."""
 
 
 def free_flyer(base: BaseNumbers) -> FloatArray:
-    """(..., 7) x, y, z, qx, qy, qz, qw of the base."""
+    """Return x, y, z, qx, qy, qz, qw of the base, (..., 7)."""
     T = np.asarray(base.placement)
     return np.concatenate((T[..., :3, 3], nearest_quaternion(T[..., :3, :3])), axis=-1)
 
 
 def free_flyer_rates(base: BaseNumbers) -> FloatArray:
-    """(..., 6) its rates: the base's velocity in its own axes."""
+    """Return the base's velocity in its own axes, (..., 6)."""
     return _in_own_axes(free_flyer(base)[..., 3:], np.asarray(base.velocity))
 
 
 def free_flyer_second_rates(base: BaseNumbers) -> FloatArray:
-    """(..., 6) their rates: the spatial acceleration, acc - w x vel, in the base's own axes."""
+    """Return the base's spatial acceleration, acc - w x vel, in its own axes, (..., 6)."""
     vel, acc = np.broadcast_arrays(base.velocity, base.acceleration)
     linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])
     return _in_own_axes(free_flyer(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
 
 
 def nearest_quaternion(M: FloatArray) -> FloatArray:
-    """(..., 4) unit quaternion, scalar last, of the rotation nearest to (..., 3, 3)."""
+    """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
     K = davenport(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # Of a rotation K + I is 4 q q^T: multiplied once more, what LAPACK left of other eigenvectors is gone.
+    # For a rotation, K + I = 4 q q^T. One more multiplication removes the parts of other eigenvectors.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
 
 
 def davenport(M: NDArray[Any]) -> NDArray[Any]:
-    """(..., 4, 4) K of (..., 3, 3), floats or other numbers; of a rotation it is 4 q q^T - I."""
+    """Return Davenport's matrix K (..., 4, 4) of M (..., 3, 3); for a rotation it is 4 q q^T - I."""
     K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
     trace = np.trace(M, axis1=-2, axis2=-1)
@@ -298,7 +294,7 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """R^T of both halves, by the quaternion itself: x + 2 w (x x u) + 2 (x x u) x u."""
+    """Return R^T times both halves, from the quaternion (u, w): x + 2 w (x x u) + 2 (x x u) x u."""
     u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
     x = six.reshape(*six.shape[:-1], 2, 3)
     aside = 2.0 * np.cross(x, u)

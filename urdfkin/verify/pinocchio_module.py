@@ -1,8 +1,8 @@
-"""The door of Pinocchio: the only module that imports it, and that knows an impostor from it.
+"""Import Pinocchio, and detect a different project of the same name.
 
-PyPI's project `pinocchio` is another one (plugins for the test runner nose, with a module of the same name);
-Pinocchio's wheels are called `pin`. The other's module lies where Python looks first, so that it is found
-even where both are installed.
+No other module imports Pinocchio. Its wheels on PyPI have the name `pin`. The PyPI project `pinocchio` is a
+different one, with plugins for the test runner nose and a module of the same name. If both are installed,
+Python finds that module first.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from typing import Any
 
 from urdfkin.errors import InstallationError, Question
 
-#: The versions that check: what accelerations and J-dot mean in them was measured.
+#: Supported versions; the definitions of accelerations and J-dot were tested with them.
 _MAJOR = "4"
 _WANTED = "'pin>=4,<5'"
 
 
 def pinocchio() -> Any:
-    """Pinocchio itself.
+    """Return the module of Pinocchio.
 
     Raises:
-        InstallationError: it is not installed, or another project or version is found under its name.
+        InstallationError: it is not installed, has an unsupported version, or is a different project.
     """
     try:
-        import pinocchio as found  # noqa: PLC0415  heavy: only when something is checked
+        import pinocchio as found  # noqa: PLC0415  slow to import, needed for checks only
     except ImportError as error:
         if error.name == "pinocchio":
             raise InstallationError("Pinocchio is not installed", remedy=f"pip install {_WANTED}") from None
@@ -38,7 +38,7 @@ def pinocchio() -> Any:
         raise _impostor(found)
     if not str(found.__version__).startswith(f"{_MAJOR}."):
         raise InstallationError(
-            f"urdfkin is checked by Pinocchio {_MAJOR}",
+            f"urdfkin needs Pinocchio {_MAJOR} for its checks",
             where=str(found.__file__),
             found=str(found.__version__),
             remedy=f"pip install {_WANTED}",
@@ -47,7 +47,7 @@ def pinocchio() -> Any:
 
 
 def version() -> str:
-    """The version of the Pinocchio that checks, as the module in use says; "not installed" where none can."""
+    """Return the version of Pinocchio; "not installed" if there is no supported one."""
     try:
         return str(pinocchio().__version__)
     except InstallationError:
@@ -55,7 +55,7 @@ def version() -> str:
 
 
 def _impostor(found: Any) -> InstallationError:
-    """What is installed under Pinocchio's name, and how to be rid of it."""
+    """Return the error about a different project under Pinocchio's name, with the remedy."""
     file = found.__file__ or next(iter(found.__path__), "a folder without modules")
     owner = _owner(Path(file))
     cure = f"pip uninstall {owner[0]}" if owner else f"rename or remove {file}"
@@ -70,7 +70,7 @@ def _impostor(found: Any) -> InstallationError:
 
 
 def _owner(file: Path) -> tuple[str, str] | None:
-    """Name and version of the installed project that a file belongs to."""
+    """Return name and version of the installed project that contains a file."""
     for project in importlib.metadata.distributions():
         for one in project.files or ():
             if one.name == file.name and Path(str(project.locate_file(one))) == file:

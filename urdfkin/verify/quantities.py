@@ -1,9 +1,9 @@
-"""Every quantity of the library, a row each: its names, what computes it, what asks Pinocchio, its bound.
+"""The table of quantities: names, shapes, functions that compute and check them, bounds and help texts.
 
-Methods, checks, validation, the judge, plots, reports, replay lines and the command line read this table: a
-new quantity is a row here, beside the functions that the row names, and a page of docs.
+Methods of `Robot`, checks, validation, the accuracy study, plots, reports, replay lines and the command line
+use this table. A new quantity is a row here, plus the functions that the row names and a page in docs.
 
-Functions are named, not imported: whoever asks for help needs no numpy.
+Functions are given by name and imported at first use, so that `--help` does not import NumPy.
 
 >>> for quantity in walked():
 ...     print(quantity.name, quantity.inputs, quantity.shape)
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
 
 #: The rows of a velocity, an acceleration or a Jacobian.
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
-#: (oracle, part, ours, witness) to its results and what the two are measured against.
+#: Function of (oracle, part, ours, by) that returns the oracle's results and the bound.
 Against = Callable[..., "tuple[FloatArray, Bound]"]
 
 
-def asked(name: str) -> Callable[..., Any]:
-    """The oracle's method of that name, whichever oracle it is."""
+def oracle_method(name: str) -> Callable[..., Any]:
+    """Return a function that calls the method `name` of an oracle."""
 
     def ask(oracle: Any, *arguments: Any) -> Any:
         return getattr(oracle, name)(*arguments)
@@ -58,32 +58,33 @@ class Quantity:
     """A row of the table.
 
     Attributes:
-        name: In certificates, errors and reports.
-        title: As a sentence has it.
-        inputs: What of q, v and a it is computed from: "q", "qv" or "qva".
-        shape: Of one result; "nv" stands for the robot's rates.
-        equations: The text's.
-        compute: The walk, (plan, *inputs, reference, base=, out=, threads=) to (n, frames, ...); where it is
-            not `walked`, what a method of the robot's has computed in a way of its own.
-        ask: Asks an oracle, (oracle, *inputs, frames, reference, base) to (n, frames, ...); of joints, which
-            of the moving ones. Where it is not `referred`, neither takes a reference.
-        scale: The size of its terms, (plan, magnitudes, reference): see `urdfkin.verify.bounds`.
-        factors: How many rotated vectors each term of [linear; angular] multiplies, in LOCAL_WORLD_ALIGNED.
-        against: (oracle, part, ours, witness) to its results and their bound, where `ask` and `scale` cannot
-            say it.
-        exact: Its true values, (motion, link, reference) to numbers of any kind, for judge and enclosures.
-        walked: Whether the walk computes it for any frames.
-        validated: Whether what is walked is validated, judged and plotted too. A Hessian has as many numbers
-            as all other quantities together, times the rates, and is made of the Jacobian's columns.
-        referred: Whether it is given in a reference; a placement is not.
-        of: What a validation compares it of: "frames", "joints" or "columns".
-        head: The column of a report; rows of one head share it.
-        labels: Of a result's rows, where they have any.
-        units: By the name of each three numbers of a vector.
-        command: What computes one case again on the command line, if anything does.
-        summary: For a command of its own: its line in the list of commands.
-        page: The rest of its help.
-        example: A command line.
+        name: Name in certificates, errors and reports.
+        title: Name in sentences.
+        inputs: The inputs it depends on: "q", "qv" or "qva".
+        shape: Shape of one result; "nv" stands for the robot's nv.
+        equations: Equations of the textbook.
+        compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns (n, frames, ...). If
+            `walked` is False, a method of `Robot` calls it in another way.
+        ask: Function (oracle, *inputs, frames, reference, base) that returns the oracle's (n, frames, ...).
+            For joints, `frames` is a slice of the moving joints. If `referred` is False, `compute` and `ask`
+            take no reference.
+        scale: Function (plan, magnitudes, reference) for the size of its terms (`urdfkin.verify.bounds`).
+        factors: Number of rotated vectors in each term of [linear; angular], in LOCAL_WORLD_ALIGNED.
+        against: Function (oracle, part, ours, by) that returns the oracle's results and the bound, for
+            quantities that need more than `ask` and `scale`.
+        exact: Function (motion, link, reference) for exact values, for accuracy study and enclosures.
+        walked: True if the forward recursion computes it for any frames.
+        validated: True if `validate`, the accuracy study and plots include it. A Hessian is left out. It has
+            nv times as many numbers as a Jacobian, and consists of products of the Jacobian's columns.
+        referred: True if it depends on a reference frame; a placement does not.
+        of: Objects that a validation compares: "frames", "joints" or "columns".
+        head: Column in reports; rows with the same head share it.
+        labels: Names of a result's rows, if any.
+        units: Unit of each group of three numbers, by the group's name.
+        command: Command that computes one case again, if there is one.
+        summary: Line in the list of commands, if it has a command of its own.
+        page: The rest of the command's help.
+        example: Example command line.
     """
 
     name: str
@@ -111,34 +112,34 @@ class Quantity:
 
     @property
     def method(self) -> str:
-        """The robot's, by that name."""
+        """Name of the method of `Robot`."""
         return self.name.replace(" ", "_")
 
     @property
     def axes(self) -> int:
-        """How many axes one result has: one for [linear; angular], two for a matrix, three for a Hessian."""
+        """Number of axes of one result: one for [linear; angular], two for a matrix, three for a Hessian."""
         return len(self.shape)
 
     @property
     def columns(self) -> bool:
-        """Whether it has a column for each rate."""
+        """True if it has a column for each joint velocity."""
         return "nv" in self.shape
 
     @property
     def references(self) -> tuple[Reference | None, ...]:
-        """In which it is validated and judged."""
+        """Reference frames of its validation and accuracy study."""
         from urdfkin.model.reference import Reference  # noqa: PLC0415
 
         return tuple(Reference) if self.referred else (None,)
 
     def own_shape(self, rates: int) -> tuple[int, ...]:
-        """One result's, for a robot of so many rates."""
+        """Return the shape of one result for a robot with nv = `rates`."""
         return tuple(rates if size == "nv" else size for size in self.shape)
 
     def ours(
         self, plan: CompiledTree, inputs: Sequence[FloatArray], reference: Reference | None, **how: Any
     ) -> FloatArray:
-        """(n, frames, ...) by the text's recursion; of q, v and a it takes what it needs."""
+        """Return urdfkin's results (n, frames, ...); inputs that it does not need are ignored."""
         found: FloatArray = self.compute(plan, *inputs[: len(self.inputs)], *self._in(reference), **how)
         return found
 
@@ -150,20 +151,20 @@ class Quantity:
         reference: Reference | str | None,
         base: BaseNumbers | None = None,
     ) -> FloatArray:
-        """(n, frames, ...) by Pinocchio, likewise; `of` frames by name, or of a run of the moving joints."""
+        """Return the oracle's results (n, frames, ...) of named frames or of a slice of moving joints."""
         moving = () if base is None else (base,)
         given = inputs[: len(self.inputs)]
         found: FloatArray = self.ask(oracle, *given, of, *self._in(reference), *moving)
         return found
 
     def bound(self, plan: CompiledTree, size: Magnitudes, reference: Reference | None) -> Bound:
-        """What the two are measured against."""
+        """Return the bound between urdfkin's and the oracle's results."""
         scale = self.scale(plan, size, *self._in(reference))
         bound: Bound = _bound(scale, self.factors, size, *self._in(reference))
         return bound
 
     def truth(self, motion: Any, link: int, reference: Reference | None) -> NDArray[Any]:
-        """One link's, as `exact` gives it."""
+        """Return the exact values of one link."""
         assert self.exact is not None
         values: NDArray[Any] = self.exact(motion, link, *self._in(reference))
         return values
@@ -179,7 +180,7 @@ PLACEMENT = Quantity(
     shape=(4, 4),
     equations=("7.77",),
     compute=lazy_import("urdfkin.compiled.evaluate:placements"),
-    ask=asked("placements"),
+    ask=oracle_method("placements"),
     scale=lazy_import("urdfkin.verify.bounds:placement_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:placement_values"),
     factors=1,
@@ -205,7 +206,7 @@ VELOCITY = Quantity(
     shape=(6,),
     equations=("7.127", "7.128"),
     compute=lazy_import("urdfkin.compiled.evaluate:velocities"),
-    ask=asked("velocities"),
+    ask=oracle_method("velocities"),
     scale=lazy_import("urdfkin.verify.bounds:velocity_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:velocity_values"),
     factors=2,
@@ -213,7 +214,7 @@ VELOCITY = Quantity(
     units={"linear": "m/s", "angular": "rad/s"},
     command="velocity",
     summary="velocity of a frame",
-    page="Of the frame's origin in m/s and about it in rad/s, for joint rates --v.",
+    page="Linear velocity of the frame's origin, m/s, and angular velocity, rad/s, for joint velocities --v.",
     example="urdfkin velocity ur5 --q random --v 1,0,0,0,0,0 --frame tool0",
 )
 JACOBIAN = Quantity(
@@ -223,14 +224,14 @@ JACOBIAN = Quantity(
     shape=(6, "nv"),
     equations=("7.85",),
     compute=lazy_import("urdfkin.compiled.evaluate:jacobians"),
-    ask=asked("jacobians"),
+    ask=oracle_method("jacobians"),
     scale=lazy_import("urdfkin.verify.bounds:jacobian_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:jacobian_values"),
     factors=2,
     head="J",
     command="jacobian",
     summary="Jacobian of a frame",
-    page="A row of the table for each rate: the velocity it alone causes.",
+    page="Each row of the table is the frame's velocity when one joint velocity is 1 and all others are 0.",
     example="urdfkin jacobian panda --q random --seed 1 --frame panda_hand",
 )
 JACOBIAN_RATE = Quantity(
@@ -240,16 +241,16 @@ JACOBIAN_RATE = Quantity(
     shape=(6, "nv"),
     equations=("7.126",),
     compute=lazy_import("urdfkin.compiled.evaluate:jacobian_rates"),
-    ask=asked("jacobian_rates"),
+    ask=oracle_method("jacobian_rates"),
     scale=lazy_import("urdfkin.verify.bounds:jacobian_rate_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:jacobian_rate_values"),
     factors=3,
     head="J-dot",
     command="jacobian-rate",
     summary="time derivative of a frame's Jacobian",
-    page="Its time derivative for rates --v: a row of the table for each rate. In local_world_aligned,"
-    " J a + J' v is the acceleration that `urdfkin acceleration` gives; in local and world it is the spatial"
-    " acceleration.",
+    page="Time derivative J' for joint velocities --v. The table has a row for each column of the Jacobian."
+    " In local_world_aligned, J a + J' v is the result of `urdfkin acceleration`. In local and world it is"
+    " the spatial acceleration.",
     example="urdfkin jacobian-rate panda --q random --v random --frame panda_hand",
 )
 HESSIAN = Quantity(
@@ -259,7 +260,7 @@ HESSIAN = Quantity(
     shape=(6, "nv", "nv"),
     equations=("7.85", "7.126"),
     compute=lazy_import("urdfkin.compiled.evaluate:hessians"),
-    ask=asked("hessians"),
+    ask=oracle_method("hessians"),
     scale=lazy_import("urdfkin.verify.bounds:hessian_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:hessian_values"),
     factors=3,
@@ -267,8 +268,8 @@ HESSIAN = Quantity(
     head="H",
     command="hessian",
     summary="derivatives of a frame's Jacobian by each joint coordinate",
-    page="For each column of the Jacobian, a row of the table for each rate: how fast that rate changes the"
-    " column. Summed over the rates, each times its --v, that is `urdfkin jacobian-rate`.",
+    page="The table has a group of rows for each column of the Jacobian. Each row is the derivative of the"
+    " column by one joint coordinate. The sum of the rows times joint velocities is `urdfkin jacobian-rate`.",
     example="urdfkin hessian panda --q random --seed 1 --frame panda_hand",
 )
 ACCELERATION = Quantity(
@@ -278,7 +279,7 @@ ACCELERATION = Quantity(
     shape=(6,),
     equations=("7.129", "7.130"),
     compute=lazy_import("urdfkin.compiled.evaluate:accelerations"),
-    ask=asked("accelerations"),
+    ask=oracle_method("accelerations"),
     scale=lazy_import("urdfkin.verify.bounds:acceleration_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:acceleration_values"),
     factors=3,
@@ -286,9 +287,9 @@ ACCELERATION = Quantity(
     units={"linear": "m/s^2", "angular": "rad/s^2"},
     command="acceleration",
     summary="classical acceleration of a frame",
-    page="The second derivative of the origin's position in m/s^2 and the angular acceleration in rad/s^2,"
-    " for rates --v and their rates --a. Gravity is not in it. With --explain, what each joint contributes:"
-    " transverse, centripetal, Coriolis and sliding parts (eq. 7.125, joint by joint)."
+    page="Second derivative of the position of the frame's origin, m/s^2, and angular acceleration, rad/s^2,"
+    " for joint velocities --v and joint accelerations --a. Gravity is not included. --explain lists the"
+    " transverse, centripetal, Coriolis and sliding contribution of each joint (eq. 7.125)."
     f" {Question.TWO_ACCELERATIONS}, {Question.GRAVITY}.",
     example="urdfkin acceleration panda --q random --v random --a random --explain",
 )
@@ -326,20 +327,26 @@ IMU = replace(
     command="",
 )
 JOINT_JACOBIAN = replace(
-    JACOBIAN, name="joint jacobian", title="joint Jacobian", ask=asked("joint_jacobians"), of="joints"
+    JACOBIAN, name="joint jacobian", title="joint Jacobian", ask=oracle_method("joint_jacobians"), of="joints"
 )
 JOINT_JACOBIAN_RATE = replace(
     JACOBIAN_RATE,
     name="joint jacobian rate",
     title="joint Jacobian rate",
-    ask=asked("joint_jacobian_rates"),
+    ask=oracle_method("joint_jacobian_rates"),
     of="joints",
 )
 SCREWS = replace(
-    JACOBIAN, name="screws", title="data.J", shape=(6,), ask=asked("screws"), of="columns", head="data.J"
+    JACOBIAN,
+    name="screws",
+    title="data.J",
+    shape=(6,),
+    ask=oracle_method("screws"),
+    of="columns",
+    head="data.J",
 )
 
-#: Every quantity by its name, in the order of certificates and reports.
+#: All quantities by name, in the order of certificates and reports.
 QUANTITIES = {
     row.name: row
     for row in (
@@ -361,22 +368,22 @@ QUANTITIES = {
 
 
 def walked(of: str = "frames") -> list[Quantity]:
-    """Those that the walk computes for any frames, or for any joints."""
+    """Return the quantities that the forward recursion computes for any frames, or for any joints."""
     return [row for row in QUANTITIES.values() if row.walked and row.of == of]
 
 
 def validated(of: str = "frames") -> list[Quantity]:
-    """Those of them that are compared wherever everything is."""
+    """Return the quantities that a validation compares."""
     return [row for row in walked(of) if row.validated]
 
 
 def compared() -> str:
-    """What a validation compares of every frame, as a sentence has it."""
+    """Return the names of the quantities that a validation compares, as part of a sentence."""
     return _listed([row.title for row in validated()])
 
 
 def not_compared() -> str:
-    """What `Robot` computes of a frame that a validation does not compare; a call checks it all the same."""
+    """Return the names of the quantities that a validation does not compare; calls do check them."""
     return _listed(
         [row.title for row in QUANTITIES.values() if row.of == "frames" and row not in validated()]
     )
@@ -387,12 +394,12 @@ def _listed(titles: Sequence[str]) -> str:
 
 
 def by_command() -> dict[str, Quantity]:
-    """Those with a command of their own, by its name."""
+    """Return the quantities with a command of their own, by the command."""
     return {row.command: row for row in walked() if row.command}
 
 
 def quantity(name: str) -> Quantity:
-    """The row of that name; raises UnknownNameError with the nearest names."""
+    """Return the quantity of a name; raise UnknownNameError, with the nearest names, if there is none."""
     if (found := QUANTITIES.get(name)) is None:
         raise UnknownNameError("quantity", name, QUANTITIES)
     return found

@@ -1,7 +1,4 @@
-"""Configurations and rates to check with: random within limits, and the special ones.
-
-Which results of a call are checked: all of them, none, or a stated number.
-"""
+"""Draw random configurations and joint velocities, and choose the results of a call to check."""
 
 from __future__ import annotations
 
@@ -21,8 +18,8 @@ from urdfkin.model.configuration import neutral
 from urdfkin.model.ranges import coordinate_ranges, own_ranges
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: How far a planar or floating joint is moved from its place: m.
-_ROOM = 2.0
+#: Range of positions of planar and floating joints, +- m.
+_RANGE = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +32,12 @@ class Samples:
 
 
 def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
-    """(n, nq) configurations, uniform within limits.
+    """Return random configurations (n, nq), uniform within the limits.
 
-    Continuous joints take any angle, planar and floating ones any orientation and a place within 2 m; a
-    bound that is missing or beyond 10 (rad or m) is drawn as 10. A leader stays where its followers are
-    within their limits too; if it has no room there, where it is within its own, and
-    `configuration.limit_violations` names the followers.
+    Continuous joints take any angle. Planar and floating joints take any orientation and positions within
+    +-2 m. A missing limit, or one beyond 10 (rad or m), counts as 10. The limits of mimic joints restrict the
+    mimicked joint too. If no value satisfies both, only the limits of the mimicked joint apply, and
+    `configuration.limit_violations` names the mimic joint.
     """
     return _uniform(tree, n, rng, coordinate_ranges(tree))
 
@@ -59,18 +56,18 @@ def _uniform(
 
 def _sample_joint(joint: Joint, n: int, rng: np.random.Generator) -> FloatArray:
     if joint.kind is JointKind.PLANAR:
-        return np.hstack((rng.uniform(-_ROOM, _ROOM, (n, 2)), rng.uniform(-math.pi, math.pi, (n, 1))))
+        return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 2)), rng.uniform(-math.pi, math.pi, (n, 1))))
     return _sample_floating(n, rng)
 
 
 def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
     quaternion = rng.standard_normal((n, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return np.hstack((rng.uniform(-_ROOM, _ROOM, (n, 3)), quaternion))
+    return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 3)), quaternion))
 
 
 def special(tree: KinematicTree) -> FloatArray:
-    """(3, nq): neutral, every joint at its own lower bound, every joint at its own upper bound."""
+    """Return (3, nq): zero configuration, all joints at the lower limit, all joints at the upper limit."""
     q = np.tile(neutral(tree), (3, 1))
     ranges = own_ranges(tree)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -80,7 +77,7 @@ def special(tree: KinematicTree) -> FloatArray:
 
 
 def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
-    """A root link's motion for `n` samples: placed as a floating joint is, with rates as those of `draw`."""
+    """Return random motions of the root link: poses as of a floating joint, velocities as in `draw`."""
     placed = _sample_floating(n, rng)
     placement = np.tile(np.eye(4), (n, 1, 1))
     placement[:, :3, :3], placement[:, :3, 3] = rotation_of(placed[:, 3:]), placed[:, :3]
@@ -91,11 +88,11 @@ def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
 
 
 def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
-    """Samples for a validation: `n` random ones, and the special configurations if asked for.
+    """Return samples for a validation: `n` random ones, and those of `special` if requested.
 
-    They cover each joint's own limits, also where a mimic joint leaves its limits: the equations hold there.
-    Rates are standard normal; every eighth sample has rates a hundred times as large, where the terms of
-    7.129 and 7.130 that are quadratic in them dominate.
+    They cover the limits of each joint, even where a mimic joint is then outside its own: the equations hold
+    there too. Joint velocities and accelerations are standard normal. In every eighth sample they are a
+    hundred times larger, so that the quadratic terms of eq. 7.129 and 7.130 dominate.
     """
     q = _uniform(tree, n, rng, own_ranges(tree))
     if with_special:
@@ -106,41 +103,41 @@ def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special:
     return Samples(q, v, a)
 
 
-#: Every result, no result, or those of `SAMPLE` configurations.
+#: True: check all results. False: none. "sample": those of `SAMPLE` configurations of a call.
 Verify = bool | Literal["sample"]
 
-#: How many configurations of a call `verify="sample"` checks.
+#: Number of configurations of a call that `verify="sample"` checks.
 SAMPLE = 100
 
-#: Numbers and configurations compared at a time: few enough for a cache and for memory not to grow with a
-#: batch, many enough for array expressions to be worth their call.
+#: Largest number of values and of configurations compared at a time. Large enough for efficient array
+#: expressions, small enough for the cache; the memory does not grow with the batch.
 _AT_A_TIME = 131_072
 _MOST = 4096
 
 
 def checked_choice(verify: object) -> Verify:
-    """What was asked for.
+    """Return a valid value of `verify`.
 
     Raises:
-        InputError: it is none of True, False and "sample".
+        InputError: the value is not True, False or "sample".
     """
     if verify is True or verify is False:
         return verify
     if isinstance(verify, str) and verify == "sample":
         return "sample"
-    raise InputError('verify is True, False or "sample"', found=safe_repr(verify))
+    raise InputError('verify must be True, False or "sample"', found=safe_repr(verify))
 
 
 def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
-    """The configurations to check, of `n`, in parts of a good size.
+    """Yield the indices of the configurations to check, in parts.
 
     Args:
         verify: True or "sample".
-        n: How many configurations there are.
-        numbers: How many numbers the results of one have.
+        n: Number of configurations.
+        numbers: Number of values in the results of one configuration.
 
     Yields:
-        Indices. A sample is drawn without regard to order, which a batch often has, and always the same.
+        Slices or arrays of indices. A sample is random, because batches are often ordered, with a fixed seed.
     """
     step = min(_MOST, max(1, _AT_A_TIME // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:

@@ -1,14 +1,16 @@
-"""Singular values that are guaranteed to lie between two doubles, and what is made of them.
+"""Singular values of Jacobians with guaranteed lower and upper bounds; condition and manipulability.
 
-A singular value moves by no more than the matrix does (Weyl): |s_k(J + E) - s_k(J)| <= |E|, in any norm that
-is no less than the spectral one; Frobenius' is taken. What E is made of is known: what J may be off by (its
-bound, `urdfkin.verify.bounds`), and what the decomposition leaves, J - U S V^T. LAPACK is not believed that U
-and V are orthogonal either: with |U^T U - I| <= a and |V^T V - I| <= b the singular values of U S V^T lie
-within (1 - a)^(1/2) (1 - b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2) of those in S (Ostrowski).
+By Weyl's inequality, |s_k(J + E) - s_k(J)| <= |E| in any norm that is at least the spectral norm. The
+Frobenius norm is used here. E has two parts: the error of J (its bound, `urdfkin.verify.bounds`) and the
+residual of the decomposition, J - U S V^T.
 
-The rounding of these residuals themselves is bounded as that of any sum of products: m terms are off by m eps
-of the sum of their sizes. A norm is taken of the matrix divided by its largest number, and a product of
-mantissas and exponents apart: no square and no partial product leaves the range of doubles.
+U and V are not assumed to be orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b. By Ostrowski's theorem
+the singular values of U S V^T are those of S times a factor between (1 - a)^(1/2) (1 - b)^(1/2) and
+(1 + a)^(1/2) (1 + b)^(1/2).
+
+The residuals round too: a sum of m products has an error of at most m eps times the sum of their sizes. Norms
+are computed after division by the largest number, and products with mantissas and exponents separated. So no
+intermediate value leaves the range of doubles.
 """
 
 from __future__ import annotations
@@ -23,17 +25,17 @@ from numpy.typing import NDArray
 from urdfkin.kinematics.roundings import EPS, SMALLEST
 from urdfkin.model.tree import FloatArray
 
-#: What sums and products of positive numbers round by, here, together: they are a few dozen.
+#: Bound on the relative rounding of a few dozen sums and products of positive numbers.
 _OUTWARD = 256.0 * EPS
 
 
 class Between(NamedTuple):
-    """A value and two doubles that it lies between, arrays of one shape.
+    """A computed value with guaranteed bounds of the true value; three arrays of the same shape.
 
     Attributes:
-        value: As it is computed.
-        lower: No larger than the true one.
-        upper: No smaller.
+        value: The computed value.
+        lower: Lower bound of the true value.
+        upper: Upper bound of the true value.
     """
 
     value: FloatArray
@@ -43,13 +45,13 @@ class Between(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SingularValues:
-    """The singular values of some rows of a Jacobian, without the columns that cannot move them.
+    """The singular values of some rows of a Jacobian, without columns that are always 0.
 
     Attributes:
-        rows: Which of the Jacobian's.
-        values: (..., k), largest first; k is the number of rows or of columns, whichever is less.
-        U: (..., rows, k) the directions of the frame's motion that belong to them.
-        V: (..., nv, k) the directions of the rates; 0 for rates that do not move the frame.
+        rows: The rows of the Jacobian.
+        values: (..., k), largest first; k is the smaller of the numbers of rows and columns.
+        U: (..., rows, k) left singular vectors, directions of the frame's velocity.
+        V: (..., nv, k) right singular vectors, directions of v; 0 for joints that do not move the frame.
     """
 
     rows: slice
@@ -59,7 +61,7 @@ class SingularValues:
 
     @cached_property
     def manipulability(self) -> Between:
-        """(...) their product, which is sqrt(det J J^T) (Yoshikawa), or sqrt(det J^T J) of few columns."""
+        """(...) product of the singular values: sqrt(det J J^T) (Yoshikawa); sqrt(det J^T J) if J is tall."""
         if not self.values.value.shape[-1]:
             nothing = np.zeros(self.values.value.shape[:-1])
             return Between(nothing, nothing, nothing)
@@ -68,7 +70,7 @@ class SingularValues:
 
     @cached_property
     def condition(self) -> Between:
-        """(...) the largest by the smallest; inf where the smallest cannot be told from 0."""
+        """(...) largest singular value divided by the smallest; the upper bound is inf if that may be 0."""
         value, lower, upper = self.values
         if not value.shape[-1]:
             nothing = np.full(value.shape[:-1], np.nan)
@@ -85,11 +87,19 @@ class SingularValues:
         return Between(middle, np.maximum(_down(least), 1.0), _up(most))
 
     def manipulability_gradient(self, H: FloatArray) -> FloatArray:
-        """(..., nv) its derivatives by the rates, from the frame's Hessian H (..., 6, nv, nv).
+        """Return the gradient of the manipulability (..., nv), from the frame's Hessian.
 
-        The derivative of a singular value is u^T J' v, that of a product the sum over its factors, each by
-        the product of the others: nothing is divided by. Where the smallest cannot be told from 0 the
-        product has a kink, or may have, and the derivatives are nan.
+        The derivative of a singular value is u^T J' v. The product rule needs no division. If the smallest
+        singular value may be 0, the manipulability may not be differentiable there, and the gradient is NaN.
+
+        Args:
+            H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
+
+        >>> import urdfkin
+        >>> arm, q = urdfkin.load("planar_two_link"), [0.3, 1.0]
+        >>> found = arm.singular_values(q, "tip", "linear")  # manipulability 0.5 * 0.4 * |sin q2|
+        >>> found.manipulability_gradient(arm.hessian(q, "tip")).round(4).tolist()  # 0.2 cos q2
+        [-0.0, 0.1081]
         """
         value = self.values.value
         count = value.shape[-1]
@@ -107,13 +117,13 @@ class SingularValues:
 def singular_values(
     J: FloatArray, error: FloatArray, moving: NDArray[np.bool_], rows: slice = slice(None)
 ) -> SingularValues:
-    """Of some rows of matrices J (..., m, nv), each number of which is off by `error` at most.
+    """Return the singular values of some rows of matrices, with guaranteed bounds.
 
     Args:
-        J: Finite.
-        error: (..., m, nv).
-        moving: (nv,) bool: which columns may be anything but 0.
-        rows: Which rows.
+        J: (..., m, nv) finite matrices.
+        error: (..., m, nv) bound on the error of each number of J.
+        moving: (nv,) bool, False for columns that are always 0.
+        rows: The rows to use.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
     >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)
@@ -131,20 +141,20 @@ def singular_values(
         skew = _skew(U) + _skew(Vt.swapaxes(-1, -2))
         lower = s * _down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
-    # What is beyond all numbers, or no number, bounds nothing.
+    # A bound that is not finite becomes 0 (lower) or inf (upper).
     lower, upper = np.nan_to_num(_down(lower), nan=0.0), np.nan_to_num(_up(upper), nan=np.inf, posinf=np.inf)
     return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V)
 
 
 def _skew(U: FloatArray) -> FloatArray:
-    """(...) no less than |U^T U - I| for (..., m, k)."""
+    """Return an upper bound (...) of |U^T U - I| for U (..., m, k)."""
     back = U.swapaxes(-1, -2)
     rounding = (U.shape[-2] + 2) * EPS * (np.abs(back) @ np.abs(U))
     return _norm(np.abs(back @ U - np.eye(U.shape[-1])) + rounding)
 
 
 def _norm(E: FloatArray) -> FloatArray:
-    """(...) no less than the Frobenius norm of (..., m, n), none of whose numbers is negative."""
+    """Return an upper bound (...) of the Frobenius norm of non-negative matrices (..., m, n)."""
     largest = E.max(axis=(-2, -1), initial=0.0)
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)  # the norm of inf is inf
     with np.errstate(over="ignore", under="ignore"):
@@ -153,7 +163,7 @@ def _norm(E: FloatArray) -> FloatArray:
 
 
 def _product(x: FloatArray) -> FloatArray:
-    """(...) the product of (..., k), which alone can leave the range of doubles: no part of it does."""
+    """Return the product (...) of numbers (..., k); partial products do not overflow or underflow."""
     mantissas, exponents = np.frexp(x)
     with np.errstate(over="ignore", under="ignore"):
         product: FloatArray = np.ldexp(mantissas.prod(axis=-1), exponents.sum(axis=-1))
@@ -161,13 +171,13 @@ def _product(x: FloatArray) -> FloatArray:
 
 
 def _up(x: FloatArray) -> FloatArray:
-    """No less than `x` was before it was rounded; the next number where it is too small for a share of it."""
+    """Return a number at least as large as `x` before its rounding."""
     with np.errstate(over="ignore", under="ignore"):
         return np.nextafter(x + np.abs(x) * _OUTWARD, np.inf)
 
 
 def _down(x: FloatArray) -> FloatArray:
-    """No more, likewise; the largest double where it was beyond all."""
+    """Return a number at most as large as `x` before its rounding; the largest double if `x` is inf."""
     with np.errstate(under="ignore", invalid="ignore"):
         inside = np.nextafter(x - np.abs(x) * _OUTWARD, -np.inf)
     return np.where(np.isposinf(x), np.finfo(np.float64).max, inside)

@@ -1,23 +1,25 @@
-"""A Denavit-Hartenberg table held against Pinocchio: placement, Jacobian and acceleration of its tip.
+"""Compare a Denavit-Hartenberg table with Pinocchio: placement, Jacobian and acceleration of its tip.
 
-Pinocchio knows frames in the world; a table's numbers are relative to its base, which may itself be moving
-(left foot to right hand). With R, w, v, alpha, a of base b and tip t in the world and r = p_t - p_b:
+Pinocchio computes frames in the world. A table's numbers are relative to its base, which may move too (a
+chain from the left foot to the right hand). With R, w, v, alpha, a of base b and tip t in the world, and
+r = p_t - p_b:
 
     w    = R_b^T (w_t - w_b)
     vel  = R_b^T (v_t - v_b - w_b x r)
     alpha= R_b^T (alpha_t - alpha_b - w_b x (w_t - w_b))
     acc  = R_b^T (a_t - a_b - alpha_b x r - w_b x (w_b x r) - 2 w_b x (v_t - v_b - w_b x r))
 
-which are 7.124 and 7.125 solved for the motion seen from the moving frame. They stand here a second time, and
-not as `urdfkin.kinematics.equations` has them: a table is computed by that text, and this is what it is held
-against. The bound is what rounding can do
-to either side, plus what a snapped table declares.
+These are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. They are written here a
+second time, because `urdfkin.kinematics.equations` computes the table itself. The bound is the rounding of
+both sides, plus the declared deviation of a snapped table.
 
-Rounding is measured by the robot: by the ways from the root to both ends, with what slides, and in each
-column of the Jacobian by the mimic multipliers that move it. A table's own lengths count up to the promise
-that Hayati rows keep (`PROMISED`), and no further. Four parameters for a nearly parallel pair may need a foot
-kilometres away, and two such lengths cancel to eps times themselves: a table that is off by no more than
-that is no disagreement, but it is not the robot to rounding either. It says what it loses.
+The scale of rounding is the robot's size: the lengths from the root to both ends, prismatic displacements
+included. Columns of the Jacobian are scaled by the mimic multipliers. A table's own lengths count up to
+`PROMISED` times the robot's reach, which tables with Hayati rows never exceed.
+
+Four parameters for nearly parallel axes may need lengths of kilometres. Two such lengths cancel with an error
+of eps times their size. A difference within that error is no disagreement, but the table does lose digits.
+`TableCheck.loss` then states the loss.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.sampling import Samples
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: No length of a table with Hayati rows exceeds so many times the robot's reach (docs/dh.md).
+#: Largest length in a table with Hayati rows, in multiples of the robot's reach (docs/dh.md).
 PROMISED = 10.0
 
 
@@ -52,17 +54,17 @@ class TableError(UrdfkinError):
 
 @dataclass(frozen=True, slots=True)
 class TableCheck:
-    """What a table's check found; every figure is the worst of all samples.
+    """Result of the check of a table; each number is the worst of all samples.
 
     Attributes:
-        samples: How many configurations were compared.
-        metres: Between the two tips.
-        radians: Between their orientations.
-        units: Of "placement", "jacobian" and "acceleration": the disagreement in eps * scale.
-        shares: Likewise: the disagreement over the bound; 1 is as much as the bound allows.
-        snapped: Whether the bound includes what snapping declares.
-        loss: What rounding costs a table whose lengths go far beyond the robot, if that explains more than
-            the bound; None otherwise.
+        samples: Number of configurations.
+        metres: Distance of the two tips, m.
+        radians: Angle between their orientations, rad.
+        units: Differences of "placement", "jacobian" and "acceleration", in eps * scale.
+        shares: The same differences divided by their bounds; at most 1 if the table agrees.
+        snapped: True if the bound includes the declared deviation of snapping.
+        loss: Explanation of the digits that very large lengths lose, if the difference exceeds the bound for
+            that reason; None otherwise.
     """
 
     samples: int
@@ -75,12 +77,12 @@ class TableCheck:
 
     @property
     def within(self) -> bool:
-        """Whether every sample is within its bound."""
+        """True if every sample is within its bound."""
         return all(share <= 1.0 for share in self.shares.values())
 
     @property
     def agrees(self) -> bool:
-        """Whether all is rounding and snapping, be it the rounding of the table's own lengths."""
+        """True if rounding (also of the table's own lengths) and snapping explain the differences."""
         return self.within or self.loss is not None
 
     def __str__(self) -> str:
@@ -89,7 +91,7 @@ class TableCheck:
                 f"the table LOSES {self.metres * 1e3:.2g} mm and {self.radians:.2g} rad to rounding on"
                 f" {self.samples} samples: {self.loss}"
             )
-        bound = "rounding and what was snapped" if self.snapped else "rounding"
+        bound = "rounding and snapping" if self.snapped else "rounding"
         figures = self.shares if self.snapped else self.units
         unit = "of the bound" if self.snapped else "in eps*scale"
         worst = ", ".join(f"{name} {_figure(value, self.snapped)}" for name, value in figures.items())
@@ -110,8 +112,8 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
     Args:
         oracle: Pinocchio's model of the same robot.
         tree: The robot.
-        table: A table whose base and tip are frames of the robot.
-        samples: Configurations and rates of the whole robot.
+        table: A table with a base and a tip that are frames of the robot.
+        samples: Configurations, joint velocities and joint accelerations of the robot.
     """
     own_q = table.coupling.select(tree, samples.q)
     columns = list(table.coupling.v_index(tree))
@@ -137,12 +139,12 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
 
 
 def own_length(table: DHTable) -> float:
-    """Metres: all lengths of a table, base and tool included."""
+    """Return the sum of all lengths of a table, base and tool included, m."""
     return table.span + math.hypot(*table.base[:3, 3])
 
 
 def _loss(table: DHTable) -> str:
-    """Why a table loses digits, how many, and what to do."""
+    """Return the reason why a table loses digits, the size of the loss, and the remedy."""
     length, cell, joint = max(
         (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
     )
@@ -150,14 +152,14 @@ def _loss(table: DHTable) -> str:
     tilt = math.asin(min(tilts, default=1.0))
     snap = f"take --snap {10.0 ** math.ceil(math.log10(tilt)):.0e}, or " if tilt <= LARGEST_TOLERANCE else ""
     return (
-        f"{cell} of {joint} is {length:.3g} m, and eps times that is {EPS * length * 1e3:.2g} mm;"
+        f"{cell} of {joint} is {length:.3g} m, which rounds by {EPS * length * 1e3:.2g} mm;"
         f" {snap}take Hayati rows"
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Apart:
-    """How far a table is from Pinocchio on each sample: (n,), (n,), (n, 6, columns), two of (n,)."""
+    """Differences between a table and Pinocchio: (n,), (n,), (n, 6, columns), and a pair of (n,)."""
 
     metres: FloatArray
     radians: FloatArray
@@ -166,7 +168,7 @@ class _Apart:
 
 
 def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, float], dict[str, float]]:
-    """The worst of each quantity in eps * scale, and over the bound."""
+    """Return the worst difference of each quantity, in eps * scale and divided by the bound."""
     rates = size.rates**2 + size.accelerations
     one = np.ones_like(apart.metres)
     columns = size.turning + size.sliding
@@ -191,13 +193,13 @@ def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, floa
 
 
 def _worst(found: FloatArray, unit: FloatArray | float) -> float:
-    """The largest ratio; nothing over nothing is zero."""
+    """Return the largest ratio; 0 / 0 counts as 0."""
     return float((found / np.maximum(unit, NOT_ZERO)).max(initial=0.0))
 
 
 @dataclass(frozen=True, slots=True)
 class RelativeMotion:
-    """Pinocchio's placement (n, 4, 4), Jacobian (n, 6, nv) and acceleration (n, 6) of a tip in a base."""
+    """Pinocchio's placement (n, 4, 4), Jacobian (n, 6, nv) and acceleration (n, 6) relative to a base."""
 
     placement: FloatArray
     jacobian: FloatArray
@@ -205,7 +207,7 @@ class RelativeMotion:
 
 
 def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> RelativeMotion:
-    """The tip's motion as seen from the table's base, from Pinocchio's of both in the world."""
+    """Return the tip's motion relative to the table's base, from Pinocchio's motions of both."""
     frames = [table.base_frame, table.tip_frame]
     T = oracle.placements(samples.q, frames)
     R = T[:, 0, :3, :3]
@@ -234,16 +236,16 @@ def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """What rounding is measured by.
+    """Scales of the rounding.
 
     Attributes:
-        reach: (n,) metres: the ways from the root to both ends.
-        turning: (columns,) the sum of the multipliers with which a coordinate turns joints on these ways.
-        sliding: Likewise, slides.
-        rates: (n,) the sum of all joints' rates, rad/s and m/s.
-        accelerations: (n,) likewise.
-        rounding: (n,) the count of roundings times eps, an angle being itself rounded; and the tilts that a
-            table leaves out as rounding (`urdfkin.dh.noise`).
+        reach: (n,) length of the paths from the root to both ends, m.
+        turning: (columns,) sum of the |multiplier| of the revolute joints of a coordinate on these paths.
+        sliding: (columns,) the same for prismatic joints.
+        rates: (n,) sum of all |joint velocity|, rad/s and m/s.
+        accelerations: (n,) sum of all |joint acceleration|, rad/s^2 and m/s^2.
+        rounding: (n,) number of roundings times eps, the rounding of angles included; plus the tilts that a
+            table omits (`urdfkin.dh.noise`).
     """
 
     reach: FloatArray
@@ -254,12 +256,12 @@ class Sizes:
     rounding: FloatArray
 
     def of_length(self, metres: float) -> Sizes:
-        """The same for a table of that length."""
+        """Return the scales for a table of that length."""
         return replace(self, reach=np.maximum(self.reach, metres))
 
 
 def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
-    """Everything from the root to either end counts: Pinocchio goes there and back."""
+    """Return the scales of all joints from the root to both ends, because Pinocchio starts at the root."""
     n = len(samples.q)
     reach, rates, accelerations, angles = np.zeros((4, n))
     names, joints, tilt = table.joint_names, 0, 0.0
@@ -269,7 +271,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
             joint = tree.joints[i]
             joints += 1
             tilt += joint.tilt
-            reach += math.hypot(*joint.T_parent_joint[:3, 3])  # squares of tiny lengths vanish
+            reach += math.hypot(*joint.T_parent_joint[:3, 3])  # hypot avoids the underflow of squares
             factor, offset, leader = 1.0, 0.0, joint.name
             if (rule := joint.mimic) is not None:
                 factor, offset, leader = abs(rule.multiplier), abs(rule.offset), rule.leader
@@ -285,19 +287,19 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 weights[joint.kind.turns][names.index(leader)] += factor
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
-    # A joint costs what it does anywhere, in Pinocchio and in our reading of the chain that rows are made of,
-    # and a row what it does. The acceleration seen from the base has four factors that a tilt turns.
+    # Joints round in Pinocchio and in the chain that the rows are made of, and rows round too. The
+    # acceleration relative to the base has four factors that a tilt rotates.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 
 class _Slack:
-    """What a snapped table may differ by, beyond rounding.
+    """Allowed difference of a snapped table beyond rounding.
 
-    No axis turns by more than `turn`, no joint origin and no tip is displaced by more than the declared
-    metres; z x d so changes by turn times reach plus twice the metres, and a product of two such factors
-    by twice that. Angular terms z x z change by twice the turn.
+    Snapping rotates an axis by at most `turn` and displaces a joint origin or the tip by at most `metres`. So
+    z x d changes by at most turn times reach plus twice metres, and a product of two such factors by twice
+    that. Angular terms z x z change by at most twice the turn.
     """
 
     def __init__(self, table: DHTable, own_q: FloatArray, size: Sizes) -> None:
@@ -311,5 +313,5 @@ class _Slack:
 
 
 def _split(six: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The largest linear and angular component of (n, 6)."""
+    """Return the largest linear and the largest angular component of (n, 6)."""
     return six[:, :3].max(axis=-1), six[:, 3:].max(axis=-1)

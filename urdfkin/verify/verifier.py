@@ -1,6 +1,6 @@
-"""What a robot has that checks it: the text that its oracle reads, what that said, and what nobody asked.
+"""The verifier of a robot: it compares results with the oracle and records the checks.
 
-A result is held against the oracle's for the user's own arguments, in the shape in which it is handed out.
+The oracle receives the user's original arguments, and the comparison uses the result in its final shape.
 """
 
 from __future__ import annotations
@@ -41,29 +41,30 @@ from urdfkin.verify.quantities import Quantity
 from urdfkin.verify.sampling import SAMPLE, Verify, checked_choice, draw, parts
 from urdfkin.verify.tables import TableCheck, TableError, check_table
 
-#: Random configurations that a table is checked on, besides the neutral one and the ends of the limits.
+#: Random configurations for the check of a table, besides the zero configuration and the limits.
 TABLE_SAMPLES = 40
 
 
 class NotVerifiedWarning(UserWarning):
-    """Results are handed out that the oracle could not check; the message says why."""
+    """The oracle could not check some results; the message gives the reason."""
 
 
 class Verifier:
-    """Checks one robot's results, and keeps account of them.
+    """Checks the results of one robot and records them.
 
     Args:
-        text: The URDF that Pinocchio reads.
-        tree: urdfkin's reading of it.
-        origin: Where the text comes from, for lines that compute a case again.
-        policy: Which results are checked unless a call says otherwise.
-        mimic: Whether followers follow.
-        unverifiable: Why Pinocchio cannot check the robot; None if it can, as far as is known.
-        oracle: Who checks quantities: "pinocchio" or "mujoco". Tables, judge and enclosures ask Pinocchio.
+        text: The URDF text that Pinocchio reads.
+        tree: urdfkin's tree of the same text.
+        origin: Source of the text, for lines that reproduce a case.
+        policy: Default of `verify` in calls.
+        mimic: True: mimic joints are coupled. False: each moves freely.
+        unverifiable: Known reason why Pinocchio cannot check the robot; None if there is none.
+        oracle: Oracle for quantities, "pinocchio" or "mujoco". Tables, the accuracy study and enclosures
+            always use Pinocchio.
 
     Attributes:
-        ledger: What was handed out, checked or not.
-        reading: Who vouches for the way from another format to the text; empty where it was a URDF.
+        ledger: Record of checked and unchecked results.
+        reading: Result of the check of a conversion from another format to the text; empty for a URDF.
     """
 
     def __init__(
@@ -85,16 +86,16 @@ class Verifier:
         self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Pinocchio's models are rebuilt where they are needed. A copy, in this process or another, has handed
-        # out nothing yet: its ledger is empty.
+        # Pinocchio's models are rebuilt when needed. A copy, in this process or another, has returned no
+        # results yet, so its ledger is empty.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: Witness = PINOCCHIO) -> Oracle:
-        """A witness's model of the robot, made once; on a free-flyer if the base moves.
+        """Return the oracle's model of the robot; with a free-flyer if the base moves. It is built once.
 
         Raises:
-            OracleError: the witness does not accept the text, or finds other joints in it.
-            InputError: the witness is not installed.
+            OracleError: the oracle does not accept the text, or reads other joints from it.
+            InputError: the oracle is not installed.
         """
         key = by.name, base is not None
         if key not in self._oracles:
@@ -104,17 +105,17 @@ class Verifier:
         return self._oracles[key]
 
     def model(self, *, mimic: bool) -> Any:
-        """A new model of Pinocchio's, for others to work with.
+        """Return a new `pinocchio.Model` of the robot, for the user.
 
         Raises:
-            OracleError: Pinocchio does not accept the text, or reads another robot in it.
+            OracleError: Pinocchio does not accept the text, or reads another robot from it.
         """
         if self.unverifiable is not None:
             raise OracleError(self.unverifiable, where=self.tree.name)
         return build_model(self.text, self.tree, self.origin.root_joint, mimic=mimic)
 
     def cannot(self, base: BaseMotion | None = None, by: Witness = PINOCCHIO) -> str | None:
-        """Why a witness cannot check this robot; None if it can."""
+        """Return the reason why an oracle cannot check this robot; None if it can."""
         if by is PINOCCHIO and self.unverifiable is not None:
             return self.unverifiable
         if by.name not in self._refusals:
@@ -127,20 +128,20 @@ class Verifier:
         return self._refusals.get(by.name)
 
     def wanted(self, verify: Verify | None) -> Verify:
-        """Which results are to be checked; None leaves it to the policy."""
+        """Return the effective value of `verify`; None means the policy."""
         return checked_choice(self.policy if verify is None else verify)
 
     def ready(self, verify: Verify | None) -> None:
-        """Ask for Pinocchio before the work and not after it.
+        """Import Pinocchio before the computation if its results need a check.
 
         Raises:
-            InstallationError: it is to check results and is missing, or another project goes by its name.
+            InstallationError: Pinocchio is missing, or a different project has its name.
         """
         if self.wanted(verify) is not False and self.unverifiable is None and self.witness is PINOCCHIO:
             pinocchio()
 
     def certificate(self) -> Certificate:
-        """What was checked so far, how closely it agreed, by whom, and what was not checked."""
+        """Return the record of all checks so far: the oracle, the agreement, and the unchecked results."""
         return replace(
             self.ledger.certificate(self.tree.name, self.witness.words),
             reading=self.reading,
@@ -151,17 +152,17 @@ class Verifier:
 
     @property
     def sha256(self) -> str:
-        """The digest of what was given: of the MJCF file, or of the URDF's text as UTF-8."""
+        """SHA-256 of the MJCF file, or of the URDF text as UTF-8."""
         return self.origin.sha256 or hashlib.sha256(self.text.encode()).hexdigest()
 
     # -- quantities ----------------------------------------------------------------------------------
 
-    def check(self, quantity: Quantity, call: Call, handed_out: FloatArray, verify: Verify | None) -> None:
-        """Have a call's results checked, in the shape in which the user gets them, and enter them.
+    def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
+        """Check the results of a call in their final shape, and record them.
 
         Raises:
-            VerificationError: the oracle computes something else.
-            OracleError: they have another shape than what was asked.
+            VerificationError: the oracle's result differs by more than the bound.
+            OracleError: the shape of the results does not match the arguments.
         """
         ledger, wanted = self.ledger, self.wanted(verify)
         if wanted is False:
@@ -171,7 +172,7 @@ class Verifier:
             _warn(reason)
             ledger.unchecked(quantity.name, call.results, reason)
             return
-        results = call.question.flat(handed_out, quantity.axes)
+        results = call.question.flat(result, quantity.axes)
         total, worst = Comparison.of_nothing(), None
         for part in parts(wanted, call.n, results[:1].size):
             comparison, failure = self._compare(quantity, call, results[part], part)
@@ -187,7 +188,7 @@ class Verifier:
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[Comparison, VerificationError | None]:
-        """Hold some of the results against Pinocchio's; the worst of them, if it disagrees."""
+        """Compare some of the results with the oracle's; also return the error of the worst, if any."""
         x = call.part(part)
         theirs, bound = held_against(quantity, self.oracle(call.base, self.witness), x, ours, self.witness)
         comparison = compare(ours, theirs, bound, 2)
@@ -216,7 +217,7 @@ class Verifier:
         )
 
     def _replay(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
-        """A line that computes sample `k` again: a command, or Python for what commands have no words for."""
+        """Return a line that computes sample `k` again: a command, or Python if no command can express it."""
         inputs = (call.q, *call.rates)
         values = {name: array[k].tolist() for name, array in zip("qva", inputs, strict=False)}
         reference = call.reference.name.lower() if quantity.referred else None
@@ -232,12 +233,15 @@ class Verifier:
     # -- tables --------------------------------------------------------------------------------------
 
     def table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
-        """Hold a table against Pinocchio; None, with a warning, where Pinocchio cannot check the robot.
+        """Check a Denavit-Hartenberg table with Pinocchio.
 
-        A strict table whose lengths lose more than rounding of the robot's own is warned of as well.
+        A strict table with very large lengths loses digits; that also causes a warning.
+
+        Returns:
+            The result; None, with a warning, if Pinocchio cannot check the robot.
 
         Raises:
-            TableError: the two disagree.
+            TableError: the two differ by more than the bound.
         """
         if (reason := self.cannot()) is not None:
             _warn(reason)
@@ -256,12 +260,13 @@ class Verifier:
         return check
 
     def tree_parameters(self, parameters: TreeParameters) -> str | None:
-        """Hold the placements of all links by tree parameters against Pinocchio's; a line says how close.
+        """Compare the placements of all links by tree parameters with Pinocchio's.
 
-        None, with a warning, where Pinocchio cannot check the robot.
+        Returns:
+            A line about the agreement; None, with a warning, if Pinocchio cannot check the robot.
 
         Raises:
-            TableError: the two disagree.
+            TableError: the two differ by more than the bound.
         """
         if (reason := self.cannot()) is not None:
             _warn(reason)
@@ -283,7 +288,9 @@ class Verifier:
         tilt = max(sum(tree.joints[i].tilt for i in tree.path(leaf)) for leaf in tree.leaves())
         if units > parameters.roundings + of_joints(0, tilt):
             raise TableError(
-                f"the tree parameters of {tree.name} disagree", where=f"Pinocchio {version()}", found=line
+                f"the tree parameters of {tree.name} disagree with Pinocchio",
+                where=f"Pinocchio {version()}",
+                found=line,
             )
         return line
 
@@ -291,32 +298,34 @@ class Verifier:
 def held_against(
     quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: Witness = PINOCCHIO
 ) -> tuple[FloatArray, Bound]:
-    """(n, frames, ...) the same results by a witness, and what the two are measured against."""
+    """Return an oracle's results (n, frames, ...) for some configurations, and the bound."""
     if quantity.against is not None:
         return quantity.against(oracle, x, ours, by)
     return theirs_of(quantity, oracle, x.asked), bound_of(quantity, x, by)
 
 
 def bound_of(quantity: Quantity, x: Part, by: Witness = PINOCCHIO) -> Bound:
-    """What the two are measured against."""
+    """Return the bound between urdfkin's and the oracle's results."""
     v, a = (*x.rates, None, None)[:2]
     size = by.size(magnitudes(x.plan, x.q, v, a, x.state))
     return quantity.bound(x.plan, size, x.reference)
 
 
 def urdfkins(quantity: Quantity, x: Part) -> FloatArray:
-    """(n, frames, ...) as the recursion computes them."""
+    """Return urdfkin's results (n, frames, ...), by the forward recursion."""
     return quantity.ours(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 
-@np.errstate(over="ignore", under="ignore", invalid="ignore")  # what is not finite disagrees
+@np.errstate(
+    over="ignore", under="ignore", invalid="ignore"
+)  # a value that is not finite counts as a disagreement
 def theirs_of(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
-    """(n, frames, ...) by a witness, for what the user asked."""
+    """Return an oracle's results (n, frames, ...) for the user's arguments."""
     return quantity.theirs(oracle, asked.inputs, asked.frames, asked.reference, asked.base)
 
 
 def _warn(reason: str) -> None:
-    """Warn where the package was called from."""
+    """Issue a warning at the line that called the package."""
     level, frame = 1, sys._getframe()
     while frame.f_back is not None and frame.f_globals["__name__"].startswith("urdfkin."):
         level, frame = level + 1, frame.f_back

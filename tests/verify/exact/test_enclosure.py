@@ -277,7 +277,7 @@ def test_it_reads_as_what_it_says() -> None:
 def test_bad_input_is_said() -> None:
     robot = robot_of("panda")
     q, v, a = sample(robot)
-    with pytest.raises(InputError, match=r"a proof is for one sample: found a batch of shape \(2,\)"):
+    with pytest.raises(InputError, match=r"an enclosure needs one sample: found a batch of shape \(2,\)"):
         robot.enclose(np.stack([q, q]), v, a, robot.tip_frame)
     with pytest.raises(InputError, match="digits must be at least 15"):
         robot.enclose(q, v, a, robot.tip_frame, digits=14)

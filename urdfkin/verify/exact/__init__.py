@@ -1,1 +1,1 @@
-"""The same quantities on numbers that leave no doubt: fifty digits, or intervals that hold the true value."""
+"""Reference values: the same quantities with fifty digits, or with intervals that contain the true value."""

@@ -1,8 +1,8 @@
-"""Proof for one sample: intervals that contain the true values, and whose doubles lie in them.
+"""Enclosures: intervals that provably contain the true values of one sample.
 
-`urdfkin.kinematics.equations` is evaluated on intervals (`urdfkin.verify.exact.intervals`), from the decimals
-of the URDF as they are written and the exact values of q, v and a. That these equations are the right ones is
-not in the proof: that is what Pinocchio's agreement says.
+`urdfkin.kinematics.equations` is evaluated with interval arithmetic (`urdfkin.verify.exact.intervals`). The
+inputs are the decimals in the URDF text and the exact values of q, v and a. An enclosure proves the rounding,
+not the equations: the agreement with Pinocchio supports those.
 """
 
 from __future__ import annotations
@@ -38,22 +38,22 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, theirs_of, urdfkins
 
-#: Fewer digits than these a double has; more than those nobody waits for.
+#: Accepted numbers of digits. A double has 15; more than 10,000 take too long.
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
-#: Twice a double's, and a joint may lose one more: a third of one is lost where all axes stand askew.
+#: Default: twice the digits of a double. One is added for each joint; oblique axes lose a third of one each.
 ENOUGH_DIGITS = 30
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Enclosure:
-    """Where the true values of one quantity lie, number by number.
+    """Bounds of the true values of one quantity, number by number.
 
     Attributes:
-        quantity: Which.
-        lower: Doubles that are no larger, in the shape in which `Robot` hands the quantity out.
-        upper: Doubles that are no smaller.
-        urdfkin: What urdfkin computes.
-        pinocchio: What Pinocchio computes; None where it cannot.
+        quantity: Name of the quantity.
+        lower: Lower bounds, in the shape that the method of `Robot` returns.
+        upper: Upper bounds.
+        urdfkin: urdfkin's result.
+        pinocchio: Pinocchio's result; None if Pinocchio cannot compute it.
     """
 
     quantity: str
@@ -64,23 +64,29 @@ class Enclosure:
 
     @property
     def width(self) -> FloatArray:
-        """Upper - lower: 0 where the true value is a double, else the step to the next double, or more."""
+        """Upper - lower: 0 where the true value is a double, else at least the distance of two doubles."""
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Which numbers of `x`, of the same shape, lie inside.
+        """Return a bool array: True where the number of `x` lies between `lower` and `upper`.
+
+        Args:
+            x: Values, of the quantity's shape.
 
         Raises:
-            InputError: another shape.
+            InputError: `x` has a different shape.
         """
         x = self._alike(x)
         return (self.lower <= x) & (x <= self.upper)
 
     def error(self, x: ArrayLike) -> FloatArray:
-        """How far each number of `x`, of the same shape, can be from its true value at most.
+        """Return an upper bound of the error of each number of `x`.
+
+        Args:
+            x: Values, of the quantity's shape.
 
         Raises:
-            InputError: another shape.
+            InputError: `x` has a different shape.
         """
         x = self._alike(x)
         farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
@@ -104,18 +110,18 @@ class Enclosure:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Enclosures:
-    """Where the true values of one frame's motion lie.
+    """Enclosures of the motion of one frame.
 
     Attributes:
-        frame: Its name.
-        reference: In which its velocity, acceleration and Jacobians are seen.
-        digits: Of the ends of the intervals, before they were rounded outward to doubles.
-        placement: (4, 4).
-        velocity: (6,).
-        acceleration: (6,), classical.
+        frame: Name of the frame.
+        reference: Reference frame of velocity, acceleration and Jacobians.
+        digits: Decimal digits of the interval arithmetic; the ends are then rounded outward to doubles.
+        placement: (4, 4) m.
+        velocity: (6,) [linear; angular], m/s, rad/s.
+        acceleration: (6,) [linear; angular], classical, m/s^2, rad/s^2.
         jacobian: (6, nv).
         jacobian_rate: (6, nv).
-        hessian: (6, nv, nv), where it was asked for.
+        hessian: (6, nv, nv); None if not requested.
     """
 
     frame: str
@@ -149,14 +155,29 @@ def enclose(
     *,
     hessian: bool = False,
 ) -> Enclosures:
-    """What `Robot.enclose` says."""
+    """Return the enclosures of one frame for one sample; the arguments are those of `Robot.enclose`.
+
+    Args:
+        verifier: Verifier of the robot.
+        plan_of: Function that returns the compiled tree for some links.
+        inputs: q (nq,), v (nv,) and a (nv,).
+        frame: Name of a link or joint.
+        reference: Reference frame.
+        base: Motion of the root link; None: fixed at the world origin.
+        digits: Decimal digits, or None for the default.
+        hessian: Also enclose the Hessian.
+
+    Raises:
+        InputError: a batch, a wrong length, or an invalid number of digits.
+        UnknownNameError: the frame or reference does not exist.
+    """
     if digits is not None:
         digits = whole_number(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
     tree = verifier.tree
     call = Call(tree, plan_of, as_str(frame, "frame"), reference, base, inputs)
     if call.shape:
         raise InputError(
-            "a proof is for one sample",
+            "an enclosure needs one sample",
             found=f"a batch of shape {call.shape}",
             remedy="give q (nq,), v and a (nv,), and the base of one sample",
         )

@@ -1,8 +1,8 @@
-"""Intervals that hold the true value, proven from whole numbers on.
+"""Interval arithmetic with rigorous bounds.
 
-mpmath's sums, differences, products, quotients and whole powers of intervals are taken in whole numbers and
-rounded outward once. Its square root, sine, cosine and its reading of large exponents are good to the last
-digit, without a proof; here they are made of what is proven.
+mpmath computes sums, differences, products, quotients and integer powers of intervals in integer arithmetic
+and rounds them outward once, which is rigorous. Its square root, sine, cosine and parser of large exponents
+are accurate but not proven. This module replaces them by rigorous versions.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from mpmath.libmp import dps_to_prec, from_float, from_int, mpf_gt, mpf_lt, to_f
 
 from urdfkin.verify.exact.numbers import Matrix, Number, defect, nearest_rotation
 
-#: Bits beyond those asked for, where something is doubled or iterated.
+#: Additional bits for iterations.
 _SPARE = 30
-#: Sine and cosine are summed for angles below 2^-10, and doubled from there.
+#: Taylor's series is used for angles below 2^-10; larger ones follow from the double-angle formulas.
 _SMALL = 10
 
 
 class Intervals:
-    """A kind of number for `urdfkin.verify.exact.recursion`: intervals whose ends have so many bits.
+    """A number context for `urdfkin.verify.exact.recursion`: intervals with ends of a given precision.
 
     Args:
-        bits: Of the ends; 53 are those of a double.
+        bits: Precision of the ends, bits; a double has 53.
     """
 
     def __init__(self, bits: int) -> None:
@@ -35,7 +35,7 @@ class Intervals:
         self._field.prec = bits
 
     def mpf(self, value: str | float) -> Number:
-        """A decimal as it is written, in as small an interval as there is; or a double, as it is."""
+        """Return the smallest interval that contains a decimal, or the exact interval of a double."""
         if not isinstance(value, str):
             return self._field.mpf(value)
         mantissa, _, exponent = value.lower().partition("e")
@@ -45,28 +45,28 @@ class Intervals:
         return digits * power if shift > 0 else digits / power
 
     def _whole(self, number: int) -> Number:
-        """All digits of it, however many."""
+        """Return the exact interval of an integer of any size."""
         end = from_int(number)
         return self._field.make_mpf((end, end))
 
     def sqrt(self, x: Number) -> Number:
-        """The root of x lies between any m > 0 and x / m, which Heron knew."""
+        """Return the square root: it lies between m and x / m for any m > 0 (Heron)."""
         m = self._field.sqrt(x.mid).mid
         other = x / m
         return self._field.mpf((min(m, other.a), max(m, other.b)))
 
     def cos_sin(self, angle: Number) -> tuple[Number, Number]:
-        """Cosine and sine of the middle, which change by no more than the angle does.
+        """Return cosine and sine: those of the midpoint, widened by the half width of the angle.
 
-        Those of a small part of it are sums of Taylor's series, whose remainder is less than the next term;
-        1 - 2 s^2 and 2 s c double the angle, and what is not known of it four times at most.
+        The midpoint is halved until Taylor's series converges fast. The remainder is below the next term.
+        Then 1 - 2 s^2 and 2 s c double the angle. Each doubling enlarges the error at most four times.
         """
         if angle == 0:
             return self.mpf(1), self.mpf(0)
         middle = angle.mid
         halvings = max(0, self._field.mag(middle) + _SMALL)
         wide = intervals(self.bits + 2 * halvings + _SPARE)
-        small = wide._own(middle) / 2**halvings  # exact: the ends lose no bit
+        small = wide._own(middle) / 2**halvings  # exact: a division by a power of two
         sums, term, k = [wide.mpf(1), wide.mpf(0)], wide.mpf(1), 0
         while wide._field.mag(term) > -wide.bits:
             k += 1
@@ -80,19 +80,19 @@ class Intervals:
         return self._own(c) + spread, self._own(s) + spread
 
     def around(self, x: Number) -> Number:
-        """From -|x| to |x|, with the largest |x| there is in x."""
+        """Return the interval from -m to m, where m is the largest |x| in `x`."""
         size = abs(x).b
         return self._field.mpf((-size, size))
 
     def _own(self, x: Number) -> Number:
-        """An interval of another precision; what is computed with it is rounded here."""
+        """Return an interval of another context as one of this context, unchanged."""
         return self._field.make_mpf(x._mpi_)
 
     def nearest_rotation(self, M: Matrix) -> Matrix:
-        """The rotation nearest to a matrix which is one to some digits, proven.
+        """Return the rotation nearest to a matrix that is a rotation to some digits, with rigorous bounds.
 
-        Newton's steps leave a matrix X = U (1 + E) of the same orthogonal factor U. X^T X - 1 = 2 E + E^2 is
-        larger than E, whose eigenvalues are above -1: |X - U| <= |X^T X - 1|.
+        Newton's iteration returns X = U (1 + E) with the same orthogonal factor U. The eigenvalues of E are
+        above -1, so X^T X - 1 = 2 E + E^2 is larger than E, and |X - U| <= |X^T X - 1|.
         """
         wide = intervals(self.bits + _SPARE)
         X = nearest_rotation(_each(wide._own, M))
@@ -101,29 +101,29 @@ class Intervals:
 
 
 def _each(function: Callable[[Number], Number], M: Matrix) -> Matrix:
-    """A matrix of the results."""
+    """Return the matrix of the function's results."""
     x, y, z = ((function(a), function(b), function(c)) for a, b, c in M)
     return x, y, z
 
 
 @cache
 def intervals(bits: int) -> Intervals:
-    """The kind of number, made once."""
+    """Return the context for a precision; it is created once."""
     return Intervals(bits)
 
 
 def of_digits(digits: int) -> Intervals:
-    """Intervals whose ends have so many decimal digits, and a little more."""
+    """Return the context for a number of decimal digits."""
     return intervals(dps_to_prec(digits))
 
 
 def ends(x: Number) -> tuple[float, float]:
-    """The doubles between which an interval lies, or a whole number: the nearest to its ends, outward."""
+    """Return the ends of an interval or an integer, rounded outward to doubles."""
     if isinstance(x, int):
         return float(x), float(x)
     a, b = x._mpi_
     low, high = to_float(a), to_float(b)
-    # `to_float` is off by less than one double, subnormal and infinite ones included.
+    # The error of `to_float` is less than one double, also for subnormal and infinite numbers.
     if mpf_lt(a, from_float(low)):
         low = math.nextafter(low, -math.inf)
     if mpf_gt(b, from_float(high)):

@@ -1,12 +1,10 @@
-"""Numbers of many digits, intervals, and the rotations that are made of angles; vectors are triples of them.
+"""Vectors and rotations of exact numbers, and the exact decimals of a URDF text.
 
-The kind of number is a context: `mp` of mpmath's for fifty digits, `urdfkin.verify.exact.intervals` for
-intervals.
+A context determines the kind of number: `mp` of mpmath for fifty digits, `urdfkin.verify.exact.intervals` for
+intervals. Vectors are triples of numbers.
 
-
-The numbers of a URDF as they are written: decimals, not the doubles nearest to them.
-
-Names and order come from the tree that was read; the text was checked before (`urdfkin.lint`).
+`read_exact` reads the decimals of a URDF text without rounding them to doubles. Names and order of the joints
+come from the tree; `urdfkin.lint` checked the text before.
 """
 
 from __future__ import annotations
@@ -23,10 +21,10 @@ from urdfkin.kinematics import equations as eq
 from urdfkin.model.tree import Joint, JointKind, KinematicTree
 from urdfkin.urdf.plain_xml import plain_xml
 
-#: Digits of the judge's arithmetic. Doubles have 16; fifty leave no doubt about the last of them.
+#: Digits of the accuracy study. Doubles have 16, so fifty determine their last digit reliably.
 DIGITS = 50
 
-#: A context of our own: mpmath's global one stays as its user set it.
+#: A separate context, so that mpmath's global one does not change.
 mp = mpmath.mp.clone()
 mp.dps = DIGITS
 
@@ -35,24 +33,24 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 
-# Whole numbers are numbers of every kind.
+# Integers work with every kind of number.
 ZERO: Vector = (0, 0, 0)
 IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
 
 def exact(value: float, context: Context = mp) -> Number:
-    """A double as it is, to its last bit."""
+    """Return the exact value of a double."""
     return context.mpf(float(value))
 
 
 def unit(x: Vector, context: Context) -> Vector:
-    """`x` divided by its length."""
+    """Return `x` divided by its length."""
     length = context.sqrt(eq.dot(x, x))
     return x[0] / length, x[1] / length, x[2] / length
 
 
 def about(axis: Vector, angle: Number, context: Context) -> Matrix:
-    """R_k(phi), 7.28, for a unit axis."""
+    """Return the rotation about a unit axis, R_k(phi) (eq. 7.28)."""
     c, s = context.cos_sin(angle)
     columns = (
         eq.plus(
@@ -65,23 +63,24 @@ def about(axis: Vector, angle: Number, context: Context) -> Matrix:
 
 
 def from_rpy(rpy: Vector, context: Context) -> Matrix:
-    """Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Return Rz(yaw) Ry(pitch) Rx(roll)."""
     x, y, z = ((sine, cosine, 0, 1) for cosine, sine in map(context.cos_sin, rpy))
     found: Matrix = eq.product(eq.product(eq.about_z(*z), eq.about_y(*y)), eq.about_x(*x))
     return found
 
 
 def from_quaternion(quaternion: tuple[Number, ...], context: Context) -> Matrix:
-    """The rotation of a quaternion (x, y, z, w), put to length one first."""
+    """Return the rotation of a quaternion (x, y, z, w) of any length."""
     length = context.sqrt(sum(x * x for x in quaternion))
     found: Matrix = eq.rotation_of_quaternion(*(x / length for x in quaternion))
     return found
 
 
 def nearest_rotation(M: Matrix) -> Matrix:
-    """The rotation that a matrix means which is one to some digits: the orthogonal factor of M = U H.
+    """Return the rotation nearest to M, its orthogonal factor U in M = U H.
 
-    Newton's method, X - X (X^T X - I)/2, which doubles the digits with each step.
+    M must be a rotation to some digits. Newton's iteration X - X (X^T X - I)/2 doubles the digits with each
+    step.
     """
     for _ in range(6):
         x, y, z = (
@@ -92,26 +91,26 @@ def nearest_rotation(M: Matrix) -> Matrix:
 
 
 def defect(M: Matrix) -> Matrix:
-    """M^T M - I, which is nothing for a rotation."""
+    """Return M^T M - I, which is 0 for a rotation."""
     gram = eq.product(eq.transposed(M), M)
     x, y, z = (eq.minus(row, unit) for row, unit in zip(gram, IDENTITY, strict=True))
     return x, y, z
 
 
-#: The version of URDF from which on `quat_xyzw` counts; in older files it is ignored.
+#: First URDF version with `quat_xyzw`; in older files it is ignored.
 _WITH_QUATERNIONS = (1, 1)
 
 
 @dataclass(frozen=True, slots=True)
 class ExactJoint:
-    """What the text says about one joint.
+    """The exact numbers of one joint in the text.
 
     Attributes:
-        R: Orientation of the joint frame in its parent's.
-        p: Its place, metres.
+        R: Orientation of the joint frame relative to its parent.
+        p: Its position relative to its parent, m.
         axis: Unit axis in the joint frame.
-        multiplier: 1, or a follower's.
-        offset: 0, or a follower's.
+        multiplier: Multiplier of a mimic joint, else 1.
+        offset: Offset of a mimic joint, else 0.
     """
 
     R: Matrix
@@ -124,23 +123,23 @@ class ExactJoint:
 def read_exact(
     text: str, tree: KinematicTree, context: Context = mp, among: Iterable[int] | None = None
 ) -> dict[int, ExactJoint]:
-    """The joints of a tree, by their numbers there, from the URDF text it was read from.
+    """Return the exact numbers of joints by their index in the tree, from the URDF text.
 
     Args:
-        text: The URDF.
-        tree: The same, read; a joint `root_joint` that it was hung from is not in the text.
-        context: The kind of number.
-        among: Numbers of the joints that are wanted; None: all.
+        text: The URDF text.
+        tree: The tree of the same text. Its `root_joint`, if any, is not in the text.
+        context: The number context.
+        among: Indices of the joints to read; None: all.
 
     Raises:
-        InputError: the text and the tree are not of the same robot.
+        InputError: a joint of the tree is not in the text.
     """
     words = _Text(text, tree.name, context)
     return {i: words.joint_of(tree.joints[i]) for i in (range(len(tree.joints)) if among is None else among)}
 
 
 class _Text:
-    """The joints of a text, their numbers of one kind."""
+    """Reader of the joints of a URDF text in one number context."""
 
     def __init__(self, text: str, name: str, context: Context) -> None:
         root = plain_xml(text)
@@ -151,18 +150,18 @@ class _Text:
     def joint_of(self, joint: Joint) -> ExactJoint:
         element = self.elements.get(joint.name)
         if element is not None:
-            return self.joint(element, turns_or_slides=joint.kind.has_axis, follows=joint.mimic is not None)
+            return self.joint(element, has_axis=joint.kind.has_axis, is_mimic=joint.mimic is not None)
         if joint.kind in (JointKind.FLOATING, JointKind.PLANAR):
             return ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)
         raise InputError("a joint is not in the URDF text", where=self.name, found=joint.name)
 
-    def joint(self, element: Element, *, turns_or_slides: bool, follows: bool) -> ExactJoint:
+    def joint(self, element: Element, *, has_axis: bool, is_mimic: bool) -> ExactJoint:
         axis = self.vector(element.find("axis"), "xyz", "1 0 0")
-        multiplier, offset = self.rule(str(element.get("name"))) if follows else (1, 0)
+        multiplier, offset = self.rule(str(element.get("name"))) if is_mimic else (1, 0)
         return ExactJoint(
             R=self.rotation(element.find("origin")),
             p=self.vector(element.find("origin"), "xyz", "0 0 0"),
-            axis=unit(axis, self.context) if turns_or_slides else axis,
+            axis=unit(axis, self.context) if has_axis else axis,
             multiplier=multiplier,
             offset=offset,
         )
@@ -176,13 +175,13 @@ class _Text:
         return x, y, z
 
     def rotation(self, origin: Element | None) -> Matrix:
-        """From roll, pitch and yaw, or the quaternion, of any length, that URDF 1.1 has in their place."""
+        """Return the rotation of rpy or, from URDF 1.1 on, of `quat_xyzw`, a quaternion of any length."""
         if self.quaternions and origin is not None and "quat_xyzw" in origin.attrib:
             return from_quaternion(self.numbers(origin, "quat_xyzw", ""), self.context)
         return from_rpy(self.vector(origin, "rpy", "0 0 0"), self.context)
 
     def rule(self, name: str) -> tuple[Number, Number]:
-        """Multiplier and offset of a follower, chains followed to the joint that moves."""
+        """Return multiplier and offset of a mimic joint relative to the independent joint."""
         multiplier, offset = self.context.mpf(1), self.context.mpf(0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":

@@ -1,8 +1,8 @@
-"""The recursion of section 7.7 on numbers of many digits or on intervals: slow, short, and no doubt about it.
+"""The forward recursion of section 7.7 with exact numbers: fifty digits or intervals.
 
-The equations are those of `urdfkin.kinematics.equations`; that they are the right ones is Pinocchio's to say.
-What this adds is the true value of every digit, from the URDF's decimals and the exact values of q, v and
-a. It goes in the world's axes, as the text does.
+The equations are those of `urdfkin.kinematics.equations`, in world axes as in the textbook. The inputs are
+the URDF's decimals and the exact values of q, v and a. The results are reference values for the rounding; the
+comparison with Pinocchio checks the equations themselves.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ from urdfkin.verify.exact.numbers import (
 )
 from urdfkin.verify.pinocchio_inputs import BaseNumbers
 
-_WALK = Recursion(equations)
+_RECURSION = Recursion(equations)
 
 
 def on_base(
     base: BaseNumbers, context: Context = mp, nearest: Callable[[Matrix], Matrix] = nearest_rotation
 ) -> State:
-    """A root link that moves, from the numbers that its motion was given by.
+    """Return the state of a moving root link, from the user's numbers.
 
     Args:
         base: (4, 4) placement, (6,) velocity and acceleration.
-        context: The kind of number.
-        nearest: What brings the placement's matrix, right to nine digits, to the rotation nearest to it.
+        context: The number context.
+        nearest: Function for the rotation nearest to the placement's matrix, a rotation to nine digits.
     """
 
     def vector(x: FloatArray) -> Vector:
@@ -53,11 +53,11 @@ def on_base(
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """The robot at one instant.
+    """The motion of the robot in one sample.
 
     Attributes:
-        states: By link.
-        columns: By link, the columns of its Jacobian.
+        states: Position, velocity and acceleration of each link, by index.
+        columns: Columns of each link's Jacobian, by index.
         nv: Length of v.
     """
 
@@ -76,32 +76,31 @@ def move(
     base: State | None = None,
     context: Context = mp,
 ) -> Motion:
-    """The motion of the root, and of the link behind each joint, for one configuration and its rates.
+    """Return the motion of the root and of the child link of each joint, for one sample.
 
     Args:
         tree: The robot.
-        joints: What the text says of the joints that are wanted, with all before them, in the context's
-            numbers.
-        q: Coordinates, likewise.
-        v: Rates.
-        a: Rates of the rates.
-        base: How the root link moves; None where it stands at the world's origin.
-        context: The kind of number.
+        joints: Exact numbers of the joints, by index; each joint after those on its path to the root.
+        q: (nq,) coordinates, in numbers of the context.
+        v: (nv,) joint velocities.
+        a: (nv,) joint accelerations.
+        base: State of the root link; None: fixed at the world origin.
+        context: The number context.
     """
     states = {0: base or State()}
     columns: dict[int, tuple[Column, ...]] = {0: ()}
     for i, own in joints.items():
         joint, at, rate_at = tree.joints[i], tree.q_index[i], tree.v_index[i]
-        placed = _WALK.turned(_WALK.carried(states[joint.parent], own.p), own.R)
+        placed = _RECURSION.turned(_RECURSION.carried(states[joint.parent], own.p), own.R)
         kind, axes = joint.kind, tuple[tuple[int, bool], ...]()
         if kind.has_axis:
             coordinate = own.multiplier * q[at] + own.offset
             rates = own.multiplier * v[rate_at], own.multiplier * a[rate_at]
-            z = _WALK.seen(placed, own.axis)
+            z = _RECURSION.seen(placed, own.axis)
             if kind.turns:
-                moved = _WALK.revolute(placed, own.axis, about(own.axis, coordinate, context), *rates)
+                moved = _RECURSION.revolute(placed, own.axis, about(own.axis, coordinate, context), *rates)
             else:
-                moved = _WALK.prismatic(placed, own.axis, coordinate, *rates)
+                moved = _RECURSION.prismatic(placed, own.axis, coordinate, *rates)
             new: tuple[Column, ...] = (Column(z, kind.turns, moved, i, rate_at, own.multiplier),)
         elif kind is JointKind.FIXED:
             moved, new = placed, ()
@@ -116,56 +115,56 @@ def move(
 def _moved_freely(
     placed: State, kind: JointKind, numbers: tuple[Sequence[Number], ...], context: Context
 ) -> tuple[State, tuple[tuple[int, bool], ...]]:
-    """The state behind a planar or floating joint, and along or about which of its axes each rate acts."""
+    """Return the state after a planar or floating joint, and (axis, is_revolute) of each joint velocity."""
     q, v, a = numbers
     if kind is JointKind.PLANAR:
         slide, S = (q[0], q[1], 0), about(IDENTITY[2], q[2], context)
         rates: list[Vector] = [x for y in (v, a) for x in ((y[0], y[1], 0), (0, 0, y[2]))]
-        return _WALK.free(placed, slide, S, rates), ((0, False), (1, False), (2, True))
+        return _RECURSION.free(placed, slide, S, rates), ((0, False), (1, False), (2, True))
     slide, S = (q[0], q[1], q[2]), from_quaternion((q[3], q[4], q[5], q[6]), context)
     rates = [x for y in (v, a) for x in ((y[0], y[1], y[2]), (y[3], y[4], y[5]))]
-    moved = _WALK.free(placed, slide, S, rates)
+    moved = _RECURSION.free(placed, slide, S, rates)
     return moved, tuple((k, turns) for turns in (False, True) for k in range(3))
 
 
-# -- what is asked of a frame, as `Robot` hands it out -------------------------------------------------
+# -- quantities of a frame, in the shapes that `Robot` returns -----------------------------------------
 
 
 def placement_values(motion: Motion, link: int) -> NDArray[np.object_]:
-    """(4, 4) T_world_link."""
+    """Return T_world_link (4, 4)."""
     s = motion.states[link]
     return _array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
 
 
 def velocity_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """(6,)."""
+    """Return the velocity (6,), [linear; angular]."""
     s = motion.states[link]
-    return _array(_WALK.in_reference(s, reference, *_WALK.velocity(s, reference)))
+    return _array(_RECURSION.in_reference(s, reference, *_RECURSION.velocity(s, reference)))
 
 
 def acceleration_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """(6,)."""
+    """Return the classical acceleration (6,), [linear; angular]."""
     s = motion.states[link]
-    return _array(_WALK.in_reference(s, reference, *_WALK.acceleration(s, reference)))
+    return _array(_RECURSION.in_reference(s, reference, *_RECURSION.acceleration(s, reference)))
 
 
 def jacobian_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """(6, nv)."""
-    found = _WALK.jacobian(motion.states[link], motion.columns[link], motion.nv, reference)
+    """Return the Jacobian (6, nv)."""
+    found = _RECURSION.jacobian(motion.states[link], motion.columns[link], motion.nv, reference)
     return _array(found).reshape(motion.nv, 6).T
 
 
 def jacobian_rate_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """(6, nv)."""
-    found = _WALK.jacobian_rate(motion.states[link], motion.columns[link], motion.nv, reference)
+    """Return J-dot (6, nv)."""
+    found = _RECURSION.jacobian_rate(motion.states[link], motion.columns[link], motion.nv, reference)
     return _array(found).reshape(motion.nv, 6).T
 
 
 def hessian_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """(6, nv, nv)."""
+    """Return the Hessian (6, nv, nv)."""
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
-    for of, by, factor, six in _WALK.hessian(motion.states[link], motion.columns[link], reference):
-        out[of, by] += _array([factor * x for x in six])  # an interval multiplies numbers, not arrays
+    for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
+        out[of, by] += _array([factor * x for x in six])  # intervals do not multiply arrays
     return out.transpose(2, 0, 1)
 
 
