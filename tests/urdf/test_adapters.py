@@ -144,16 +144,8 @@ def test_a_quaternion_that_yourdfpy_dropped_is_no_secret(tmp_path: Path) -> None
     assert said['xyz="1 2 3"'] == said['quat_xyzw="0 0 1 0"']
     findings, reading = said['quat_xyzw="0 0 1 0"']
     assert len(findings) == 1
-<<<<<<< HEAD
     assert "<yourdfpy>:1:1: URDF512 note: yourdfpy ignores quat_xyzw: if the file has one" in findings[0]
     assert "drops quat_xyzw: its file was not seen" in reading
-=======
-    assert (
-        "<yourdfpy>:1:1: URDF512 note: yourdfpy drops quat_xyzw and keeps no text: had the file"
-        in findings[0]
-    )
-    assert "drops quat_xyzw; the file was not read" in reading
->>>>>>> q5
 
 
 def test_a_yourdfpy_robot_in_two_pieces_is_refused() -> None:
