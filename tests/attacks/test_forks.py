@@ -84,7 +84,7 @@ CASES = {
         """,
     "a deep robot, while another thread builds one": """
         from urdfkin.system import deep_stack
-        held(deep_stack._one_at_a_time)
+        held(deep_stack._stack_size_lock)
         fork(lambda: deep_stack.with_stack(2**24, lambda: None))
         """,
     "verified results, after the parent had some": """

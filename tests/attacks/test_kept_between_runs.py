@@ -27,7 +27,7 @@ from urdfkin.system.cache import CacheWarning, get, kept_folder, put
 
 @pytest.fixture(autouse=True)
 def _nothing_said_yet(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "_said", set())
+    monkeypatch.setattr(cache, "_warned", set())
 
 
 @pytest.fixture

@@ -39,18 +39,18 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int =
     >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
     """
-    begins = word[:_COMPARED]
-    matcher = difflib.SequenceMatcher(b=begins)
+    prefix = word[:_COMPARED]
+    matcher = difflib.SequenceMatcher(b=prefix)
     found = []
     for name in known:
         matcher.set_seq1(name[:_COMPARED])
         if matcher.real_quick_ratio() < cutoff or matcher.quick_ratio() < cutoff:
             continue
-        work -= len(begins) * len(name[:_COMPARED])
+        work -= len(prefix) * len(name[:_COMPARED])
         if work < 0:
             break
-        if (alike := matcher.ratio()) >= cutoff:
-            found.append((alike, name))
+        if (similarity := matcher.ratio()) >= cutoff:
+            found.append((similarity, name))
     return [name for _, name in heapq.nlargest(_OFFERED, found)]
 
 

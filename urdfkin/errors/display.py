@@ -45,7 +45,7 @@ class Table:
             [x if isinstance(x, str) else six_digits(x, NOISE * largest) for x in row] for row in self.rows
         ]
 
-    def _drawn(self) -> list[list[tuple[str, str]]]:
+    def _split_cells(self) -> list[list[tuple[str, str]]]:
         """Split each cell, including the heads, into the lines of a tree and the text after them."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(LINES),)]
@@ -70,7 +70,7 @@ class Table:
         marks = [":---" if self._left(i) else "---:" for i in range(len(self.heads))]
         rows = [
             [lines.replace(" ", "&nbsp;") + markdown_text(words) for lines, words in row]
-            for row in self._drawn()
+            for row in self._split_cells()
         ]
         return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], marks, *rows[1:]))
 
@@ -94,7 +94,7 @@ class Table:
         rows = [
             " & ".join(lines.translate(ASCII).replace(" ", "~") + latex_text(words) for lines, words in row)
             + r" \\"
-            for row in self._drawn()
+            for row in self._split_cells()
         ]
         lines = [
             rf"\begin{{tabular}}{{{sides}}}",

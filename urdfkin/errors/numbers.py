@@ -21,7 +21,7 @@ _LONGEST = 2000
 #: Pattern of a rejected text -> its remedy; the first match counts.
 _REMEDIES = (
     (r"", "it is empty: write a number"),
-    (r"[+-]?(nan|inf|infinity)", "only finite numbers have a meaning here"),
+    (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*[^\x00-\x7f].*", "write ASCII digits and signs"),
     (r".*_.*", "write the digits without underscores"),
     (r"0[xXbBoO].*", "write it in decimal digits"),
@@ -67,7 +67,7 @@ UNITS = {
     **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), "mm"),
 }
 _FACTOR = r"(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|pi)"
-_WRITTEN = re.compile(
+_QUANTITY = re.compile(
     rf"(?P<sign>[+-]?)\s*(?P<factors>{_FACTOR}(?:\s*[*/]\s*{_FACTOR}|\s*pi)*)"
     r"\s*(?P<unit>[a-z]+)?\s*(?P<per>/\s*s\s*(?:\^?\s*2|/\s*s)?)?"
 )
@@ -100,7 +100,7 @@ Measured(value=0.3, unit=None, per=0), None, None]
     """
     plain = text.strip(" \t\r\n").lower()
     plain = plain.replace("°", "deg").replace("π", "pi").replace("²", "2")
-    if len(plain) > _LONGEST_QUANTITY or (found := _WRITTEN.fullmatch(plain)) is None:
+    if len(plain) > _LONGEST_QUANTITY or (found := _QUANTITY.fullmatch(plain)) is None:
         return None
     unit = UNITS.get(found["unit"]) if found["unit"] else None
     value = _product(found["factors"])

@@ -122,7 +122,7 @@ def seen_from(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = Non
     return T
 
 
-_STILL = (0.0, 0.0, 0.0)
+_ZERO = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,7 +186,7 @@ def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
     return p_0
 
 
-def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _STILL) -> VelocityParts:
+def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
     """Return p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 if the point is fixed in frame 1).
 
     Args:
@@ -207,7 +207,7 @@ def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _STILL) 
 
 
 def point_acceleration(
-    frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _STILL, a_1: ArrayLike = _STILL
+    frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO, a_1: ArrayLike = _ZERO
 ) -> AccelerationParts:
     """Return p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot (7.125).
 
@@ -296,9 +296,9 @@ def interorigin_velocity(
     Raises:
         InputError: a wrong shape, or an axis that is not a unit vector.
     """
-    carried: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
-    slid: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
-    return carried if turns else carried + slid
+    rotation: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
+    sliding: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
+    return rotation if turns else rotation + sliding
 
 
 def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:

@@ -37,7 +37,7 @@ def dot(x, y):
 
 
 def cross(x, y):
-    """Return the cross product x x y, which is S(x) y with the matrix of 7.16."""
+    """Return the cross product of x and y, which is S(x) y with the matrix of 7.16."""
     return x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]
 
 
@@ -106,7 +106,7 @@ def angular_velocity(w, z, v):
 
 
 def tangential(w, d):
-    """7.59: velocity of a point at d, from the rotation w."""
+    """7.59: tangential velocity of a point at d, for the angular velocity w."""
     return cross(w, d)
 
 
@@ -129,12 +129,12 @@ def moving_point_velocity(vel, w, p, u):
 
 
 def transverse(alpha, d):
-    """7.123: acceleration of a point at d, from the angular acceleration alpha."""
+    """7.123: transverse acceleration of a point at d, for the angular acceleration alpha."""
     return cross(alpha, d)
 
 
 def centripetal(w, d):
-    """7.123: acceleration of a point at d, from the angular velocity w."""
+    """7.123: centripetal acceleration of a point at d, for the angular velocity w."""
     return cross(w, cross(w, d))
 
 

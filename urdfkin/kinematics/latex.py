@@ -29,7 +29,7 @@ _SYMBOLS = {
     "one": "1",
 }
 #: Function name -> symbols that differ from `_SYMBOLS` in this function.
-_OWN = {
+_SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},
     "interorigin_vector": {"a": "a_i", "d": "d_i"},
@@ -85,7 +85,7 @@ def _cross(x: Word, y: Word) -> Word:
     return Word(f"{x.inside(_CROSS)} \\times {y.inside(_CROSS)}", _CROSS)
 
 
-def _applied(R: Word, x: Word) -> Word:
+def _rotate(R: Word, x: Word) -> Word:
     return Word(f"{R.inside(_CROSS)} \\, {x.inside(_CROSS)}")
 
 
@@ -94,8 +94,8 @@ _words = bound(
     minus=lambda x, y: x - y,
     times=_times,
     cross=_cross,
-    rotate=_applied,
-    product=_applied,
+    rotate=_rotate,
+    product=_rotate,
     dot=lambda x, y: Word(f"{x.inside(_CROSS)} \\cdot {y.inside(_CROSS)}"),
     transposed=lambda R: Word(f"{R.inside(_CROSS)}^T"),
 )
@@ -111,13 +111,13 @@ def latex(name: str) -> str:
     \ddot{d} + \dot{\omega} \times d + \omega \times (\omega \times d)
     """
     parameters = inspect.signature(getattr(equations, name)).parameters
-    symbols = _SYMBOLS | _OWN.get(name, {})
-    return _written(getattr(_words, name)(*(Word(symbols.get(word, word)) for word in parameters)))
+    symbols = _SYMBOLS | _SYMBOLS_BY_FUNCTION.get(name, {})
+    return _latex_of(getattr(_words, name)(*(Word(symbols.get(word, word)) for word in parameters)))
 
 
-def _written(value: Any) -> str:
+def _latex_of(value: Any) -> str:
     """Return the LaTeX of a word, of a column of words, or of a matrix."""
     if isinstance(value, Word):
         return value.text
-    rows = [" & ".join(map(_written, row)) if isinstance(row, tuple) else _written(row) for row in value]
+    rows = [" & ".join(map(_latex_of, row)) if isinstance(row, tuple) else _latex_of(row) for row in value]
     return r"\begin{bmatrix} " + r" \\ ".join(rows) + r" \end{bmatrix}"

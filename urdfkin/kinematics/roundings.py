@@ -13,8 +13,8 @@ for each joint by
 |---|---|---|
 | product with the constant rotation: three terms, fused (FMA) in urdfkin only | 1.5 | 1.8 |
 | rotation about the axis, with its sine and cosine | 1.5 | 1.7 |
-| constant rotation from roll, pitch, yaw: products of sines; Pinocchio: by a normalised quaternion | 3.1 |
-12.5 | | all of a joint about a coordinate axis | 5.7 | 16.8 |
+| constant rotation from roll, pitch, yaw; Pinocchio: by a normalised quaternion | 3.1 | 12.5 |
+| all of a joint about a coordinate axis | 5.7 | 16.8 |
 
 The worst cases of the parts do not occur together, so a sum is smaller than its parts. The two errors may
 have opposite signs, so the bound for the difference is 5.7 + 16.8 = 22.5.
@@ -50,14 +50,14 @@ causes an error of half an eps, but the product and the sum that are omitted hav
 decides whether products and sums are fused. The sine and cosine are those of a library. In batches in C they
 are polynomials of an angle that is reduced in three parts, with an error of one eps:
 
-| | |
+| Roundings of the polynomials, with r the reduced angle | |
 |---|---|
-| r: rounded twice | 0.5 |
-| the sum of the sine | 0.25 |
-| the numbers that are added in it | 0.1 |
+| sine: r, rounded twice | 0.5 |
+| sine: the sum | 0.25 |
+| sine: the terms that are added to it | 0.1 |
 | cosine: r | 0.35 |
 | cosine: the square of r | 0.13 |
-| cosine: the sums and the last product | 0.08, 0.13, 0.25 |
+| cosine: the two sums and the last product | 0.08, 0.13, 0.25 |
 
 The counts of an export's joint are
 
@@ -112,9 +112,10 @@ satisfy it up to
 | | |
 |---|---|
 | the rule's offset y0 + c0 - c1 x0 | 1.5 |
-| a rule that refers to a mimic joint: the product of multipliers, its product with the offset, the sum | 1.5
-| | x and y by their rules, m q + c | 2.0 | | MuJoCo's residual: x - x0, c1 times that, y - y0, two
-differences | 2.5 | | sum | 7.5 |
+| a rule that refers to a mimic joint: two products and a sum | 1.5 |
+| x and y by their rules, m q + c | 2.0 |
+| MuJoCo's residual: x - x0, c1 times that, y - y0, two differences | 2.5 |
+| sum | 7.5 |
 
 This is multiplied by the size of all these terms and by the number of rules up to the mimicked joint, plus
 one.
@@ -130,8 +131,9 @@ then cover this error too, also after later multiplications. The least unit is e
 |---|---|
 | theta + q: half an eps of theta, up to pi; the half eps of q is counted with the angles | 1.6 |
 | sine and cosine of that sum, of alpha and of beta; products of two of them in a Hayati row | 2.1 |
-| the product of the row's two matrices, of two terms; its product with the pose so far, of three terms | 3.8
-| | the sum of the pose's position and the row's | 0.5 | | sum | 8.0 |
+| the product of the row's two matrices (two terms), and that with the pose so far (three terms) | 3.8 |
+| the sum of the pose's position and the row's | 0.5 |
+| sum | 8.0 |
 
 The tool counts as one row more.
 """

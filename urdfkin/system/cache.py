@@ -29,7 +29,7 @@ from urdfkin.errors import SourceError
 from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
 
 #: Version of the checksum. It is part of the folder's digest, so another version uses other folders.
-_SEAL = "sealed with its name"
+_CHECKSUM_VERSION = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
 _USED = ".used"
 #: User ids that may own the parent folders: root, and 65534, the id of the host's root inside a container.
@@ -40,19 +40,19 @@ class CacheWarning(UserWarning):
     """The cache cannot be used, or a cached file is damaged; the results are not affected."""
 
 
-def kept_folder(kind: str, sources: Iterable[Path], *besides: str, root: Path | None = None) -> Path | None:
+def kept_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | None = None) -> Path | None:
     """Return a cache folder that only this user can write to; create it if it does not exist.
 
     Args:
         kind: Kind of the cached files; the folder's name begins with it.
         sources: Files that the cached files depend on. Their contents are part of the folder's digest.
-        besides: Other texts that the cached files depend on.
+        texts: Other texts that the cached files depend on.
         root: The parent folder; None for the user's cache folder.
 
     Returns:
         The folder; None, with a `CacheWarning`, if no such folder can be used.
     """
-    digest = hashlib.sha256("\n".join([_SEAL, *besides]).encode())
+    digest = hashlib.sha256("\n".join([_CHECKSUM_VERSION, *texts]).encode())
     for source in sources:
         digest.update(read_bytes(source))
     root = root or Path(platformdirs.user_cache_dir("urdfkin"))
@@ -60,7 +60,7 @@ def kept_folder(kind: str, sources: Iterable[Path], *besides: str, root: Path | 
         root.mkdir(mode=0o700, parents=True, exist_ok=True)
         folder = root.resolve() / f"{kind}-{digest.hexdigest()[:16]}"
         folder.mkdir(mode=0o700, exist_ok=True)
-        if (reason := _not_ours(folder)) is not None:
+        if (reason := _unsafe_reason(folder)) is not None:
             say_once(f"the cache is not used: {reason}")
             return None
     except (OSError, RuntimeError) as error:  # RuntimeError: a loop of symbolic links
@@ -69,21 +69,21 @@ def kept_folder(kind: str, sources: Iterable[Path], *besides: str, root: Path | 
         return None
     with contextlib.suppress(OSError):  # on a full or read-only disk existing files can still be read
         (folder / _USED).touch()
-        _forget_unused(root, kind)
+        _delete_unused(root, kind)
     return folder
 
 
 def say_once(message: str) -> None:
     """Issue a `CacheWarning`, each message at most once per process."""
-    if message not in _said:
-        _said.add(message)
+    if message not in _warned:
+        _warned.add(message)
         warnings.warn(message, CacheWarning, stacklevel=3)
 
 
-_said: set[str] = set()
+_warned: set[str] = set()
 
 
-def _not_ours(folder: Path) -> str | None:
+def _unsafe_reason(folder: Path) -> str | None:
     """Return why another user could have written to a folder; None if no other user could.
 
     A user who can write to a parent folder can replace the folder, unless the parent has the sticky bit, as
@@ -111,7 +111,7 @@ def _is_private(group: int) -> bool:
     return found.gr_name == name and set(found.gr_mem) <= {name}
 
 
-def _forget_unused(root: Path, kind: str) -> None:
+def _delete_unused(root: Path, kind: str) -> None:
     """Delete folders of this kind and this user that have not been used for a month."""
     for mark in root.glob(f"{kind}-*/{_USED}"):
         with contextlib.suppress(OSError):
@@ -129,7 +129,7 @@ def put(place: Path, data: bytes) -> None:
     try:
         with tempfile.NamedTemporaryFile(dir=place.parent, prefix=f".{place.name}.", delete=False) as file:
             name = file.name
-            file.write(_seal(place, data) + data)
+            file.write(_checksum(place, data) + data)
         Path(name).replace(place)
     except OSError as error:
         if name:
@@ -147,14 +147,14 @@ def get(place: Path) -> bytes | None:
         return None
     if content is None:
         return None
-    seal, data = content[:_DIGEST], content[_DIGEST:]
-    if _seal(place, data) != seal:
+    checksum, data = content[:_DIGEST], content[_DIGEST:]
+    if _checksum(place, data) != checksum:
         report_damaged(place, "its checksum does not match its content and its name")
         return None
     return data
 
 
-def _seal(place: Path, data: bytes) -> bytes:
+def _checksum(place: Path, data: bytes) -> bytes:
     digest = hashlib.sha256()
     for part in (os.fsencode(place.parent.name), os.fsencode(place.name), data):
         digest.update(len(part).to_bytes(8, "big") + part)

@@ -89,10 +89,10 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
             if stat.S_ISDIR(kind):
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             if not pipes:
-                _demand_regular(path, kind)
+                _check_regular(path, kind)
             first = _first_of_pipe(descriptor, path) if stat.S_ISFIFO(kind) else b""
             os.set_blocking(descriptor, True)
-            return _up_to(count, descriptor, first)
+            return _read_up_to(count, descriptor, first)
         finally:
             os.close(descriptor)
     except SourceError:
@@ -112,10 +112,10 @@ def demand_regular(path: Path) -> None:
         kind = path.stat().st_mode
     except (OSError, ValueError):
         return
-    _demand_regular(path, kind)
+    _check_regular(path, kind)
 
 
-def _demand_regular(path: Path, kind: int) -> None:
+def _check_regular(path: Path, kind: int) -> None:
     if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
         raise SourceError(
             "not a regular file",
@@ -215,7 +215,7 @@ def _too_large(where: str, most: int) -> SourceError:
     )
 
 
-def _up_to(count: int, descriptor: int, first: bytes) -> bytes:
+def _read_up_to(count: int, descriptor: int, first: bytes) -> bytes:
     pieces, left = [first[:count]], count - len(first)
     while left > 0 and (piece := os.read(descriptor, min(left, _AT_A_TIME))):
         pieces.append(piece)

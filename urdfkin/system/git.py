@@ -84,7 +84,7 @@ def version_before(reference: str, folder: Path) -> Version:
         commit = _text(
             "rev-parse", "--verify", "--quiet", "--end-of-options", f"{reference}^{{commit}}", cwd=root
         )
-        parted = _text("merge-base", commit, "HEAD", cwd=root)
+        merge_base = _text("merge-base", commit, "HEAD", cwd=root)
     except SourceError as error:
         raise SourceError(
             "git finds no common version of this commit and HEAD",
@@ -92,7 +92,7 @@ def version_before(reference: str, folder: Path) -> Version:
             found=error.found,
             remedy="fetch it first, with its history; in GitHub's actions/checkout set fetch-depth: 0",
         ) from None
-    rows = _git("ls-tree", "-r", "-z", "--full-tree", parted, cwd=root).split(b"\0")
+    rows = _git("ls-tree", "-r", "-z", "--full-tree", merge_base, cwd=root).split(b"\0")
     parts = (row.partition(b"\t") for row in rows if row)
     files = {os.fsdecode(name): head.split()[2].decode() for head, _, name in parts}
     gone = frozenset(Path(name).name for name in files if not (root / name).exists())
@@ -112,13 +112,13 @@ def _git(*words: str, cwd: Path) -> bytes:
         "LC_ALL": "C",
     }
     try:
-        done = subprocess.run(
+        result = subprocess.run(
             ["git", "-c", "core.fsmonitor=false", *words],
             cwd=cwd, env=environ, stdin=subprocess.DEVNULL, capture_output=True, check=False,
         )  # fmt: skip
     except FileNotFoundError:
         raise SourceError("git is not installed", remedy="install it, or leave out --changed-since") from None
-    if done.returncode:
-        found = done.stderr.decode("utf-8", "replace").strip().removeprefix("fatal: ")
+    if result.returncode:
+        found = result.stderr.decode("utf-8", "replace").strip().removeprefix("fatal: ")
         raise SourceError("git failed", where=str(cwd), found=found or None)
-    return done.stdout
+    return result.stdout

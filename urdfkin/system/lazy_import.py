@@ -42,14 +42,14 @@ def own_version() -> str:
     return installed_version("urdfkin") or "of a checkout"
 
 
-_ANSWERS: dict[str, Callable[..., Any]] = {}
+_HOOKS: dict[str, Callable[..., Any]] = {}
 
 
 def register_hook(word: str, function: Callable[..., Any]) -> None:
     """Register a function under a name."""
-    _ANSWERS[word] = function
+    _HOOKS[word] = function
 
 
 def hook(word: str) -> Callable[..., Any]:
     """Return the function that is registered under a name."""
-    return _ANSWERS[word]
+    return _HOOKS[word]

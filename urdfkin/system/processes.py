@@ -27,7 +27,7 @@ from typing import TypeVar
 #: Environment variables that a Python interpreter may need to start.
 _NEEDED = ("LD_LIBRARY_PATH",)
 #: One thread for linear algebra: more threads need address space, which is limited in a confined process.
-_GIVEN = {"OPENBLAS_NUM_THREADS": "1"}
+_ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
 
 
 def own_python(code: str, *, options: Sequence[str] = ()) -> list[str]:
@@ -65,15 +65,15 @@ def ask_python(command: list[str], request: bytes, patience: float, most: int) -
     Returns:
         The output and the exit status. The status is None after a timeout.
     """
-    environ = _GIVEN | {name: os.environ[name] for name in _NEEDED if name in os.environ}
+    environ = _ENVIRONMENT | {name: os.environ[name] for name in _NEEDED if name in os.environ}
     pipe = subprocess.PIPE
-    late = threading.Event()
+    timed_out = threading.Event()
     with subprocess.Popen(
         command, env=environ, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL
     ) as process:
 
         def give_up() -> None:
-            late.set()
+            timed_out.set()
             process.kill()
 
         timer = threading.Timer(patience, give_up)
@@ -90,7 +90,7 @@ def ask_python(command: list[str], request: bytes, patience: float, most: int) -
         finally:
             timer.cancel()
             process.kill()
-    return output, None if late.is_set() else status
+    return output, None if timed_out.is_set() else status
 
 
 @contextmanager
@@ -132,7 +132,7 @@ importing = lock_over_forks()
 _T = TypeVar("_T")
 
 _USUAL_STACK = 8 * 2**20
-_one_at_a_time = lock_over_forks()
+_stack_size_lock = lock_over_forks()
 
 
 def with_stack(size: int, function: Callable[[], _T]) -> _T:
@@ -149,7 +149,7 @@ def with_stack(size: int, function: Callable[[], _T]) -> _T:
         except BaseException as error:
             future.set_exception(error)
 
-    with _one_at_a_time:  # the stack size is a global setting of the process
+    with _stack_size_lock:  # the stack size is a global setting of the process
         before = threading.stack_size(max(size, _USUAL_STACK))
         try:
             thread = threading.Thread(target=run)

@@ -28,7 +28,9 @@ def questions_page() -> Path:
     for file in (here / "questions.md", here.parent / "docs" / "questions.md"):
         if file.is_file():
             return file
-    raise SourceError("urdfkin's questions are missing", where=str(here), remedy="install urdfkin again")
+    raise SourceError(
+        "urdfkin's page questions.md is missing", where=str(here), remedy="install urdfkin again"
+    )
 
 
 @cache
@@ -38,13 +40,13 @@ def example_robots_dir() -> Path:
     Raises:
         SourceError: example-robot-data is not installed.
     """
-    tried = list(_example_candidates())
-    for folder in tried:
+    candidates = list(_example_candidates())
+    for folder in candidates:
         if folder.is_dir():
             return folder
     raise SourceError(
         "example-robot-data is not installed",
-        found="no folder " + " or ".join(str(folder) for folder in tried),
+        found="no folder " + " or ".join(str(folder) for folder in candidates),
         remedy="pip install example-robot-data",
     )
 

@@ -169,6 +169,6 @@ def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3]
     sine = np.sqrt((vector * vector).sum(axis=-1))
-    still = (sine == 0.0)[..., np.newaxis]
-    axis = np.where(still, [0.0, 0.0, 1.0], vector / np.where(still, 1.0, sine[..., np.newaxis]))
+    identity = (sine == 0.0)[..., np.newaxis]
+    axis = np.where(identity, [0.0, 0.0, 1.0], vector / np.where(identity, 1.0, sine[..., np.newaxis]))
     return axis, 2.0 * np.arctan2(sine, scalar)

@@ -3,8 +3,9 @@
 | Functions | Section and equations of the textbook |
 |---|---|
 | `skew`, `unskew`, `rotate_skew` | 7.2: 7.16, 7.31, 7.46; appendix A |
-| `rotation_rate`, `angular_velocity_of`, `turning_vector_rate`, `add_angular_velocities` | 7.2.2, 7.2.3: 7.35
-to 7.50 | | `axis_aligning` | 7.4 |
+| `rotation_rate`, `angular_velocity_of`, `turning_vector_rate` | 7.2.2: 7.35 to 7.42 |
+| `add_angular_velocities` | 7.2.3: 7.43 to 7.50 |
+| `axis_aligning` | 7.4 |
 
 `w_0_1` is the angular velocity of frame 1 relative to frame 0.
 

@@ -234,7 +234,9 @@ def integrate_orientation(
     """
     times = scalars(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
-        raise InputError("times must be a row of increasing numbers", found=str(times.shape))
+        raise InputError(
+            "times must be a one-dimensional array of increasing numbers", found=str(times.shape)
+        )
     quats = [unit_quaternions(quat)]
     for start, end in pairwise(times.tolist()):
         quats.append(_step(w, quats[-1], start, end, frame))
