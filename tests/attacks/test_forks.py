@@ -83,9 +83,9 @@ CASES = {
         fork(lambda: robot.placement(q[:3], "tool0"))
         """,
     "a deep robot, while another thread builds one": """
-        from urdfkin.system import deep_stack
-        held(deep_stack._stack_size_lock)
-        fork(lambda: deep_stack.with_stack(2**24, lambda: None))
+        from urdfkin.system import processes
+        held(processes._stack_size_lock)
+        fork(lambda: processes.with_stack(2**24, lambda: None))
         """,
     "verified results, after the parent had some": """
         checked = urdfkin.load("ur5")
