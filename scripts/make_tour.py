@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/tour.md into docs/images (needs matplotlib: the extra `plots`)."""
+"""Draw the pictures of docs/tour.md into docs/images. This needs matplotlib (the extra `plots`)."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ STYLE: Any = {
 
 
 def arrow(axes: Any, start: FloatArray, vector: FloatArray, color: str, label: str | None = None) -> None:
-    """An arrow in the plane, in data units."""
+    """Draw an arrow in the plane, in data units."""
     axes.quiver(
         *start,
         *vector,
@@ -68,7 +68,7 @@ def arrow(axes: Any, start: FloatArray, vector: FloatArray, color: str, label: s
 
 
 def plane(axes: Any, title: str) -> None:
-    """Equal scales, a quiet grid, metres."""
+    """Set equal scales, a grid, and axis labels in metres."""
     axes.set_aspect("equal")
     axes.grid(color="#e6eaee", linewidth=0.8)
     axes.set_axisbelow(True)
@@ -78,7 +78,7 @@ def plane(axes: Any, title: str) -> None:
 
 
 def one_link(figure: Any) -> None:
-    """Figure 7.1: a link that turns, and its endpoint's velocity."""
+    """Draw a turning link and its endpoint's velocity (figure 7.1)."""
     axes = figure.subplots()
     a1, rate = 0.8, 1.2
     circle = link_endpoint(np.linspace(0, 2 * np.pi, 200), a1)
@@ -89,11 +89,11 @@ def one_link(figure: Any) -> None:
         arrow(axes, tip, 0.4 * link_endpoint_velocity(theta, rate, a1), RED)
     axes.plot(0, 0, "o", color=INK, markersize=8)
     axes.set(xlim=(-1.1, 1.15), ylim=(-0.95, 1.3))
-    plane(axes, "7.2: the endpoint moves along y1, with a1 times the rate")
+    plane(axes, "7.2: the endpoint's velocity is along y1: a1 times the joint velocity")
 
 
 def velocity_field(figure: Any) -> None:
-    """The field w x p of a turning body, in a plane that is not perpendicular to the axis."""
+    """Draw the field w x p of a turning body, in a plane that is not perpendicular to the axis."""
     axes = figure.add_subplot(projection="3d")
     k = np.array([1.0, 0.4, 2.0]) / np.linalg.norm([1.0, 0.4, 2.0])
     x, y = np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 7))
@@ -115,23 +115,23 @@ def velocity_field(figure: Any) -> None:
     axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1), xlabel="x0", ylabel="y0", zlabel="z0")
     axes.set_box_aspect((1, 1, 1))
     axes.view_init(elev=24, azim=-58)
-    axes.set_title("7.21: every point moves with w x p")
+    axes.set_title("7.21: the velocity of every point is w x p")
 
 
 def draw_frame(axes: Any, R: FloatArray, size: float, names: str) -> None:
-    """Three axes in red, green and blue."""
+    """Draw three axes in red, green and blue."""
     for i, color in enumerate(AXES):
         axes.quiver(0, 0, 0, *(size * R[:, i]), color=color, arrow_length_ratio=0.12, linewidth=2.2)
         axes.text(*(1.16 * size * R[:, i]), f"{names}{'xyz'[i]}", color=color, ha="center", va="center")
 
 
 def turning(first: int, second: int) -> Callable[[float], FloatArray]:
-    """A quarter turn a second, about one axis of frame 0 and then about another."""
+    """Return w(t) of a quarter turn per second, about one axis of frame 0 and then about another."""
     return lambda t: np.pi / 2 * np.eye(3)[first if t < 1.0 else second]
 
 
 def integral_of_w(figure: Any) -> None:
-    """Example 7.3 and figure 7.9: the same integral of w, two orientations."""
+    """Draw two different orientations with the same integral of w (example 7.3 and figure 7.9)."""
     cases = (("case 1: about x0, then about y0", (0, 1)), ("case 2: about y0, then about x0", (1, 0)))
     for row, (title, order) in enumerate(cases):
         quats = integrate_orientation(turning(*order), [0.0, 0.0, 0.0, 1.0], np.linspace(0.0, 2.0, 201))
@@ -152,7 +152,7 @@ def integral_of_w(figure: Any) -> None:
 
 
 def euler_singularity(figure: Any) -> None:
-    """The condition number of Omega over the middle angle, ZYZ and roll-pitch-yaw."""
+    """Draw the condition number of Omega over the middle angle, for ZYZ and roll-pitch-yaw."""
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
     for name, color, label in (("ZYZ", BLUE, "ZYZ"), ("xyz", ORANGE, "roll, pitch, yaw")):
@@ -171,11 +171,11 @@ def euler_singularity(figure: Any) -> None:
     axes.set_xticks(range(0, 181, 30))
     axes.grid(color="#e6eaee", linewidth=0.8)
     axes.legend(loc="upper center", ncols=2)
-    axes.set_title("7.56: where Euler angle rates do not exist")
+    axes.set_title("7.56: singularities of Euler angle rates")
 
 
 def convergence(figure: Any) -> None:
-    """The error of quaternion integration over the step."""
+    """Draw the error of quaternion integration over the step."""
 
     def angles(t: float) -> FloatArray:
         return np.array([0.3 * t, 1.0 + 0.4 * np.sin(2.0 * t), t * t])
@@ -199,11 +199,11 @@ def convergence(figure: Any) -> None:
     axes.set(xlabel="step [s]", ylabel="error of the orientation [rad]")
     axes.grid(color="#e6eaee", linewidth=0.8, which="both")
     axes.legend()
-    axes.set_title("7.57, integrated: halve the step, a sixteenth of the error")
+    axes.set_title("7.57, integrated: half the step gives 1/16 of the error")
 
 
 def acceleration_parts(figure: Any) -> None:
-    """7.125: a point that slides on a turning arm, and the parts of its acceleration."""
+    """Draw a point that slides on a turning arm, and the terms of its acceleration (7.125)."""
     axes = figure.subplots()
     theta, w, alpha = 0.5, 1.4, 1.8
     z = np.array([0.0, 0.0, 1.0])
@@ -224,11 +224,11 @@ def acceleration_parts(figure: Any) -> None:
     axes.plot(0, 0, "o", color=INK, markersize=8)
     axes.set(xlim=(-0.45, 1.45), ylim=(-0.2, 1.75))
     axes.legend(loc="lower right")
-    plane(axes, "7.125: a slider on a turning arm; the parts laid end to end")
+    plane(axes, "7.125: the terms of a slider's acceleration, and their sum")
 
 
 def two_link(figure: Any) -> None:
-    """The planar two-link manipulator along a line, with its velocity ellipses (7.90)."""
+    """Draw the planar two-link manipulator in four configurations, with velocity ellipses (7.90)."""
     axes = figure.subplots()
     robot = urdfkin.load("planar_two_link")
     poses = np.array([[0.15, 0.35], [0.5, 1.0], [0.75, 1.7], [0.9, 2.5]])
@@ -241,11 +241,11 @@ def two_link(figure: Any) -> None:
         velocity = 0.22 * robot.velocity(q, [0.6, 0.8], "tip")[:2]
         arrow(axes, joints[-1], velocity, RED)
     axes.set(xlim=(-0.25, 1.1), ylim=(-0.1, 0.95))
-    plane(axes, "7.90: where the tip can go with unit joint rates")
+    plane(axes, "7.90: the tip's velocities for joint velocities of norm 1")
 
 
 def breakdown(figure: Any) -> None:
-    """The elbow robot's wrist acceleration by joint and kind."""
+    """Draw the acceleration of the elbow robot's tool by joint and term."""
     robot = urdfkin.load("elbow")
     q, v, a = (
         [0.4, 0.5, 0.7, 0.3, 0.6, 0.2],
@@ -271,7 +271,7 @@ def breakdown(figure: Any) -> None:
         panel.set_xlabel("joint")
     axes[0].set_ylabel("linear acceleration [m/s^2]")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    figure.suptitle("7.130, taken apart: whose doing the tool's acceleration is", fontsize=11)
+    figure.suptitle("7.130: the tool's acceleration by joint and term", fontsize=11)
 
 
 PICTURES: dict[str, tuple[Callable[[Any], None], tuple[float, float]]] = {

@@ -112,7 +112,7 @@ def _raise(error: Exception) -> None:
 @pytest.mark.parametrize("question", Question, ids=lambda question: question.value)
 def test_what_people_stumble_over_leads_to_a_section_that_stands_on_the_page(question: Question) -> None:
     for told in ASKED[question]:
-        assert str(question) in " ".join(told().split()).replace("- ", "-")
+        assert f"`urdfkin explain {question.value}`" in " ".join(told().split()).replace("- ", "-")
     done = run("explain", question.value)
     assert done.code == 0
     assert len(done.text.splitlines()) > 3

@@ -211,10 +211,10 @@ def test_a_named_pipe_that_nobody_writes_to_is_given_up(
     monkeypatch.setattr(files, "PATIENCE", 0.1)
     os.mkfifo(tmp_path / "pipe.urdf")
     os.mkfifo(tmp_path / "pipe.toml")
-    with pytest.raises(SourceError, match="a pipe that nobody writes to"):
+    with pytest.raises(SourceError, match="a pipe without a writer"):
         urdfkin.read_table(tmp_path / "pipe.toml")
     for take in (urdfkin.load, urdfkin.check):
-        with pytest.raises(SourceError, match=r"a pipe that nobody writes to: found nothing in 0.1 s"):
+        with pytest.raises(SourceError, match=r"a pipe without a writer: found nothing in 0.1 s"):
             take(tmp_path / "pipe.urdf")
 
 

@@ -27,7 +27,7 @@ from urdfkin.system.cache import CacheWarning, get, kept_folder, put
 
 @pytest.fixture(autouse=True)
 def _nothing_said_yet(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "_said", set())
+    monkeypatch.setattr(cache, "_warned", set())
 
 
 @pytest.fixture
@@ -88,7 +88,7 @@ def test_a_damaged_kernel_is_said_compiled_again_and_mended(damage: str, folder:
     (file,) = folder.iterdir()
     file.write_bytes(DAMAGE[damage](file.read_bytes()))
     kernel = fresh()
-    with pytest.warns(CacheWarning, match=f"{file.name} is damaged and is made anew"):
+    with pytest.warns(CacheWarning, match=f"{file.name} is damaged and is computed again"):
         assert ask(kernel) == 7
     assert was_compiled(kernel)
     assert not was_compiled(fresh())
@@ -99,7 +99,7 @@ def test_a_kernel_that_is_whole_but_of_another_time_is_compiled_again(folder: Pa
     ask(fresh())
     (file,) = folder.iterdir()
     put(file, pickle.dumps(("not", "a", "kernel")))
-    with pytest.warns(CacheWarning, match="is damaged and is made anew"):
+    with pytest.warns(CacheWarning, match="is damaged and is computed again"):
         assert ask(fresh()) == 7
     assert not was_compiled(fresh())
 
@@ -110,7 +110,7 @@ def test_a_kept_file_in_another_folder_of_its_name_is_noticed(tmp_path: Path) ->
         place.parent.mkdir()
     put(first, b"of the first")
     second.write_bytes(first.read_bytes())
-    with pytest.warns(CacheWarning, match="its content is not what was written under this name"):
+    with pytest.warns(CacheWarning, match="its checksum does not match its content and its name"):
         assert get(second) is None
     assert get(first) == b"of the first"
     first.parent.rename(tmp_path / "moved")
@@ -146,7 +146,7 @@ def test_where_nothing_can_be_written_everything_goes_on_and_it_is_said_once(
         assert ask(fresh()) == 7
     (warning,) = said
     assert warning.category is CacheWarning
-    assert f"nothing can be kept in {folder}: {os.strerror(no_room)}" in str(warning.message)
+    assert f"the cache cannot be written in {folder}: {os.strerror(no_room)}" in str(warning.message)
     assert list(folder.iterdir()) == []
 
 
@@ -164,7 +164,7 @@ def test_a_file_that_ends_in_the_middle_leaves_nothing_behind(
     tmp_path: Path, largest_file: Callable[[int], None]
 ) -> None:
     largest_file(1000)
-    with pytest.warns(CacheWarning, match=f"nothing can be kept in .*: {os.strerror(errno.EFBIG)}"):
+    with pytest.warns(CacheWarning, match=f"the cache cannot be written in .*: {os.strerror(errno.EFBIG)}"):
         put(tmp_path / "kept", bytes(5000))
     assert list(tmp_path.iterdir()) == []
     put(tmp_path / "kept", bytes(500))
@@ -188,7 +188,7 @@ def test_a_command_on_a_full_disc_gives_its_result_and_says_so(tmp_path: Path) -
             subprocess.run(["umount", str(cache)], check=True)
     assert done.code == 0, done.err
     assert "verified by Pinocchio" in done.text
-    assert done.err.count("nothing can be kept in") == 1
+    assert done.err.count("the cache cannot be written in") == 1
     assert "Traceback" not in done.err
 
 
@@ -243,14 +243,14 @@ def test_a_folder_that_everybody_may_write_in_is_refused(mode: int, tmp_path: Pa
     folder = kept_folder("kernels", [], root=tmp_path)
     assert folder is not None
     folder.chmod(mode)
-    refused(tmp_path, r"everybody may write in .*chmod go-w.* and delete")
+    refused(tmp_path, r"every user can write to .*chmod go-w.* and delete")
 
 
 def test_a_folder_in_which_everybody_could_put_another_in_its_place_is_refused(tmp_path: Path) -> None:
     shared = tmp_path / "shared"
     shared.mkdir()
     shared.chmod(0o777)
-    refused(shared / "urdfkin", "everybody may write in")
+    refused(shared / "urdfkin", "every user can write to")
     shared.chmod(0o1777)  # sticky, as /tmp: nobody can move what another owns
     assert kept_folder("kernels", [], root=shared / "urdfkin") is not None
 
@@ -264,7 +264,7 @@ def test_a_folder_of_a_group_is_refused_but_not_that_of_a_users_own_group(
     monkeypatch.setattr(cache, "_is_private", lambda group: True)
     assert kept_folder("kernels", [], root=tmp_path) == folder
     monkeypatch.setattr(cache, "_is_private", lambda group: False)
-    refused(tmp_path, "a group may write in")
+    refused(tmp_path, "a group can write to")
 
 
 @pytest.mark.parametrize("whose", ["the folder", "the one above", "the file behind a link"])

@@ -57,7 +57,7 @@ def test_even_whom_one_trusts_above_a_folder_may_not_own_the_folder_itself(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     owner = tmp_path.stat().st_uid
-    assert cache._not_ours(tmp_path) is None
+    assert cache._unsafe_reason(tmp_path) is None
     monkeypatch.setattr(cache, "_TRUSTED", (0, owner))
     monkeypatch.setattr("os.geteuid", lambda: owner + 1)
-    assert str(cache._not_ours(tmp_path)).startswith(f"{tmp_path} belongs to another user")
+    assert str(cache._unsafe_reason(tmp_path)).startswith(f"{tmp_path} belongs to another user")

@@ -129,7 +129,7 @@ def test_a_packages_manifest_that_is_a_link_to_a_device_is_none(tmp_path: Path) 
 
 def test_a_kept_file_that_is_a_link_to_a_device_is_damaged(tmp_path: Path) -> None:
     (tmp_path / "kernel").symlink_to("/dev/zero")
-    with pytest.warns(UserWarning, match="is damaged and is made anew: a character device"):
+    with pytest.warns(UserWarning, match="is damaged and is computed again: a character device"):
         assert get(tmp_path / "kernel") is None
 
 
@@ -195,7 +195,7 @@ def test_arrays_that_unpack_to_more_than_the_limit_are_refused(tmp_path: Path) -
             file.write(bytes(10**6))
     assert (tmp_path / "t.npz").stat().st_size < 2e7
     with pytest.raises(
-        SourceError, match=r"no \.npz file of numbers: found arrays of 21000\d+ bytes, more than"
+        SourceError, match=r"not an \.npz file of numbers: found arrays of 21000\d+ bytes, more than"
     ):
         read_arrays(tmp_path / "t.npz", {"q": (1,)}, ["q"])
 

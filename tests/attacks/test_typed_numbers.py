@@ -88,7 +88,7 @@ NAMES = "shoulder_pan_joint,shoulder_lift_joint,elbow_joint,wrist_1_joint,wrist_
         (f"{NAMES},more\n0,0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
         (f"{NAMES},more\n0,0,0,0,0,0,0\n", "found unknown: more;"),
         (NAMES.replace(",elbow_joint", "") + "\n0,0,0,0,0\n", "found missing: elbow_joint;"),
-        (NAMES.replace("elbow_joint", "wrist_1_joint") + "\n", "missing: elbow_joint; twice there: wrist_1_"),
+        (NAMES.replace("elbow_joint", "wrist_1_joint") + "\n", "missing: elbow_joint; duplicate: wrist_1_"),
         (
             f"{NAMES}\n0,0,0,0,0,0,0\n",
             f"q.csv:2: 6 numbers are expected ({NAMES.replace(',', ', ')}): found 7",
@@ -96,7 +96,7 @@ NAMES = "shoulder_pan_joint,shoulder_lift_joint,elbow_joint,wrist_1_joint,wrist_
         (f"{NAMES}\n0,0,0,0,0\n", "q.csv:2: 6 numbers are expected"),
         (f"{NAMES}\n0,0,0,0,0\n", "found 5, none for wrist_3_joint"),
         (f'# remark\n\n{NAMES}\n"0",0,0,0,0,0\n\n0,0\n', "q.csv:6: 6 numbers are expected"),
-        (f'{NAMES}\n0,0,0,0,0,"0\n', "q.csv:2: no CSV"),
+        (f'{NAMES}\n0,0,0,0,0,"0\n', "q.csv:2: not valid CSV"),
     ],
 )
 def test_a_column_too_many_or_missing_is_told_with_file_line_and_name(

@@ -64,7 +64,7 @@ def test_a_wheel_that_turns_steadily_has_a_steady_rate_wherever_its_log_wraps(
     turns = (motion.q[:, 0] - angle) / (2.0 * np.pi)
     np.testing.assert_allclose(turns, np.round(turns[0]), atol=1e-9)
     assert "angle jumps by a whole turn after sample" in motion.notes[0]
-    assert "wraps were taken out of wheel" in motion.rates
+    assert "after unwrapping wheel" in motion.rates
 
 
 def test_a_wheel_may_turn_backwards_and_forwards(tmp_path: Path) -> None:
@@ -93,14 +93,14 @@ def test_a_fast_wheel_that_was_never_wrapped_is_taken_as_written_and_said(tmp_pa
     motion = read(wheel(), tmp_path / "w.csv", angle)
     np.testing.assert_array_equal(motion.q[:, 0], angle)
     (note,) = motion.notes
-    assert "span more than one turn and are taken as written" in note
+    assert "span more than one turn and are not unwrapped" in note
 
 
 def test_a_step_of_nearly_half_a_turn_is_called_unsure(tmp_path: Path) -> None:
     motion = read(wheel(), tmp_path / "w.csv", wrapped(2.9 * np.arange(len(T))))
     np.testing.assert_allclose(np.diff(motion.q[:, 0]), 2.9)
-    assert any("the shorter way round is taken, and may be the wrong one" in note for note in motion.notes)
-    assert any(f"and so {len(T) - 2} times more" in note for note in motion.notes)
+    assert any("the shorter direction is assumed, which may be wrong" in note for note in motion.notes)
+    assert any(f"and in {len(T) - 2} more steps" in note for note in motion.notes)
 
 
 @pytest.mark.parametrize(
@@ -159,5 +159,5 @@ def test_plot_tells_on_stderr_that_it_took_wraps_out(tmp_path: Path) -> None:
     done = running.urdfkin(*map(str, words))
     assert done.code == 0
     assert "warning: joint wheel: its angle jumps by a whole turn after sample" in done.err
-    assert "wraps were taken out of wheel" in done.text
+    assert "after unwrapping wheel" in done.text
     assert "not whether v and a" in " ".join((tmp_path / "w.svg").read_text().split())

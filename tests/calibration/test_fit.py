@@ -190,8 +190,8 @@ def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
         ({"noise": (0.0, 1.0)}, "noise is more than nothing"),
         ({"noise": 1.0}, "noise is two numbers"),
         ({"fit": []}, "nothing is to be fitted"),
-        ({"fit": "origins"}, "are a list of names"),
-        ({"tip": 5}, "tip is a name"),
+        ({"fit": "origins"}, "must be a list of names"),
+        ({"tip": 5}, "tip must be a name"),
     ],
 )
 def test_bad_input_is_told(change: dict[str, object], words: str) -> None:

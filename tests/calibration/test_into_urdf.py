@@ -81,7 +81,7 @@ def test_what_has_errors_or_no_such_joint_is_not_edited() -> None:
         with_origins(b"<robot>", {})
     with pytest.raises(InputError, match="no such joint"):
         with_origins(BRANCHED.encode(), {"five": np.eye(4)})
-    with pytest.raises(InputError, match="two edits of one place"):
+    with pytest.raises(InputError, match="two edits overlap"):
         edited(b"abc", [Edit(0, 2), Edit(1, 3)])
 
 

@@ -375,7 +375,7 @@ def test_a_xacro_file_is_told_in_full_when_what_it_may_include_changed(repositor
 def test_a_version_that_is_none_is_told_with_what_to_do(repository: Path, version: str) -> None:
     done = check(f"--changed-since={version}")
     assert (done.code, done.out) == (2, b"")
-    assert "git knows no version from which this one parted" in done.err
+    assert "git finds no common version of this commit and HEAD" in done.err
     assert "fetch-depth: 0" in done.err
 
 

@@ -81,17 +81,17 @@ def test_a_base_in_the_archive_moves_the_robot_and_rates_are_made_where_there_ar
 @pytest.mark.parametrize(
     ("arrays", "words"),
     [
-        ({"q": np.zeros((4, 5))}, "q has the shape (n, 6)"),
-        ({"q": np.zeros((4, 6)), "v": np.zeros((4, 6))}, "v, a are there together or not at all"),
-        ({"q": np.zeros((4, 6)), "t": np.zeros(3)}, "t has the shape (n)"),
+        ({"q": np.zeros((4, 5))}, "q must have the shape (n, 6)"),
+        ({"q": np.zeros((4, 6)), "v": np.zeros((4, 6))}, "v, a must be given together"),
+        ({"q": np.zeros((4, 6)), "t": np.zeros(3)}, "t must have the shape (n)"),
         ({"q": np.zeros((4, 6)), "t": np.zeros(4)}, "time must increase"),
-        ({"q": np.zeros((2, 6))}, "3 samples are the least"),
+        ({"q": np.zeros((2, 6))}, "at least 3 samples"),
         ({"q": np.full((4, 6), np.nan)}, "q must be finite"),
         ({"q": np.array([["x"] * 6] * 4)}, "q must be real numbers"),
-        ({"q": np.array(0.0)}, "q has the shape (n, 6)"),
+        ({"q": np.array(0.0)}, "q must have the shape (n, 6)"),
         ({"Q": np.zeros((4, 6))}, "unknown: Q; missing: q"),
-        ({"q": np.zeros((4, 6)), "base_velocity": np.zeros((4, 6))}, "are there together or not at all"),
-        ({"q": np.array([print], dtype=object)}, "no .npz file of numbers"),
+        ({"q": np.zeros((4, 6)), "base_velocity": np.zeros((4, 6))}, "must be given together"),
+        ({"q": np.array([print], dtype=object)}, "not an .npz file of numbers"),
     ],
 )
 def test_an_archive_of_anything_else_is_refused_in_one_line(
@@ -112,7 +112,7 @@ def test_what_is_no_archive_is_refused_too(data: bytes, tmp_path: Path) -> None:
     path.write_bytes(data)
     done = urdfkin("imu", "ur5", "--trajectory", str(path))
     assert done.code == 2
-    assert "no .npz file of numbers" in done.err
+    assert "not an .npz file of numbers" in done.err
 
 
 def test_options_without_effect_and_half_a_vector_are_refused(

@@ -30,7 +30,7 @@ MISTAKES = {
     "nan": (["jacobian", "panda", "--q", ZEROS.replace("-1", "nan")], "not a finite number: found 'nan'"),
     "inf": (["velocity", "panda", "--v", "0,0,0,0,0,0,0,inf"], "_joint1: not a finite number: found 'inf'"),
     "no csv file": (["jacobian", "panda", "--q", "@nowhere.csv"], "nowhere.csv: cannot be read: found No"),
-    "a binary csv file": (["jacobian", "panda", "--q", "@/bin/sh"], "/bin/sh: cannot be read: found no UTF"),
+    "a binary csv file": (["jacobian", "panda", "--q", "@/bin/sh"], "/bin/sh: cannot be read: found text"),
     "an empty csv file": (["jacobian", "panda", "--q", "@/dev/null"], "no samples; one line a sample"),
     "random:many": (["jacobian", "panda", "--q", "random:many"], "random:N wants a whole number"),
     "random:0": (["jacobian", "panda", "--q", "random:0"], "random:N wants a whole number from 1 on"),

@@ -46,5 +46,5 @@ def test_what_nobody_used_for_a_month_is_deleted_and_nothing_else(tmp_path: Path
 
 def test_a_root_that_cannot_be_written_gives_no_folder(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.warns(CacheWarning, match="nothing can be kept in .*file: .*set XDG_CACHE_HOME"):
+    with pytest.warns(CacheWarning, match="the cache cannot be written in .*file: .*set XDG_CACHE_HOME"):
         assert kept_folder("kernels", [], root=tmp_path / "file") is None

@@ -345,5 +345,5 @@ def test_a_base_and_a_batch_shape_are_taken_and_bad_words_refused() -> None:
         robot.singular_values(q, "tool0", "both")
     with pytest.raises(UnknownNameError, match="tool1"):
         robot.singular_values(q, "tool1")
-    with pytest.raises(InputError, match="frame is a name"):
+    with pytest.raises(InputError, match="frame must be a name"):
         robot.singular_values(q, ["tool0"])  # type: ignore[arg-type]

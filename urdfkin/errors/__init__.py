@@ -1,11 +1,9 @@
-"""Names that look like another, found in bounded time.
+"""The exceptions that urdfkin raises.
 
-Where a message leads whoever asks why: headings of docs/questions.md, which `urdfkin explain` prints.
-
-One family of exceptions, each with the facts a person needs to act on it.
-
-Every message says what is wrong, where, what was found and what to do about it; the same facts are
-attributes, so that a program need not read the sentence.
+Every message has four parts: what is wrong, where, what was found and what to do. The same four parts are
+attributes of the exception, so a program does not have to parse the message. A message may end with a
+`Question`: the command that prints a section of docs/questions.md. `nearest` suggests names for a misspelt
+one.
 """
 
 from __future__ import annotations
@@ -18,47 +16,51 @@ from typing import Any, Self, TypeVar
 
 from urdfkin.errors.escape import log_line
 
-#: Characters of a name that are compared.
+#: Number of leading characters of a name that `nearest` compares.
 _COMPARED = 128
 
-#: Pairs of characters that are compared for one word, after what tells at a glance that names differ.
+#: Default limit of `nearest`: pairs of characters to compare for one word. Quick rejections do not count.
 WORK = 1_000_000
-#: How many names are offered.
+#: Largest number of suggested names.
 _OFFERED = 3
 
 
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int = WORK) -> list[str]:
-    """Up to three known names that look like `word`, the nearest first, as `difflib.get_close_matches`.
+    """Return up to three known names that look like `word`, the most similar first.
+
+    The similarity is that of `difflib.get_close_matches`, but the amount of work is bounded.
 
     Args:
-        word: What was written.
-        known: The names there are.
-        cutoff: How alike they must be, from 0 to 1.
-        work: Pairs of characters to compare before the search ends with what it has.
+        word: The misspelt name.
+        known: The existing names.
+        cutoff: Least similarity, from 0 to 1.
+        work: Pairs of characters to compare. When they are used up, the names found so far are returned.
 
     >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
     """
-    begins = word[:_COMPARED]
-    matcher = difflib.SequenceMatcher(b=begins)
+    prefix = word[:_COMPARED]
+    matcher = difflib.SequenceMatcher(b=prefix)
     found = []
     for name in known:
         matcher.set_seq1(name[:_COMPARED])
         if matcher.real_quick_ratio() < cutoff or matcher.quick_ratio() < cutoff:
             continue
-        work -= len(begins) * len(name[:_COMPARED])
+        work -= len(prefix) * len(name[:_COMPARED])
         if work < 0:
             break
-        if (alike := matcher.ratio()) >= cutoff:
-            found.append((alike, name))
+        if (similarity := matcher.ratio()) >= cutoff:
+            found.append((similarity, name))
     return [name for _, name in heapq.nlargest(_OFFERED, found)]
 
 
 class Question(Enum):
-    """A question by its heading's anchor; as text, the command that answers it.
+    """A section of docs/questions.md, by the anchor of its heading.
+
+    As text it is the command that prints the section:
 
     >>> print(Question.MIMIC_JOINTS)
-    `urdfkin explain mimic-joints` says more
+    see `urdfkin explain mimic-joints`
     """
 
     REFERENCE_FRAMES = "reference-frames"
@@ -80,22 +82,22 @@ class Question(Enum):
     FLOATING_BASES = "floating-bases"
 
     def __str__(self) -> str:
-        return f"`urdfkin explain {self.value}` says more"
+        return f"see `urdfkin explain {self.value}`"
 
 
 _E = TypeVar("_E", bound="UrdfkinError")
 
 
 class UrdfkinError(Exception):
-    """Root of everything urdfkin raises on purpose.
+    """Base class of all exceptions that urdfkin raises intentionally.
 
     Attributes:
-        what: The claim in one clause, without a full stop.
-        where: File, line, frame, sample: whatever locates it; None when there is no place.
-        found: The offending value, as the user wrote it.
-        remedy: What to do.
-        question: What people ask who see this; the message ends with the command that answers it.
-        is_disagreement: Whether it is urdfkin and Pinocchio that disagree, not the input that is wrong.
+        what: The problem in one clause, without a full stop.
+        where: The location: file and line, frame or sample. None without a location.
+        found: The wrong value, as the user wrote it.
+        remedy: Instruction for the user.
+        question: A related section of docs/questions.md. The message ends with the command that prints it.
+        is_disagreement: True if urdfkin and Pinocchio disagree; False if the input is wrong.
     """
 
     is_disagreement = False
@@ -122,11 +124,11 @@ class UrdfkinError(Exception):
         remedy = f"; {self.remedy}" if self.remedy else ""
         apart = " " if remedy.endswith("?") else "; "
         question = f"{apart}{self.question}" if self.question else ""
-        # Names and files are in it: none of them may add a line or act on a terminal.
+        # The message contains names from files. They must not add lines or terminal commands.
         return log_line(f"{place}{self.what}{found}{remedy}{question}")
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
-        # Errors cross process borders in `validate --jobs`; the default would lose the keyword fields.
+        # `validate --jobs` pickles errors between processes; the default would lose the keyword fields.
         return _rebuild, (type(self), self.__dict__)
 
 
@@ -138,23 +140,23 @@ def _rebuild(cls: type[_E], state: dict[str, Any]) -> _E:
 
 
 class InputError(UrdfkinError, ValueError):
-    """A value handed to urdfkin cannot be used: wrong length, not finite, not a rotation, ..."""
+    """An argument is invalid: for example a wrong length, a value that is not finite, or no rotation."""
 
 
 class NotFiniteError(InputError):
-    """A coordinate or rate that is infinite or no number."""
+    """A coordinate, joint velocity or joint acceleration is infinite or NaN."""
 
 
 class RangeError(InputError):
-    """Numbers so large that what is computed from them leaves the range of double precision."""
+    """The numbers are so large that a result exceeds the range of double precision."""
 
 
 class UnknownNameError(UrdfkinError, LookupError):
-    """A name that does not exist; the message offers the nearest ones that do.
+    """A name does not exist; the message suggests similar existing names.
 
     Attributes:
-        name: The name that was asked for.
-        nearest: Up to three existing names that look like it.
+        name: The unknown name.
+        nearest: Up to three similar existing names.
     """
 
     def __init__(
@@ -180,32 +182,32 @@ class UnknownNameError(UrdfkinError, LookupError):
 
 
 class OracleError(UrdfkinError):
-    """Pinocchio refuses a robot, or reads another robot from the same text."""
+    """Pinocchio rejects a robot, or parses a different robot from the same text."""
 
 
 class InstallationError(UrdfkinError, ImportError):
-    """A library that urdfkin needs is missing, or another one goes by its name."""
+    """A required library is missing, or a different library of the same name is installed."""
 
 
 class SourceError(UrdfkinError, OSError):
-    """A file that cannot be read or written."""
+    """A file cannot be read or written."""
 
 
 class RepresentationSingularityError(InputError):
-    """Angles at which an orientation's rates cannot be had: the text's representational singularity.
+    """Euler angles are at their representational singularity, where their rates do not exist (7.56).
 
-    Nothing is wrong with the motion, only with its description (7.56).
+    The motion itself is regular; only its description by these angles fails.
 
     Attributes:
         sequence: The Euler sequence.
-        distance: How far the middle angle is from the singularity, radians.
-        sample: Index of the worst member of the batch, () for a single one.
+        distance: Distance of the middle angle from the singularity, radians.
+        sample: Index of the worst sample in the batch; () for a single one.
     """
 
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:
         super().__init__(
             f"the Euler angles {sequence} are at their representational singularity: "
-            "some angular velocities have no rates there",
+            "no angle rates exist there for some angular velocities",
             where=f"sample {list(sample)}" if sample else None,
             found=f"a middle angle {distance:.3g} rad from it",
             remedy="describe the orientation by another sequence or by a quaternion",

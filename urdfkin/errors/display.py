@@ -1,7 +1,8 @@
-"""How an object shows itself: a title, sentences and tables, said once, as text, HTML, Markdown and LaTeX.
+"""Display of objects as text, HTML, Markdown and LaTeX.
 
-An object says what there is to say in `_sheet`; `Displayable` makes `print` of it and what notebooks ask
-for. Names may hold anything: each form makes them harmless in its own way.
+A class derives from `Displayable` and returns a `TextDocument` from `_sheet`: a title, sentences and tables.
+`Displayable` derives the output of `print` and of notebooks from it. Names come from files and may contain
+any characters, so each format escapes them.
 """
 
 from __future__ import annotations
@@ -12,22 +13,23 @@ from html import escape
 
 from urdfkin.errors.escape import latex_text, log_line, markdown_text, printable
 
-#: What a tree is drawn with before its parts, and in ASCII.
+#: Characters that draw the lines of a tree before a name, and their ASCII replacements.
 LINES = "├│└ "
 ASCII = str.maketrans("├│└", "+|`")
-#: What is less than this share of a table's largest number is rounding, and shown as 0. For the eye alone:
-#: what is written for machines has every digit, and no verdict asks.
+#: A number below this fraction of a table's largest number is rounding error and is displayed as 0. This
+#: affects display only: machine-readable output has all digits, and no check uses the displayed value.
 NOISE = 1e-15
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of words and numbers.
+    """A table of text and numbers.
 
     Attributes:
-        heads: What the columns are called.
-        rows: A cell for each; numbers are shown at six digits.
-        left: How many of the first columns hold words, or which; blanks before these are kept.
+        heads: Titles of the columns.
+        rows: Cells of each row. Numbers are displayed with six digits.
+        left: Left-aligned columns: the number of first columns, or the column indices. Leading blanks in
+            these columns are kept.
     """
 
     heads: Sequence[str]
@@ -43,15 +45,15 @@ class Table:
             [x if isinstance(x, str) else six_digits(x, NOISE * largest) for x in row] for row in self.rows
         ]
 
-    def _drawn(self) -> list[list[tuple[str, str]]]:
-        """Each cell, the heads' too, as the lines of a tree before it and its words."""
+    def _split_cells(self) -> list[list[tuple[str, str]]]:
+        """Split each cell, including the heads, into the lines of a tree and the text after them."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(LINES),)]
             for row in (self.heads, *self._cells())
         ]
 
     def text(self) -> str:
-        """Columns side by side."""
+        """Return the table as aligned plain text."""
         body = [[log_line(cell) for cell in row] for row in (self.heads, *self._cells())]
         widths = [max(map(len, column)) for column in zip(*body, strict=True)]
         lines = [
@@ -64,16 +66,16 @@ class Table:
         return "\n".join([lines[0], "-" * (sum(widths) + 2 * (len(widths) - 1)), *lines[1:]])
 
     def markdown(self) -> str:
-        """A table of Markdown."""
+        """Return the table in Markdown."""
         marks = [":---" if self._left(i) else "---:" for i in range(len(self.heads))]
         rows = [
             [lines.replace(" ", "&nbsp;") + markdown_text(words) for lines, words in row]
-            for row in self._drawn()
+            for row in self._split_cells()
         ]
         return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], marks, *rows[1:]))
 
     def html(self) -> str:
-        """A table of HTML, which is styled by where it stands."""
+        """Return the table in HTML with inline styles."""
 
         def row(cells: Sequence[str], tag: str) -> str:
             sides = ("left;white-space:pre" if self._left(i) else "right" for i in range(len(cells)))
@@ -87,12 +89,12 @@ class Table:
         return f"<table>\n<thead>{row(self.heads, 'th')}</thead>\n<tbody>\n{body}\n</tbody>\n</table>"
 
     def latex(self) -> str:
-        """A tabular with booktabs."""
+        """Return a LaTeX tabular that uses the package booktabs."""
         sides = "".join("l" if self._left(i) else "r" for i in range(len(self.heads)))
         rows = [
             " & ".join(lines.translate(ASCII).replace(" ", "~") + latex_text(words) for lines, words in row)
             + r" \\"
-            for row in self._drawn()
+            for row in self._split_cells()
         ]
         lines = [
             rf"\begin{{tabular}}{{{sides}}}",
@@ -107,10 +109,10 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class TextDocument:
-    """What an object says.
+    """The displayed content of an object.
 
     Attributes:
-        title: What it is.
+        title: The title.
         parts: Sentences and tables, in order.
     """
 
@@ -118,24 +120,24 @@ class TextDocument:
     parts: Sequence[str | Table] = ()
 
     def text(self) -> str:
-        """Lines for a terminal."""
+        """Return plain text for a terminal."""
         return self._joined("\n", log_line, log_line, Table.text)
 
     def markdown(self) -> str:
-        """Markdown."""
+        """Return Markdown."""
         return self._joined(
             "\n\n", markdown_text, lambda title: f"**{markdown_text(title)}**", Table.markdown
         )
 
     def html(self) -> str:
-        """HTML, to stand in a page."""
+        """Return an HTML `div`."""
         body = self._joined(
             "\n", lambda x: f"<p>{_html(x)}</p>", lambda x: f"<p><b>{_html(x)}</b></p>", Table.html
         )
         return f"<div>\n{body}\n</div>"
 
     def latex(self) -> str:
-        """LaTeX, which needs the package booktabs."""
+        """Return LaTeX that uses the package booktabs."""
         return self._joined("\n\n", latex_text, lambda title: rf"\textbf{{{latex_text(title)}}}", Table.latex)
 
     def _joined(
@@ -150,7 +152,7 @@ class TextDocument:
 
 
 class Displayable:
-    """What shows itself: in a terminal by `print`, in a notebook by being the last line of a cell."""
+    """Base class of objects that `print` and notebooks display from one `TextDocument`."""
 
     __slots__ = ()
 
@@ -175,7 +177,7 @@ def _html(words: str) -> str:
 
 
 def six_digits(value: float, noise: float = NOISE, digits: int = 6) -> str:
-    """A number for people, at six digits or so many; what is no more than noise as 0.
+    """Format a number with `digits` significant digits; return "0" if its absolute value is at most `noise`.
 
     >>> six_digits(0.1 + 0.2), six_digits(1e-16), six_digits(1e-16, noise=0.0)
     ('0.3', '0', '1e-16')

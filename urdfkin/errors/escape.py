@@ -1,7 +1,8 @@
-"""Words from a file made safe for what shows them: one function for each target, used wherever names leave.
+"""Escaping of names from files: one function for each output format.
 
-A name in a URDF may hold anything: line ends, escape sequences, marks that turn the direction of writing,
-HTML, formulas. What acts in the target is written as an escape that can be read; nothing is dropped.
+A name in a URDF may contain line ends, terminal escape sequences, bidirectional control characters, HTML or
+spreadsheet formulas. Each function replaces the active characters by readable escapes. No character is
+removed.
 """
 
 from __future__ import annotations
@@ -13,18 +14,18 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-#: What a spreadsheet takes for the beginning of a formula.
+#: First characters that make a spreadsheet interpret a cell as a formula.
 FORMULA = ("=", "+", "-", "@")
-#: What a CI service would take for a command: Azure and TeamCity anywhere, GitHub at a line's beginning. The
-#: group, which ends it, is written as an escape; JSON and TOML read it back as it was.
+#: Commands to a CI service: of Azure and TeamCity anywhere in a line, of GitHub at its beginning. The group
+#: is the character to escape. JSON and TOML parsers turn the escape back into the character.
 COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
 COMMANDS = (re.compile(r"\A\s*:(:)"), COMMAND_ANYWHERE)
-#: Joins letters without being seen: what is split by it is no address, mention or number of an issue.
+#: An invisible character (word joiner). It prevents that text becomes a link, a mention or an issue number.
 _JOINER = "&#8288;"
 
 
 def printable(text: str) -> str:
-    r"""One line for a terminal: everything that could act on it is written as an escape, line ends too.
+    r"""Return one line that is safe for a terminal: unprintable characters and line ends are escaped.
 
     Example:
         >>> print(printable("a\u202eb\x1b[31m\n"))
@@ -36,7 +37,9 @@ def printable(text: str) -> str:
 
 
 def log_line(text: str) -> str:
-    r"""One line for a terminal or a CI service's log: as `printable`, and no command for the service.
+    r"""Return one line that is safe for a terminal and for the log of a CI service.
+
+    It is escaped as by `printable`, and commands to the CI service are escaped too.
 
     Example:
         >>> print(log_line("::error::a\n##vso[b]"))
@@ -49,7 +52,7 @@ def log_line(text: str) -> str:
 
 
 def markdown_text(words: str) -> str:
-    r"""Prose for Markdown: no markup, no HTML, no link, no mention, on one line.
+    r"""Escape text for Markdown: one line without markup, HTML, links and mentions.
 
     Example:
         >>> markdown_text("<b>*x*")
@@ -58,14 +61,14 @@ def markdown_text(words: str) -> str:
     flat = printable(re.sub(r"\s+", " ", words)).replace("&", "&amp;")
     flat = flat.replace("<", "&lt;").replace(">", "&gt;")
     flat = re.sub(r"([\\`*_{}\[\]()|~!#$])", r"\\\1", flat.strip())
-    flat = re.sub(r"^(\d*)([-+=.])", r"\1\\\2", flat)  # no list, no rule
+    flat = re.sub(r"^(\d*)([-+=.])", r"\1\\\2", flat)  # prevents a list or a horizontal rule
     return re.sub(r"(?i)(@|\\#|:(?=//)|www(?=\.)|(?:mailto|xmpp):)", rf"\1{_JOINER}", flat)
 
 
 def markdown_code(name: str) -> str:
-    r"""A name for Markdown, in prose and in a table's cell: code, in which nothing acts.
+    r"""Return a name as Markdown code, for text and for table cells.
 
-    Backticks would end the code and bars the cell: they are written as escapes.
+    Backticks, which would end the code, and bars, which would end the cell, are escaped.
 
     Example:
         >>> print(markdown_code("a`|b"))
@@ -82,12 +85,12 @@ _LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
 
 
 def latex_text(text: str) -> str:
-    """Text with LaTeX's special characters made harmless, on one line."""
+    """Return one line of text with the special characters of LaTeX escaped."""
     return "".join(_LATEX.get(character, character) for character in printable(text))
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
-    r"""Rows as CSV; words that a file brings go through `csv_cell` first.
+    r"""Return rows as CSV. Pass names from files through `csv_cell` first.
 
     Example:
         >>> csv_text([["joint", "lower"], ["a, b", 0.5]])
@@ -99,7 +102,7 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 
 
 def json_text(data: Any) -> str:
-    r"""JSON in ASCII, in which no log finds a command either; what reads it gets the names as they are.
+    r"""Return JSON in ASCII without commands to a CI service; a parser restores the original names.
 
     Example:
         >>> print(json_text(["\u202e ##[error]"]))
@@ -110,14 +113,14 @@ def json_text(data: Any) -> str:
 
 
 def escape(c: str) -> str:
-    """A character as JSON (but for rare ones), TOML and Python write it."""
+    """Return the escape of a character in Python and TOML; up to U+FFFF also in JSON."""
     return f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}"
 
 
 def csv_cell(name: str) -> str:
-    r"""A name for comma-separated values: one line, and no spreadsheet takes it for a formula.
+    r"""Escape a name for a CSV cell: one line that no spreadsheet interprets as a formula.
 
-    An apostrophe before `=`, `+`, `-`, `@` says to a spreadsheet that this is text; `from_csv_cell` drops it.
+    An apostrophe before `=`, `+`, `-` or `@` marks the cell as text. `from_csv_cell` removes it.
 
     Example:
         >>> csv_cell("=cmd|'/C calc'!A0"), csv_cell("joint1")
@@ -128,5 +131,5 @@ def csv_cell(name: str) -> str:
 
 
 def from_csv_cell(cell: str) -> str:
-    """The name that `csv_cell` wrote, where it held nothing that has to be escaped."""
+    """Return the name that `csv_cell` wrote, if the name contained no character to escape."""
     return cell[1:] if cell.startswith("'") and cell.lstrip("' ").startswith(FORMULA) else cell

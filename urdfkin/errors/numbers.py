@@ -1,10 +1,9 @@
-"""Numbers as people write them: decimal digits in ASCII, finite, and nothing else.
+"""Strict parsing of numbers, and of numbers with units.
 
-Python's own `float` is far more generous: it takes `1_0`, Arabic digits, `nan` and `infinity`. It is only
-asked once the grammar has agreed, which is that of `xs:double` without its special values.
-
-
-A number with its unit as people write it: `30deg`, `pi/2`, `5 mm`, `-2*pi/3`, `90 deg/s`.
+`parse_float` and `parse_int` accept finite numbers in decimal ASCII digits only. Python's `float` also
+accepts `1_0`, Arabic digits, `nan` and `infinity`, so the text is first matched with the grammar of
+`xs:double` without its special values. `parse_quantity` parses a number with a unit: `30deg`, `pi/2`, `5 mm`,
+`-2*pi/3`, `90 deg/s`.
 """
 
 from __future__ import annotations
@@ -13,16 +12,16 @@ import math
 import re
 from typing import NamedTuple
 
-#: The grammar, which takes time linear in the length of a text.
+#: The grammar of a decimal number. Matching takes time linear in the length of the text.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _WHOLE = re.compile(r"[+-]?[0-9]+")
-#: Longest number that is read; Python's conversion takes time quadratic in the length of absurd ones.
+#: Longest accepted number, in characters: Python converts long integers in quadratic time.
 _LONGEST = 2000
 
-#: What a refused number might have been meant as -> what to do about it; the first that matches.
+#: Pattern of a rejected text -> its remedy; the first match counts.
 _REMEDIES = (
     (r"", "it is empty: write a number"),
-    (r"[+-]?(nan|inf|infinity)", "only finite numbers have a meaning here"),
+    (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*[^\x00-\x7f].*", "write ASCII digits and signs"),
     (r".*_.*", "write the digits without underscores"),
     (r"0[xXbBoO].*", "write it in decimal digits"),
@@ -31,7 +30,7 @@ _REMEDIES = (
 
 
 def parse_float(text: str) -> float | None:
-    """The finite number that a text is, blanks around it allowed; None where it is none.
+    """Parse a finite number, with optional surrounding blanks; return None if the text is no such number.
 
     >>> [parse_float(text) for text in (" -1.5e-3", "1_0", "nan", "\u0661", "1e999")]
     [-0.0015, None, None, None, None]
@@ -44,7 +43,7 @@ def parse_float(text: str) -> float | None:
 
 
 def parse_int(text: str) -> int | None:
-    """The whole number that a text is, blanks around it allowed; None where it is none.
+    """Parse an integer, with optional surrounding blanks; return None if the text is no integer.
 
     >>> parse_int("12"), parse_int("1_2"), parse_int("1.0"), parse_int("1e3")
     (12, None, None, None)
@@ -54,13 +53,13 @@ def parse_int(text: str) -> int | None:
 
 
 def remedy(text: str) -> str | None:
-    """What to do about a text that is no number; None where there is no telling what was meant."""
+    """Return the remedy for a text that is no number; None if its intended meaning is unknown."""
     text = text.strip(" \t\r\n")
     found = (words for pattern, words in _REMEDIES if re.fullmatch(pattern, text, re.IGNORECASE | re.DOTALL))
     return next(found, None)
 
 
-#: Units by the names that people give them -> the short one.
+#: Accepted names of units -> the short name.
 UNITS = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),
@@ -68,7 +67,7 @@ UNITS = {
     **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), "mm"),
 }
 _FACTOR = r"(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|pi)"
-_WRITTEN = re.compile(
+_QUANTITY = re.compile(
     rf"(?P<sign>[+-]?)\s*(?P<factors>{_FACTOR}(?:\s*[*/]\s*{_FACTOR}|\s*pi)*)"
     r"\s*(?P<unit>[a-z]+)?\s*(?P<per>/\s*s\s*(?:\^?\s*2|/\s*s)?)?"
 )
@@ -77,12 +76,12 @@ _LONGEST_QUANTITY = 200
 
 
 class Measured(NamedTuple):
-    """What a text says.
+    """A parsed number with its unit.
 
     Attributes:
-        value: In radians or metres where it says a unit, else as it stands.
-        unit: "rad" or "m"; None where it says none. A multiple of pi without a unit is in radians.
-        per: How often it is divided by a second: 1 for a rate, 2 for a rate's rate.
+        value: The number, in radians or metres if a unit is given, otherwise as written.
+        unit: "rad" or "m"; None without a unit. A multiple of pi without a unit is in radians.
+        per: Power of seconds in the denominator: 1 for a velocity, 2 for an acceleration.
     """
 
     value: float
@@ -91,7 +90,7 @@ class Measured(NamedTuple):
 
 
 def parse_quantity(text: str) -> Measured | None:
-    """The finite number that a text is, with its unit; None where it is none, or a sum.
+    """Parse a finite number with an optional unit; return None for other texts, and for sums.
 
     >>> parse_quantity("30deg").value == math.pi / 6, parse_quantity("-pi/2").value == -math.pi / 2
     (True, True)
@@ -101,7 +100,7 @@ Measured(value=0.3, unit=None, per=0), None, None]
     """
     plain = text.strip(" \t\r\n").lower()
     plain = plain.replace("°", "deg").replace("π", "pi").replace("²", "2")
-    if len(plain) > _LONGEST_QUANTITY or (found := _WRITTEN.fullmatch(plain)) is None:
+    if len(plain) > _LONGEST_QUANTITY or (found := _QUANTITY.fullmatch(plain)) is None:
         return None
     unit = UNITS.get(found["unit"]) if found["unit"] else None
     value = _product(found["factors"])
@@ -130,7 +129,7 @@ def _product(factors: str) -> float | None:
 
 
 def in_radians(degrees: float) -> float:
-    """Radians; multiples of 15 degrees are those of pi/12 to the bit.
+    """Convert degrees to radians; a multiple of 15 degrees gives bit for bit the multiple of pi/12.
 
     >>> in_radians(90.0) == math.pi / 2
     True

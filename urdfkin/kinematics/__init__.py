@@ -1,1 +1,1 @@
-"""The chapter's kinematics, each equation written once."""
+"""The textbook's kinematics: each equation is written once, for every kind of number."""

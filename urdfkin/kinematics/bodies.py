@@ -1,42 +1,24 @@
-"""A frame that moves in another, and rows of such frames.
+"""Moving bodies: planar links, points and frames in moving frames, joints, tools and analytical Jacobians.
 
-Sections 7.3 and 7.6, equations 7.58 to 7.61, 7.49 and 7.125.
+| Subject | Section of the textbook | Equations |
+|---|---|---|
+| one link in the plane | 7.1 | 7.1 to 7.7 (page 2, with 7.6 and 7.8 to 7.10, is lost) |
+| `MovingFrame`, `compose` | 7.3, 7.6 | 7.49, 7.58 to 7.61, 7.125 |
+| position, velocity and acceleration of a point in a moving frame | 7.3.1, 7.6 | 7.58, 7.59, 7.123 to 7.125 |
+| one joint | 7.4.1, 7.4.2, 7.4.4 | 7.62 to 7.67, 7.72 to 7.74, 7.80, a column of 7.85 |
+| the tool and the last frame | 7.4.8 | 7.115 |
+| the analytical Jacobian | 7.5 | 7.116 to 7.122 |
 
+`p_1`, `v_1` and `a_1` are position, velocity and acceleration of a point as an observer in frame 1 measures
+them, expressed in frame 1. Results are measured and expressed in frame 0. Six-vectors are [linear; angular].
+`z` is a joint's axis z_{i-1} in frame 0; `turns` is True for a rotary joint and False for a prismatic one.
 
-A point in a moving frame: its position, its velocity and its acceleration, part by part.
+There are two Jacobians, which are often confused, as the textbook warns. The velocity Jacobian J_v gives
+linear and angular velocity. The manipulator (or analytical) Jacobian J gives the rates of x = (position,
+orientation). The orientation is either three Euler angles in any sequence ("ZYZ" is the textbook's) or a unit
+quaternion ("quaternion").
 
-Sections 7.3.1 and 7.6, equations 7.58, 7.59 and 7.123 to 7.125. `p_1`, `v_1`, `a_1` are what an observer who
-moves with frame 1 measures, expressed in frame 1; results are what one in frame 0 sees, expressed in frame 0.
-
-
-What one joint does: to the link it moves, and to a point further out.
-
-Sections 7.4.1, 7.4.2 and 7.4.4, equations 7.62 to 7.67, 7.72 to 7.74, 7.80 and a column of 7.85. `z` is the
-joint's axis z_{i-1} in frame 0; `turns` says whether the joint is rotary or prismatic.
-
-
-One link in the plane: where its endpoint is and how fast it goes.
-
-Section 7.1, equations 7.1 to 7.7 (page 2 of the text, with 7.6 and 7.8 to 7.10, is lost).
-
-
-Velocity of one point of a link from that of another: the tool and the last frame.
-
-Section 7.4.8, equation 7.115. Six-vectors are [linear; angular]. The angular velocity is the same at both.
-
-
-The manipulator Jacobian: rates of position and of an orientation's *representation*.
-
-Section 7.5, equations 7.116 to 7.122. The velocity Jacobian J_v gives linear and angular velocity; the
-manipulator (or analytical) Jacobian J gives the rates of x = (position, orientation), where the orientation
-is three Euler angles in any sequence ("ZYZ" is the text's) or a unit quaternion ("quaternion"). People have
-mixed the two up: the text warns of it.
-
-
-Moving bodies: one link in the plane, points and frames in moving frames, and what a joint does.
-
-Sections 7.1, 7.3 and 7.6 of the text, and of 7.4 and 7.5 what needs no robot. Every
-function takes any leading batch shape.
+Every function accepts any leading batch shape.
 """
 
 from __future__ import annotations
@@ -56,7 +38,7 @@ from urdfkin.kinematics.rotation.quaternion import quaternion_of, quaternion_rat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovingFrame:
-    """Where frame 1 is in frame 0 and how it moves, everything expressed in frame 0.
+    """Pose, velocity and acceleration of frame 1 relative to frame 0, expressed in frame 0.
 
     Attributes:
         R_0_1: (..., 3, 3) orientation.
@@ -67,7 +49,7 @@ class MovingFrame:
         a_0_1: (..., 3) rate of `v_0_1`, m/s^2.
 
     Raises:
-        InputError: a shape, a value that is not finite, or `R_0_1` is no rotation.
+        InputError: a wrong shape, a value that is not finite, or `R_0_1` is not a rotation.
     """
 
     R_0_1: FloatArray
@@ -86,19 +68,19 @@ class MovingFrame:
 
 
 def turned(R: FloatArray, p: FloatArray) -> FloatArray:
-    """R p for (..., 3, 3) and (..., 3)."""
+    """Return R p for R (..., 3, 3) and p (..., 3)."""
     return (R @ p[..., np.newaxis])[..., 0]
 
 
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
-    """Frame 2 in frame 0, from frame 1 in frame 0 and frame 2 in frame 1 (7.60, 7.61).
+    """Return the motion of frame 2 in frame 0, from frame 1 in frame 0 and frame 2 in frame 1 (7.60, 7.61).
 
-    O_2 is a point that moves in frame 1, so that 7.58, 7.124 and 7.125 give its motion. Angular
-    velocities add (7.49), and the rate of that sum has the term w_01 x w_12.
+    The origin O_2 is a point that moves in frame 1. Its motion follows from 7.58, 7.124 and 7.125. Angular
+    velocities add (7.49), and the rate of their sum contains the term w_01 x w_12.
 
     Args:
         outer: Frame 1 in frame 0.
-        inner: Frame 2 in frame 1: its "frame 0" is our frame 1.
+        inner: Frame 2 in frame 1. Its attributes `..._0_1` are those of frame 2 in frame 1.
 
     Returns:
         Frame 2 in frame 0.
@@ -117,10 +99,12 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
 
 
 def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
-    """The last of a row of frames, each given in the one before it, in frame 0 (7.50, 7.61).
+    """Return the motion of the last frame in frame 0, from frames that are each given in the previous one.
+
+    The equations are 7.50 and 7.61.
 
     Args:
-        frames: Frame i + 1 in frame i, for i = 0, 1, ...; none at all gives frame 0 itself.
+        frames: Frame i + 1 in frame i, for i = 0, 1, ...; without frames the result is frame 0 itself.
 
     Returns:
         The last frame in frame 0.
@@ -129,7 +113,7 @@ def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
 
 
 def seen_from(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = None) -> FloatArray:
-    """(..., 4, 4) T_1_2 = T_0_1^-1 T_0_2: frame 2 in frame 1, both given in frame 0 (7.77)."""
+    """Return T_1_2 = T_0_1^-1 T_0_2 (..., 4, 4), frame 2 in frame 1; both are given in frame 0 (7.77)."""
     T = np.empty(np.broadcast_shapes(T_0_1.shape, T_0_2.shape)) if out is None else out
     back = T_0_1[..., :3, :3].swapaxes(-1, -2)
     T[..., :3, :3] = back @ T_0_2[..., :3, :3]
@@ -138,17 +122,17 @@ def seen_from(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = Non
     return T
 
 
-_STILL = (0.0, 0.0, 0.0)
+_ZERO = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityParts:
-    """The velocity of a point, m/s in frame 0, as 7.124 names its terms.
+    """The terms of a point's velocity, m/s in frame 0 (7.124).
 
     Attributes:
-        rotation: w x p, from the turning of the frame.
-        relative: R v_1, from the point's motion in the frame.
-        origin: d-dot, from the motion of the frame's origin.
+        rotation: w x p, from the rotation of the frame.
+        relative: R v_1, from the point's velocity in the frame.
+        origin: d-dot, the velocity of the frame's origin.
     """
 
     rotation: FloatArray
@@ -157,18 +141,18 @@ class VelocityParts:
 
     @property
     def total(self) -> FloatArray:
-        """The sum of the parts."""
+        """The sum of the terms."""
         return self.rotation + self.relative + self.origin
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AccelerationParts:
-    """The acceleration of a point, m/s^2 in frame 0, as 7.125 names its terms.
+    """The terms of a point's acceleration, m/s^2 in frame 0 (7.125).
 
     Attributes:
         transverse: alpha x p.
         centripetal: w x (w x p), towards the axis of rotation.
-        coriolis: 2 w x R v_1, perpendicular to both.
+        coriolis: 2 w x R v_1, perpendicular to w and to R v_1.
         relative: R a_1, from the point's acceleration in the frame.
         origin: d-dot-dot, the acceleration of the frame's origin.
     """
@@ -181,40 +165,40 @@ class AccelerationParts:
 
     @property
     def total(self) -> FloatArray:
-        """The sum of the parts."""
+        """The sum of the terms."""
         return self.transverse + self.centripetal + self.coriolis + self.relative + self.origin
 
 
 def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
-    """p_0 = d_01 + R p_1 (7.58).
+    """Return p_0 = d_01 + R p_1 (7.58).
 
     Args:
         frame: Frame 1 in frame 0.
-        p_1: (..., 3) the point in frame 1, metres.
+        p_1: (..., 3) position of the point in frame 1, metres.
 
     Returns:
-        (..., 3) the point in frame 0, metres.
+        (..., 3) position of the point in frame 0, metres.
 
     Raises:
-        InputError: a shape or a value that is not finite.
+        InputError: a wrong shape, or a value that is not finite.
     """
     p_0: FloatArray = eq.point_position(frame.d_0_1, frame.R_0_1, vectors(p_1, "p_1"))
     return p_0
 
 
-def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _STILL) -> VelocityParts:
-    """p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 when the point is fixed in frame 1).
+def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
+    """Return p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 if the point is fixed in frame 1).
 
     Args:
         frame: Frame 1 in frame 0.
-        p_1: (..., 3) the point in frame 1, metres.
-        v_1: (..., 3) its velocity in frame 1, m/s; at rest unless given.
+        p_1: (..., 3) position of the point in frame 1, metres.
+        v_1: (..., 3) velocity of the point in frame 1, m/s; by default 0.
 
     Returns:
-        The parts; `.total` is the velocity, (..., 3) m/s in frame 0.
+        The terms; `.total` is the velocity, (..., 3) m/s in frame 0.
 
     Raises:
-        InputError: a shape or a value that is not finite.
+        InputError: a wrong shape, or a value that is not finite.
     """
     p_0 = turned(frame.R_0_1, vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
@@ -223,21 +207,23 @@ def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _STILL) 
 
 
 def point_acceleration(
-    frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _STILL, a_1: ArrayLike = _STILL
+    frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO, a_1: ArrayLike = _ZERO
 ) -> AccelerationParts:
-    """p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot (7.125; 7.123 at rest).
+    """Return p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot (7.125).
+
+    For a point that is fixed in frame 1 this is 7.123.
 
     Args:
         frame: Frame 1 in frame 0.
-        p_1: (..., 3) the point in frame 1, metres.
-        v_1: (..., 3) its velocity in frame 1, m/s; at rest unless given.
-        a_1: (..., 3) its acceleration in frame 1, m/s^2; none unless given.
+        p_1: (..., 3) position of the point in frame 1, metres.
+        v_1: (..., 3) velocity of the point in frame 1, m/s; by default 0.
+        a_1: (..., 3) acceleration of the point in frame 1, m/s^2; by default 0.
 
     Returns:
-        The parts; `.total` is the acceleration, (..., 3) m/s^2 in frame 0.
+        The terms; `.total` is the acceleration, (..., 3) m/s^2 in frame 0.
 
     Raises:
-        InputError: a shape or a value that is not finite.
+        InputError: a wrong shape, or a value that is not finite.
     """
     p_0 = turned(frame.R_0_1, vectors(p_1, "p_1"))
     v_0 = turned(frame.R_0_1, vectors(v_1, "v_1"))
@@ -248,7 +234,7 @@ def point_acceleration(
 
 
 def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -> FloatArray:
-    """d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+    """Return d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 
     Args:
         d: (...) offset d_i along the joint's axis, metres.
@@ -260,7 +246,7 @@ def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -
         (..., 3) metres, in the frame of `z` and `x`.
 
     Raises:
-        InputError: a shape, or a vector that is not of unit length.
+        InputError: a wrong shape, or a vector that is not of unit length.
 
     Example:
         >>> interorigin_vector(0.3, [0.0, 0.0, 1.0], 0.5, [1.0, 0.0, 0.0])
@@ -273,18 +259,18 @@ def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -
 
 
 def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatArray:
-    """w_{i-1,i}: theta-dot z for a rotary joint (7.62), nothing for a prismatic one (7.63).
+    """Return w_{i-1,i}: theta-dot z for a rotary joint (7.62), zero for a prismatic one (7.63).
 
     Args:
         z: (..., 3) unit axis z_{i-1} in frame 0.
-        rate: (...) the joint's rate, rad/s or m/s.
+        rate: (...) joint velocity, rad/s or m/s.
         turns: Whether the joint is rotary.
 
     Returns:
         (..., 3) rad/s, in frame 0.
 
     Raises:
-        InputError: a shape, or an axis that is not of unit length.
+        InputError: a wrong shape, or an axis that is not a unit vector.
     """
     w: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
     return w if turns else np.zeros_like(w)
@@ -293,30 +279,30 @@ def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatA
 def interorigin_velocity(
     w_0_i: ArrayLike, d_vector: ArrayLike, z: ArrayLike, rate: ArrayLike, turns: bool
 ) -> FloatArray:
-    """d-dot_{i-1,i} = w_0i x d_{i-1,i}, and d-dot_i z more for a prismatic joint (7.73, 7.74).
+    """Return d-dot_{i-1,i} = w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint (7.73, 7.74).
 
-    With only joint i moving, w_0i is w_{i-1,i} and these are 7.66 and 7.67.
+    If only joint i moves, w_0i is w_{i-1,i}, and the equations are 7.66 and 7.67.
 
     Args:
         w_0_i: (..., 3) angular velocity of link i, rad/s, in frame 0.
         d_vector: (..., 3) interorigin vector d_{i-1,i}, metres, in frame 0.
         z: (..., 3) unit axis z_{i-1} in frame 0.
-        rate: (...) the joint's rate, rad/s or m/s.
+        rate: (...) joint velocity, rad/s or m/s.
         turns: Whether the joint is rotary.
 
     Returns:
-        (..., 3) m/s, in frame 0: the rate of the vector as frame 0 sees it.
+        (..., 3) m/s, the rate of the vector in frame 0.
 
     Raises:
-        InputError: a shape, or an axis that is not of unit length.
+        InputError: a wrong shape, or an axis that is not a unit vector.
     """
-    carried: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
-    slid: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
-    return carried if turns else carried + slid
+    rotation: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
+    sliding: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
+    return rotation if turns else rotation + sliding
 
 
 def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
-    """What a joint's unit rate does to an endpoint: [z x d_{i-1,n}; z] or [z; 0] (7.80, 7.85).
+    """Return a joint's column of the velocity Jacobian: [z x d_{i-1,n}; z] or [z; 0] (7.80, 7.85).
 
     Args:
         z: (..., 3) unit axis z_{i-1} in frame 0.
@@ -327,7 +313,7 @@ def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
         (..., 6) [linear; angular], in frame 0.
 
     Raises:
-        InputError: a shape, or an axis that is not of unit length.
+        InputError: a wrong shape, or an axis that is not a unit vector.
     """
     z, arm = np.broadcast_arrays(unit_vectors(z, "z"), vectors(arm, "arm"))
     linear, angular = eq.turning_column(z, arm) if turns else (z, np.zeros_like(z))
@@ -335,16 +321,16 @@ def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
 
 
 def planar_rotation(theta: ArrayLike) -> FloatArray:
-    """R(theta) of the plane (7.5).
+    """Return the rotation matrix R(theta) of the plane (7.5).
 
     Args:
         theta: (...) radians.
 
     Returns:
-        (..., 2, 2) rotation; its columns are the axes x1 and y1 in frame 0.
+        (..., 2, 2) rotation; the columns are the axes x1 and y1 in frame 0.
 
     Raises:
-        InputError: an angle that is not a finite number.
+        InputError: an angle is not a finite number.
     """
     theta = scalars(theta, "theta")
     c, s = np.cos(theta), np.sin(theta)
@@ -352,7 +338,7 @@ def planar_rotation(theta: ArrayLike) -> FloatArray:
 
 
 def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
-    """dR/dtheta: the same axes a right angle on, y1 and -x1 (used in 7.4; drawn in figure 7.2).
+    """Return dR/dtheta, whose columns are y1 and -x1: the axes turned by 90 degrees (7.4, figure 7.2).
 
     Args:
         theta: (...) radians.
@@ -361,24 +347,24 @@ def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
         (..., 2, 2), per radian.
 
     Raises:
-        InputError: an angle that is not a finite number.
+        InputError: an angle is not a finite number.
     """
     R = planar_rotation(theta)
     return np.stack((R[..., 1], -R[..., 0]), axis=-1)
 
 
 def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
-    """d_01 = a x1 = R a (1, 0): the endpoint of a link that turns about O_0 (7.1, 7.3).
+    """Return d_01 = a x1 = R a (1, 0), the endpoint of a link that turns about O_0 (7.1, 7.3).
 
     Args:
         theta: (...) joint angle, radians.
-        length: (...) the link's length a, metres.
+        length: (...) link length a, metres.
 
     Returns:
         (..., 2) metres, in frame 0.
 
     Raises:
-        InputError: a value that is not a finite number.
+        InputError: a value is not a finite number.
 
     Example:
         >>> link_endpoint(np.pi / 2, 2.0).round(12)
@@ -389,18 +375,18 @@ def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
 
 
 def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
-    """d-dot_01 = a theta-dot y1: along the tangent, v = r w (7.2, 7.4, 7.7).
+    """Return d-dot_01 = a theta-dot y1, along the tangent with the speed v = r w (7.2, 7.4, 7.7).
 
     Args:
         theta: (...) joint angle, radians.
-        rate: (...) its rate, rad/s.
-        length: (...) the link's length a, metres.
+        rate: (...) joint velocity, rad/s.
+        length: (...) link length a, metres.
 
     Returns:
         (..., 2) m/s, in frame 0.
 
     Raises:
-        InputError: a value that is not a finite number.
+        InputError: a value is not a finite number.
 
     Example:
         >>> link_endpoint_velocity(0.0, 3.0, 2.0) + 0.0
@@ -412,17 +398,17 @@ def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike)
 
 
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}: from frame n out to the tool.
+    """Return the velocity of the tool from that of frame n: d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}.
 
     Args:
-        velocity: (..., 6) of frame n, m/s and rad/s, in frame 0.
-        d_n_tool: (..., 3) from O_n to O_tool, metres, in frame 0.
+        velocity: (..., 6) velocity of frame n, m/s and rad/s, in frame 0.
+        d_n_tool: (..., 3) vector from O_n to O_tool, metres, in frame 0.
 
     Returns:
-        (..., 6) of the tool frame, in frame 0.
+        (..., 6) velocity of the tool frame, in frame 0.
 
     Raises:
-        InputError: a shape or a value that is not finite.
+        InputError: a wrong shape, or a value that is not finite.
     """
     velocity, d = vectors(velocity, "velocity", 6), vectors(d_n_tool, "d_n_tool")
     linear, w = velocity[..., :3], velocity[..., 3:]
@@ -431,17 +417,17 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
 
 def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """d-dot_0n = d-dot_{0,tool} - w x d_{n,tool}: from the tool back to frame n (7.115).
+    """Return the velocity of frame n from the tool's: d-dot_0n = d-dot_{0,tool} - w x d_{n,tool} (7.115).
 
     Args:
-        velocity: (..., 6) of the tool frame, m/s and rad/s, in frame 0.
-        d_n_tool: (..., 3) from O_n to O_tool, metres, in frame 0.
+        velocity: (..., 6) velocity of the tool frame, m/s and rad/s, in frame 0.
+        d_n_tool: (..., 3) vector from O_n to O_tool, metres, in frame 0.
 
     Returns:
-        (..., 6) of frame n, in frame 0.
+        (..., 6) velocity of frame n, in frame 0.
 
     Raises:
-        InputError: a shape or a value that is not finite.
+        InputError: a wrong shape, or a value that is not finite.
 
     Example:
         >>> frame_velocity([0.0, 1.0, 0.0, 0.0, 0.0, 2.0], [0.5, 0.0, 0.0])
@@ -454,37 +440,38 @@ QUATERNION = "quaternion"
 
 
 def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
-    """The numbers that represent a rotation: the last entries of the text's x.
+    """Return the Euler angles or the quaternion of a rotation, the last entries of the textbook's x.
 
     Args:
-        representation: An Euler sequence by SciPy's name, or "quaternion".
+        representation: SciPy's name of an Euler sequence, or "quaternion".
         R: (..., 3, 3) rotation.
 
     Returns:
         (..., 3) angles in radians, or (..., 4) quaternion, scalar last.
 
     Raises:
-        UnknownNameError: no such representation.
-        InputError: a shape, or `R` is no rotation.
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     return quaternion_of(R) if representation == QUATERNION else euler_of(representation, R)
 
 
 def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
-    """C, with [d-dot; w] = C x-dot: the identity and Omega on its diagonal (7.119, 7.120).
+    """Return the matrix C with [d-dot; w] = C x-dot (7.119, 7.120).
 
-    For a quaternion Omega is 4 E^T, three by four, with E that of 7.57.
+    C is block diagonal, with the identity and Omega. For a quaternion, Omega is 4 E^T (3 by 4) with E of
+    7.57.
 
     Args:
-        representation: An Euler sequence by SciPy's name, or "quaternion".
+        representation: SciPy's name of an Euler sequence, or "quaternion".
         R: (..., 3, 3) orientation of the end frame.
 
     Returns:
         (..., 6, 6), or (..., 6, 7) for a quaternion.
 
     Raises:
-        UnknownNameError: no such representation.
-        InputError: a shape, or `R` is no rotation.
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     if representation == QUATERNION:
         return _blocks(4.0 * quaternion_rate_matrix(quaternion_of(R)).swapaxes(-1, -2))
@@ -492,23 +479,23 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 
 
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """C^-1, with x-dot = C^-1 [d-dot; w] (7.122).
+    """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122).
 
-    For a quaternion it is the right inverse whose rates keep the length: there is no singularity.
+    For a quaternion it is the right inverse that keeps the quaternion's length; it has no singularity.
 
     Args:
-        representation: An Euler sequence by SciPy's name, or "quaternion".
+        representation: SciPy's name of an Euler sequence, or "quaternion".
         R: (..., 3, 3) orientation of the end frame.
-        nearest: How near the representational singularity may be, radians.
+        nearest: Least allowed distance from the representational singularity, radians.
 
     Returns:
         (..., 6, 6), or (..., 7, 6) for a quaternion.
 
     Raises:
-        RepresentationSingularityError: Euler angles of a sample are nearer than `nearest` to where Omega
-            cannot be inverted; the error says how near.
-        UnknownNameError: no such representation.
-        InputError: a shape, or `R` is no rotation.
+        RepresentationSingularityError: Euler angles of a sample are within `nearest` of the singularity,
+            where Omega cannot be inverted. The error contains the distance.
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     if representation == QUATERNION:
         return _blocks(quaternion_rate_matrix(quaternion_of(R)))
@@ -518,40 +505,41 @@ def representation_inverse(representation: str, R: ArrayLike, nearest: float = N
 def analytical_jacobian(
     representation: str, R: ArrayLike, J_v: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
-    """J = C^-1 J_v, the manipulator Jacobian (7.122).
+    """Return J = C^-1 J_v, the manipulator Jacobian (7.122).
 
     Args:
-        representation: An Euler sequence by SciPy's name, or "quaternion".
+        representation: SciPy's name of an Euler sequence, or "quaternion".
         R: (..., 3, 3) orientation of the end frame.
         J_v: (..., 6, n) velocity Jacobian, [linear; angular], in frame 0.
-        nearest: How near the representational singularity may be, radians.
+        nearest: Least allowed distance from the representational singularity, radians.
 
     Returns:
-        (..., 6, n), or (..., 7, n) for a quaternion: the derivatives of x by the joint coordinates.
+        (..., 6, n), or (..., 7, n) for a quaternion: the derivatives of x with respect to the joint
+            coordinates.
 
     Raises:
         RepresentationSingularityError: see `representation_inverse`.
-        UnknownNameError: no such representation.
-        InputError: a shape, or `R` is no rotation.
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     J: FloatArray = representation_inverse(representation, R, nearest) @ _rows(J_v, "J_v", 6)
     return J
 
 
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
-    """J_v = C J, the velocity Jacobian back from the manipulator Jacobian (7.121); never singular.
+    """Return J_v = C J, the velocity Jacobian from the manipulator Jacobian (7.121); never singular.
 
     Args:
-        representation: An Euler sequence by SciPy's name, or "quaternion".
+        representation: SciPy's name of an Euler sequence, or "quaternion".
         R: (..., 3, 3) orientation of the end frame.
-        J: (..., 6, n), or (..., 7, n) for a quaternion.
+        J: (..., 6, n), or (..., 7, n) for a quaternion; the manipulator Jacobian.
 
     Returns:
         (..., 6, n), [linear; angular], in frame 0.
 
     Raises:
-        UnknownNameError: no such representation.
-        InputError: a shape, or `R` is no rotation.
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     C = representation_matrix(representation, R)
     J_v: FloatArray = C @ _rows(J, "J", C.shape[-1])
@@ -561,40 +549,40 @@ def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatA
 def pose_rates(
     representation: str, R: ArrayLike, velocity: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
-    """Rates x-dot = C^-1 [d-dot; w]: the rates of position and representation of a moving frame.
+    """Return x-dot = C^-1 [d-dot; w], the rates of position and orientation representation of a frame.
 
     Args:
-        representation: An Euler sequence by SciPy's name, or "quaternion".
+        representation: SciPy's name of an Euler sequence, or "quaternion".
         R: (..., 3, 3) orientation of the frame.
         velocity: (..., 6) [linear; angular] in frame 0, m/s and rad/s.
-        nearest: How near the representational singularity may be, radians.
+        nearest: Least allowed distance from the representational singularity, radians.
 
     Returns:
         (..., 6), or (..., 7) for a quaternion.
 
     Raises:
         RepresentationSingularityError: see `representation_inverse`.
-        UnknownNameError: no such representation.
-        InputError: a shape, or `R` is no rotation.
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     column = vectors(velocity, "velocity", 6)[..., np.newaxis]
     return (representation_inverse(representation, R, nearest) @ column)[..., 0]
 
 
 def velocity_of_pose_rates(representation: str, R: ArrayLike, rates: ArrayLike) -> FloatArray:
-    """[d-dot; w] = C x-dot (7.119).
+    """Return [d-dot; w] = C x-dot (7.119).
 
     Args:
-        representation: An Euler sequence by SciPy's name, or "quaternion".
+        representation: SciPy's name of an Euler sequence, or "quaternion".
         R: (..., 3, 3) orientation of the frame.
-        rates: (..., 6), or (..., 7) for a quaternion.
+        rates: (..., 6), or (..., 7) for a quaternion; the rates x-dot.
 
     Returns:
         (..., 6) [linear; angular] in frame 0, m/s and rad/s.
 
     Raises:
-        UnknownNameError: no such representation.
-        InputError: a shape, or `R` is no rotation.
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     C = representation_matrix(representation, R)
     column = vectors(rates, "rates", C.shape[-1])[..., np.newaxis]
@@ -602,7 +590,7 @@ def velocity_of_pose_rates(representation: str, R: ArrayLike, rates: ArrayLike) 
 
 
 def _blocks(lower: FloatArray) -> FloatArray:
-    """The identity and `lower` on the diagonal."""
+    """Return the block-diagonal matrix of the 3 by 3 identity and `lower`."""
     rows, columns = lower.shape[-2:]
     C = np.zeros((*lower.shape[:-2], 3 + rows, 3 + columns))
     C[..., :3, :3] = np.eye(3)

@@ -1,6 +1,6 @@
-"""Checked input: what the text calls a vector or a matrix, as float64 arrays with leading batch axes.
+"""Validation of vectors, matrices and rotations, as float64 arrays with leading batch axes.
 
-Every function of this part takes any leading batch shape, and every pair of arguments broadcasts.
+Every function accepts any leading batch shape, and arguments broadcast.
 """
 
 from __future__ import annotations
@@ -13,25 +13,27 @@ from urdfkin.errors.validators import is_real, safe_repr
 
 FloatArray = NDArray[np.float64]
 
-#: A direction counts as a unit vector when its norm is one to this. Normalised doubles are within 4e-16;
-#: six typed digits are not, and would give a matrix that is no rotation.
+#: Largest deviation of a unit vector's norm from 1. Normalised doubles deviate by 4e-16 at most. A vector
+#: typed with six digits deviates by more and would not give a rotation matrix.
 UNIT_TOLERANCE = 1e-12
-#: A matrix is a rotation when R R^T is the identity to this: nine decimals, each off by 5e-10, leave it off
-#: by 1e-9 times the sum of the absolute values of a row, which is sqrt(3) at most.
+#: Largest deviation of R R^T from the identity for a rotation. If the entries of R are rounded to nine
+#: decimals, each has an error of 5e-10 at most. R R^T then deviates by 1e-9 times the sum of the absolute
+#: values of a row at most, and this sum is at most sqrt(3).
 ROTATION_TOLERANCE = 2e-9
-#: NumPy's kinds that would turn into floats without a word: complex, bytes, text, spans and dates.
+#: Kinds of NumPy types that convert to floats without an error: complex, bytes, text, timedelta, datetime,
+#: void.
 _NOT_NUMBERS = "cSUmMV"
 
 
 def floats(value: ArrayLike, name: str) -> FloatArray:
-    """`value` as float64 of any shape, nan and inf too; raises InputError where it is no real numbers."""
+    """Return `value` as float64 of any shape, NaN and inf included; raise InputError if not real numbers."""
     if _is_masked(value):
-        raise InputError(f"{name} must be real numbers", found="a masked value, which is none")
+        raise InputError(f"{name} must be real numbers", found="a masked value")
     try:
         array = np.asarray(value)
         if array.dtype.kind in _NOT_NUMBERS:
             raise TypeError(array.dtype)
-        # In an array of objects, text and None would become numbers, or nan, without a word.
+        # NumPy would convert text and None in an object array to numbers or NaN without an error.
         if array.dtype.kind == "O" and not all(map(is_real, array.flat)):
             raise TypeError(array.dtype)
         return np.asarray(array, dtype=np.float64)
@@ -40,14 +42,14 @@ def floats(value: ArrayLike, name: str) -> FloatArray:
 
 
 def _is_masked(value: object) -> bool:
-    """Whether a number is masked, which NumPy would unmask without a word."""
+    """Return whether a number is masked; NumPy would ignore the mask without an error."""
     if isinstance(value, np.ma.MaskedArray):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
 
 
 def scalars(value: ArrayLike, name: str) -> FloatArray:
-    """`value` as finite float64 of any shape; raises InputError naming the argument otherwise."""
+    """Return `value` as finite float64 of any shape; otherwise raise InputError with its name."""
     array = floats(value, name)
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be finite", found=str(array[~np.isfinite(array)][0]))
@@ -55,7 +57,7 @@ def scalars(value: ArrayLike, name: str) -> FloatArray:
 
 
 def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
-    """`value` as finite (..., size) float64; raises InputError naming the argument otherwise."""
+    """Return `value` as finite (..., size) float64; otherwise raise InputError with its name."""
     array = scalars(value, name)
     if array.ndim < 1 or array.shape[-1] != size:
         raise InputError(f"{name} must have the shape (..., {size})", found=str(array.shape))
@@ -63,7 +65,7 @@ def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
 
 
 def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> FloatArray:
-    """`value` as finite (..., rows, columns) float64; raises InputError naming the argument otherwise."""
+    """Return `value` as finite (..., rows, columns) float64; otherwise raise InputError with its name."""
     array = scalars(value, name)
     if array.ndim < 2 or array.shape[-2:] != (rows, columns):
         raise InputError(f"{name} must have the shape (..., {rows}, {columns})", found=str(array.shape))
@@ -71,9 +73,9 @@ def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> Fl
 
 
 def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
-    """`value` as (..., 3) unit vectors; raises InputError naming the argument otherwise.
+    """Return `value` as (..., 3) unit vectors; otherwise raise an InputError with the argument's name.
 
-    They are used as they are: normalising in silence would hide a mistake in the caller's axis.
+    The vectors are not normalised, because normalising would hide a mistake in the caller's axis.
     """
     array = vectors(value, name)
     norms = np.sqrt((array * array).sum(axis=-1))
@@ -86,17 +88,19 @@ def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
 
 
 def rotations(value: ArrayLike, name: str) -> FloatArray:
-    """`value` as (..., 3, 3) rotation matrices; raises InputError naming the argument otherwise."""
+    """Return `value` as (..., 3, 3) rotation matrices; otherwise raise InputError with its name."""
     array = matrices(value, name)
     residual = np.abs(array @ array.swapaxes(-1, -2) - np.eye(3)).max(initial=0.0)
     if residual > ROTATION_TOLERANCE:
-        raise InputError(f"{name} must be a rotation", found=f"R R^T off the identity by {residual:.3g}")
+        raise InputError(
+            f"{name} must be a rotation", found=f"R R^T differs from the identity by {residual:.3g}"
+        )
     if (determinant(array) < 0.0).any():
         raise InputError(f"{name} must be a rotation", found="a reflection, determinant -1")
     return array
 
 
 def determinant(matrix: FloatArray) -> FloatArray:
-    """Determinant of (..., 3, 3) as the triple product of the rows."""
+    """Return the determinant of (..., 3, 3), computed as the triple product of the rows."""
     triple: FloatArray = (np.cross(matrix[..., 0, :], matrix[..., 1, :]) * matrix[..., 2, :]).sum(axis=-1)
     return triple

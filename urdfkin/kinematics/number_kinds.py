@@ -1,21 +1,20 @@
-"""The equations bound to another kind of vector, or to another kind of function.
+"""The equations for other kinds of numbers: NumPy arrays, lengths, or LaTeX expressions.
 
-`urdfkin.kinematics.equations` computes with triples of numbers. Where a vector is something else, an array, a
-length, a piece of LaTeX, the same functions run with other ones in the place of `plus`, `cross` and the like.
+`urdfkin.kinematics.equations` computes with triples of numbers. `bound` makes copies of its functions that
+use other basic operations than `plus`, `cross` and so on.
 
+`array_equations` computes with NumPy arrays: the last axis contains the three components of a vector, so
+whole batches are computed at once.
 
-The equations on NumPy arrays whose last axis holds a vector's three numbers: whole batches at once.
+`length_equations` computes the scale of a result: an upper bound of the terms that are summed. Each vector is
+replaced by its length or by a bound of it. A difference becomes a sum, a cross product becomes the product of
+two lengths, and a rotation changes nothing. No term, no partial sum and no result of the equation exceeds the
+scale. Rounding errors are proportional to the scale. They are not proportional to the result, which may be
+small because large terms cancel.
 
-The equations on lengths: how large the terms are that a result is summed from.
-
-Instead of a vector stands its length, or a bound of it: a minus becomes a plus, a cross product the product
-of two lengths, and a rotation changes nothing. What an equation gives then, no term, no partial sum and no
-result of the equation itself can exceed. Rounding errors are proportional to it, not to the result, which
-may be small because large terms cancel.
-
-Nothing but zero counts as smaller than `SMALLEST`, the smallest normal number. Below it a product is off by
-half the smallest subnormal number, not by half an eps of itself, and so as much as `SMALLEST` would be; and a
-product that is zero because two small numbers were multiplied may still meet a large one.
+A scale that is not zero is at least `SMALLEST`, the smallest normal number. A product below it has an error
+of half the smallest subnormal number, as much as a product of the size `SMALLEST`. A product of two small
+numbers may also underflow to zero and later be multiplied by a large number.
 """
 
 from __future__ import annotations
@@ -30,18 +29,18 @@ from numpy.typing import NDArray
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.roundings import SMALLEST
 
-#: The functions on vectors, which all others are made of.
+#: The basic operations on vectors. All other functions are composed of them.
 VECTORS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "product")
 
 
 def bound(
     *, made: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Every function of `equations`, under its name, computing with what is given here.
+    """Return a namespace with a copy of every function of `equations` that uses other basic operations.
 
     Args:
-        made: What becomes of each function, a compiler's decorator for instance.
-        vectors: Functions to use instead of those of `equations`.
+        made: A decorator for each copied function, for example a compiler's.
+        vectors: Basic operations to use instead of those of `equations`.
 
     >>> lengths = bound(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
@@ -59,7 +58,7 @@ def _functions() -> list[tuple[str, FunctionType]]:
     return [(name, value) for name, value in vars(equations).items() if isinstance(value, FunctionType)]
 
 
-#: A number is an array without that axis, a rotation one with two axes of three.
+#: The equations on NumPy arrays: a number is (...), a vector (..., 3) and a rotation (..., 3, 3).
 array_equations = bound(
     plus=np.add,
     minus=np.subtract,
@@ -76,7 +75,7 @@ FloatArray = NDArray[np.float64]
 
 
 def product(x: FloatArray | float, y: FloatArray | float) -> FloatArray:
-    """`x y` for numbers that are not negative, and no less than `SMALLEST` unless one of them is zero."""
+    """Return x y of numbers >= 0; at least `SMALLEST` if neither of them is zero."""
     xy = np.asarray(np.multiply(x, y))
     small = xy < SMALLEST
     if not small.any():
@@ -85,7 +84,7 @@ def product(x: FloatArray | float, y: FloatArray | float) -> FloatArray:
 
 
 def counted(x: FloatArray) -> FloatArray:
-    """Sizes |x|: what is not zero counts as `SMALLEST` at least.
+    """Return the absolute values |x|; a value that is not zero becomes at least `SMALLEST`.
 
     >>> counted(np.array([0.0, -5e-324, -2.0])).tolist() == [0.0, SMALLEST, 2.0]
     True
@@ -94,12 +93,13 @@ def counted(x: FloatArray) -> FloatArray:
 
 
 def norm(x: FloatArray) -> FloatArray:
-    """(...,) the lengths of vectors (..., n)."""
-    # hypot neither under- nor overflows where squares would.
+    """Return the lengths (...) of vectors (..., n), each zero or at least `SMALLEST`."""
+    # The squares could underflow or overflow; hypot does not.
     return counted(np.hypot.reduce(x, axis=-1))
 
 
-#: A number, a vector and what it is turned by are arrays of the same shape, or broadcast; a unit vector is 1.
+#: The equations on lengths: each number or vector is an array of sizes that broadcasts; a unit vector has
+#: size 1.
 length_equations = bound(
     plus=np.add,
     minus=np.add,

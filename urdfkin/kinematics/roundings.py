@@ -1,120 +1,139 @@
-"""How many roundings two correct computations may lie apart by: the one place where tolerances come from.
+"""Error bounds of two correct computations, as numbers of roundings: the source of all tolerances.
 
-Everything is counted in eps = 2^-52 of what is rounded, each operation being off by half of that at most, and
-to first order. The sizes that the counts multiply are elsewhere (`urdfkin.verify.bounds` for what the
-recursion computes, the modules of `urdfkin.dh` for tables), the counts are all here.
+The unit is eps = 2^-52 times the rounded number. Each operation has an error of half an eps at most. Errors
+are counted to first order. A tolerance is a count of this module times a scale. The scales are computed
+elsewhere: in `urdfkin.verify.bounds` for the forward recursion, and in the modules of `urdfkin.dh` for
+tables.
 
-**A joint.** It multiplies the rotation so far by its constant rotation and by its own turn. A number of a
-rotated vector is off, where *all* roundings conspire, for each joint by
+**A joint.** For each joint, the recursion multiplies the rotation so far by the joint's constant rotation and
+by its rotation about its axis. If *all* roundings add up, the error of a component of a rotated vector grows
+for each joint by
 
 | | urdfkin | Pinocchio |
 |---|---|---|
-| the product with the constant: three terms, fused by urdfkin alone | 1.5 | 1.8 |
-| the turn, with its sine and cosine | 1.5 | 1.7 |
-| the constant, read from roll, pitch, yaw: products of sines; through a quaternion, normalised | 3.1 | 12.5 |
+| product with the constant rotation: three terms, fused (FMA) in urdfkin only | 1.5 | 1.8 |
+| rotation about the axis, with its sine and cosine | 1.5 | 1.7 |
+| constant rotation from roll, pitch, yaw; Pinocchio: by a normalised quaternion | 3.1 | 12.5 |
 | all of a joint about a coordinate axis | 5.7 | 16.8 |
 
-which is 22.5 together: not all that conspires in a part does so in the whole. The two may err in opposite
-directions, hence the sum. `tests/kinematics/test_roundings.py` finds these counts by running the equations,
-the same text, on numbers that remember each of their roundings.
+The worst cases of the parts do not occur together, so a sum is smaller than its parts. The two errors may
+have opposite signs, so the bound for the difference is 5.7 + 16.8 = 22.5.
+`tests/kinematics/test_roundings.py` computes these counts: it runs the same equations on numbers that record
+each of their roundings.
 
-Adding a joint's term to the sum and its cross product cost 2 eps at most on each side, for the two or three
-factors of that term together (`bounds`). Counting one joint more than there is covers the frame's own offset
-and the first of these sums; the rest is in rounding 22.5 up to `ROUNDINGS` = 24.
+The sum over the joints and the cross product of each term add 2 eps at most in each implementation, for the
+two or three factors of that term together (`bounds`). The count uses one joint more than the path has. This
+covers the frame's own offset and the first of these sums. Rounding 22.5 up to `ROUNDINGS` = 24 covers the
+others.
 
-The walk may see its vectors in the world's axes or in a link's. In the world's, R d and z are turned by all
-joints up to theirs, one factor each. In a link's, w as it comes to link k has been turned back by the joints
-between, and a term made there by those up to the frame and, by R, once by all: for w x (w x d) no more than
-three times the joints of the path, as many as the three factors have in the world's.
+The recursion expresses its vectors in the world's axes or in a link's. In the world's axes, each of R d and z
+is rotated by all joints before it, once for each factor. In a link's axes, w of link k is rotated back by the
+joints before it. A term of link k is rotated by the joints up to the frame, and R rotates it once by all
+joints. For w x (w x d) these are at most three times the joints of the path, as for the three factors in the
+world's axes.
 
-About an axis **askew** two more products stand before the turn: of the constant with the axis made z, and
-with the one before it, turned back; Pinocchio has Rodrigues' formula, and the axis's length enters both. All
-340 roundings conspiring make 41. That is not allowed for: with each anything up to its half unit, the
-standard deviation is 3.3, and ROUNDINGS seven times that, for a single joint.
+A joint about an axis that is **not a coordinate axis** needs two more products before its rotation: the
+constant rotation times the rotation that turns z to the axis, and the inverse of that rotation for the
+previous joint. Pinocchio uses Rodrigues' formula. The length of the axis enters in both. If all 340 roundings
+add up, the error is 41. The bound does not allow for this. If each rounding is uniformly distributed in its
+half unit, the standard deviation is 3.3. `ROUNDINGS` is seven standard deviations for a single joint.
 
-Pinocchio takes an axis within 1e-12 of a coordinate axis for that one. With Q the turn by the tilt t that
-brings one axis to the other, |Q R Q^T - R| <= 2 |Q - 1| <= 2 t: a vector turned by the joint, or slid along
-its axis, is off by 2 t at most, and so is each factor behind it. A larger tilt than eps is a finding
-(URDF514). It adds 2 t / eps to the roundings of each factor, for the frames behind that joint and no others.
+Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation by
+the tilt t that turns one axis to the other. Then |Q R Q^T - R| <= 2 |Q - 1| <= 2 t. A vector that the joint
+rotates, or moves along its axis, has an error of 2 t at most, and so has each later factor. A tilt larger
+than eps is a finding (URDF514). It adds 2 t / eps to the roundings of each factor, for the frames after that
+joint only.
 
-**An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. What of a constant's
-row, or of an offset, is less than half an eps of its largest number is left out: it is off by that half, and
-the product and the sum that are gone are not rounded. Whether the rest is fused is the compiler's affair. Its
-sine and cosine are a library's, or in C's batches polynomials of an angle that was reduced in three parts,
-and then right to one eps: r is rounded twice, 0.5; the sum that makes the sine 0.25 and what is added there
-0.1; for the cosine r counts 0.35, its square 0.13, the sums and the product behind it 0.08, 0.13 and 0.25.
+**An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. A number of a
+constant's row or of an offset is omitted if it is less than half an eps of the largest number there. This
+causes an error of half an eps, but the product and the sum that are omitted have no rounding. The compiler
+decides whether products and sums are fused. The sine and cosine are those of a library. In batches in C they
+are polynomials of an angle that is reduced in three parts, with an error of one eps:
+
+| Roundings of the polynomials, with r the reduced angle | |
+|---|---|
+| sine: r, rounded twice | 0.5 |
+| sine: the sum | 0.25 |
+| sine: the terms that are added to it | 0.1 |
+| cosine: r | 0.35 |
+| cosine: the square of r | 0.13 |
+| cosine: the two sums and the last product | 0.08, 0.13, 0.25 |
+
+The counts of an export's joint are
 
 | | fused | not fused |
 |---|---|---|
-| the product with a constant of which something is left out | | 1.5 |
-| the turn, with such sine and cosine | 2.5 | 2.6 |
+| product with a constant in which a number is omitted | | 1.5 |
+| rotation about the axis, with such a sine and cosine | 2.5 | 2.6 |
 | all of an export's joint | 6.5 | 7.2 |
 
-An offset's own numbers are off by 0.5 each where they are left out, 0.7 of its length: less than its products
-with a row or a cross product's that are gone, 1.5. With Pinocchio's 16.8 an export's joint makes 24.0 where
-nothing is fused, and the sums above come on top. That is not allowed for: the standard deviation is as
-urdfkin's own. Against true values, as test vectors are, an export stands alone, with 7.2 of ROUNDINGS.
+Omitting components of an offset causes an error of 0.5 each, 0.7 of its length. This is less than the 1.5 of
+the omitted products with a row, or of those of a cross product. With Pinocchio's 16.8, an export's joint has
+24.0 if nothing is fused, plus the sums above. The bound does not allow for this; the standard deviation is
+the same as urdfkin's. The comparison of an export with true values (test vectors) uses 7.2 of `ROUNDINGS`.
 
-**MuJoCo**, where it is asked, goes another way: the orientation so far is a unit quaternion, which the
-constant's quaternion and the turn's multiply, about an axis that it normalises; at each link it is brought to
-norm 1 and made a matrix. All of that conspiring is
+**MuJoCo**, the optional second oracle, computes the orientation as a unit quaternion. It multiplies this
+quaternion by those of the constant rotation and of the joint's rotation, about an axis that it normalises. At
+each link it normalises the quaternion and converts it to a matrix. If all roundings add up, the error is
 
 | | MuJoCo |
 |---|---|
-| a joint: two products of quaternions, the norm, the matrix, about any axis | 21.5 |
+| a joint about any axis: two products of quaternions, the norm, the matrix | 21.5 |
 
-and with urdfkin's 5.7 it is 27.2, the rest up to `MUJOCO` = 30 being the same sums. Its axes are the file's.
+With urdfkin's 5.7 the difference is 27.2. Rounding it up to `MUJOCO` = 30 covers the same sums as above.
+MuJoCo uses the axes of the file.
 
-A follower's angle counts nothing: urdfkin and the oracle compute fl(fl(m q) + c) with the same doubles m and
-c (rules that follow rules are multiplied out from the leader's end, by both), which IEEE 754 defines to the
-last bit, and neither fuses the two operations. What is left is sine and cosine, above, whose argument is
-reduced without loss however large it is. So a slip in a follower's angle shows as it is, at 1e12 rad too.
+**A mimic joint** adds no rounding. urdfkin and the oracle compute its angle as fl(fl(m q) + c), with the same
+doubles m and c, and neither fuses the two operations. IEEE 754 then defines the result to the last bit. Both
+multiply out chains of mimic rules in the same order, starting with the mimicked joint. The errors of sine and
+cosine are counted above; the reduction of their argument is exact for every size. A mistake in a mimic
+joint's angle is therefore detected, even at 1e12 rad.
 
-**A base** that is turned counts as one joint more; one that is not rounds nothing. Both sides bring the
-user's matrix M, right to nine digits, to the rotation nearest to it, each in its own way, so that how far M
-is from a rotation does not enter:
+**A base** that is rotated counts as one joint more. A base that is not rotated adds no rounding. The user's
+matrix M has nine correct digits. Both implementations replace it by the nearest rotation, each by its own
+method. The distance of M from a rotation therefore does not matter. The counts, with u = eps/2, are
 
 | | urdfkin | Pinocchio |
 |---|---|---|
-| M^T M - I: nine sums of three products, 9 u in the Frobenius norm, of which the step takes half | 2.3 | |
-| the difference M - M (M^T M - I)/2, u sqrt(3), and what the step leaves, u/8 | 0.9 | |
-| K: sums of two or three numbers, 12 u; eigenvalues 4 apart; a quaternion's turn counts twice | | 3.0 |
-| the eigenvector once more through K + I: four products, 16 u, likewise; the quotient by its norm | | 5.0 |
+| M^T M - I: nine sums of three products, 9 u in the Frobenius norm; the step uses half of it | 2.3 | |
+| the difference M - M (M^T M - I)/2, u sqrt(3), and the remaining error of the step, u/8 | 0.9 | |
+| K: sums of two or three numbers, 12 u; eigenvalues differ by 4; a quaternion's error counts twice | | 3.0 |
+| the eigenvector once more by K + I: four products, 16 u, likewise; the division by its norm | | 5.0 |
 | the quaternion's matrix | | 3.0 |
-| a base's velocity and acceleration, brought into its axes: two crosses and two sums | | 6.0 |
-| | 3.2 | 17.0 |
+| a base's velocity and acceleration, expressed in its axes: two cross products and two sums | | 6.0 |
+| sum | 3.2 | 17.0 |
 
-with u = eps/2. 20.2 is within ROUNDINGS. Found were 0.6 and 5.1 for the rotation (1,500 matrices, against 50
-digits).
+The sum 20.2 is within `ROUNDINGS`. The largest measured errors of the rotation are 0.6 and 5.1 (1,500
+matrices, compared with 50 digits).
 
-**An MJCF equality** y - y0 = c0 + c1 (x - x0), of reference values y0 and x0, holds where the tree's mimic
-rules put the joints, but for
+**An MJCF equality** is y - y0 = c0 + c1 (x - x0), with reference values y0 and x0. The tree's mimic rules
+satisfy it up to
 
 | | |
 |---|---|
 | the rule's offset y0 + c0 - c1 x0 | 1.5 |
-| a rule that follows a rule: the product of multipliers, that with the offset, the sum | 1.5 |
+| a rule that refers to a mimic joint: two products and a sum | 1.5 |
 | x and y by their rules, m q + c | 2.0 |
 | MuJoCo's residual: x - x0, c1 times that, y - y0, two differences | 2.5 |
-| | 7.5 |
+| sum | 7.5 |
 
-for each rule up to the joint that moves, and one more, times the size of all these terms.
+This is multiplied by the size of all these terms and by the number of rules up to the mimicked joint, plus
+one.
 
-**Numbers near zero.** Products below the smallest normal number lose bits one by one. Such a product is off
-by 2^-1075, half the smallest subnormal number, which is (eps/2) times the smallest normal number: counting
-every size that is not zero as that large at least (`urdfkin.kinematics.number_kinds`) puts it among the
-roundings counted here, whatever it is multiplied with afterwards. The least unit is then eps times it,
-2^-1074.
+**Numbers near zero.** A product below the smallest normal number loses bits. Its error is 2^-1075, half the
+smallest subnormal number, which is (eps/2) times the smallest normal number. Every scale that is not zero is
+therefore at least the smallest normal number (`urdfkin.kinematics.number_kinds`). The counts of this module
+then cover this error too, also after later multiplications. The least unit is eps times that number, 2^-1074.
 
-**A row** of a Denavit-Hartenberg table rounds its pose by 8 at most:
+**A row** of a Denavit-Hartenberg table has 8 roundings at most:
 
 | | |
 |---|---|
-| theta + q: half an eps of theta, up to pi; that of q is counted with the angles | 1.6 |
-| sine and cosine of that, of alpha and of beta; a Hayati row's products of two | 2.1 |
-| the product of its two matrices, of two terms, and that with the pose so far, of three | 3.8 |
+| theta + q: half an eps of theta, up to pi; the half eps of q is counted with the angles | 1.6 |
+| sine and cosine of that sum, of alpha and of beta; products of two of them in a Hayati row | 2.1 |
+| the product of the row's two matrices (two terms), and that with the pose so far (three terms) | 3.8 |
 | the sum of the pose's position and the row's | 0.5 |
-| | 8.0 |
+| sum | 8.0 |
 
 The tool counts as one row more.
 """
@@ -131,59 +150,61 @@ FloatArray = NDArray[np.float64]
 EPS = sys.float_info.epsilon
 #: The smallest normal number.
 SMALLEST = sys.float_info.min
-#: The smallest unit: eps times the smallest normal number, which is the smallest number of all.
+#: The smallest unit: eps times the smallest normal number. It is the smallest subnormal number.
 LEAST_UNIT = EPS * SMALLEST
-#: Divides in the place of a 0, where 0 is divided too: less than anything that is measured.
+#: Replaces a divisor 0 if the dividend is 0 too. It is smaller than every measured number.
 NOT_ZERO = 1e-300
 
-#: For each joint and each factor, both computations together; derived above.
+#: Roundings for each joint and each factor, of urdfkin and Pinocchio together; derived above.
 ROUNDINGS = 24.0
-#: The same of urdfkin and MuJoCo together; derived above.
+#: Roundings for each joint and each factor, of urdfkin and MuJoCo together; derived above.
 MUJOCO = 30.0
-#: For each mimic rule of an MJCF file, between the tree and MuJoCo; derived above.
+#: Roundings for each mimic rule of an MJCF file, between the tree and MuJoCo; derived above.
 MJCF_RULE = 8.0
-#: For each row of a table; derived above.
+#: Roundings for each row of a table; derived above.
 ROW = 8.0
 
-# What of a constant pose between two joint axes is rounding (`urdfkin.dh.noise`).
+# Rounding errors in the constant pose between two joint axes (`urdfkin.dh.noise`).
 
-#: For each URDF joint whose constant is folded into the pose, by two readers: of the 18.9 that conspire above
-#: (all but the turn), the standard deviation is 2.4, and this nearly six times that.
+#: For each URDF joint with a constant transform in the pose, by two parsers. The worst case is 18.9 (the
+#: table above without the rotation about the axis). The standard deviation is 2.4, and this is nearly six
+#: times that.
 CONSTANT = 13.7
-#: For the two axes: each divided by its length, 0.5, or turned into place by Rodrigues' formula, 2.0.
+#: For the two axes: each is divided by its length, 0.5, or rotated into place by Rodrigues' formula, 2.0.
 AXES = 5.0
-#: For each joint, in the program that wrote the file. A double that goes through text keeps fifteen digits
-#: (DBL_DIG), so that an angle up to pi is off by half a unit of the fifteenth, 5e-15 rad or 22.5 eps; roll
-#: and pitch tilt an axis, yaw does not.
+#: For each joint, in the program that wrote the file. A double that is written with fifteen digits (DBL_DIG)
+#: has an error of half a unit in the last digit. For an angle up to pi this is 5e-15 rad or 22.5 eps. It
+#: counts for roll and pitch, which tilt an axis; yaw does not.
 WRITTEN = 45.0
-#: Of a length along an axis, for the way on which positions are summed: the dot product that gives it, 2.4,
-#: and 0.5 for each sum, of which few are as large as the whole way.
+#: For a length along an axis, in units of the length of the path whose positions are summed: 2.4 for the dot
+#: product, and 0.5 for each sum; few sums are as large as the whole path.
 SUMMED = 4.0
 
-# What is round but for rounding.
+# Numbers that are round up to rounding errors.
 
-#: An angle up to pi: the multiples of pi/12, as they are computed, are off by 1.2; the number in a file, half
-#: a unit in the last place, by 1.0, and arctan2 by 1.1.
+#: An angle up to pi: 1.2 for a computed multiple of pi/12, 1.0 for the number in a file (half a unit in the
+#: last place), and 1.1 for arctan2.
 ANGLE = 4.0
-#: An entry of a rotation: a difference of two products, of which one was made of another such, 0.75 each.
+#: An entry of a rotation: a difference of two products, 0.75; one factor is itself such a difference, 0.75.
 ENTRY = 2.0
-#: A length that twelve digits hold: half of what it may be off by.
+#: A length with twelve digits: half of its largest error.
 DIGITS = SUMMED / 2.0
-#: An angle between two rotations, one read from roll, pitch and yaw, 3.1, one the product of three turns:
-#: sine and cosine, 0.5 each, and two products, 1.4 and 1.8.
+#: An angle between two rotations. One is computed from roll, pitch and yaw, 3.1. The other is the product of
+#: three rotations: sine and cosine, 0.5 each, and two products, 1.4 and 1.8.
 TURN = 8.0
 
-#: By how much the limits of a follower, referred to its leader, are too wide: a difference and a quotient
-#: there, a product and a sum here, 0.5 each, and as much for the limits themselves to be kept.
+#: Widening of the limits of a mimic joint when they are converted to the mimicked joint: 0.5 each for a
+#: difference and a quotient there and for a product and a sum here, and as much again so that a value at the
+#: limits is accepted.
 FOLLOWER = 4.0
 
 
 def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """For each factor, between two readers of a URDF.
+    """Return the roundings for each factor, between two parsers of a URDF.
 
     Args:
-        joints: (...,) on the way.
-        tilt: (...,) radians by which Pinocchio's axes on it are off the file's, added up.
+        joints: (...,) numbers of joints on the path.
+        tilt: (...,) radians, the sum of the angles between Pinocchio's axes and the file's on the path.
 
     >>> of_joints([7, 8]).tolist()
     [168.0, 192.0]
@@ -192,27 +213,28 @@ def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 
 
 def of_rows(rows: int) -> float:
-    """Of a table's pose, its tool's included; what its angles round by (half of q) is not."""
+    """Return the roundings of a table's pose with its tool, without half an eps of q for the angles."""
     return ROW * (rows + 1)
 
 
 def of_rows_read_back(rows: int) -> float:
-    """Between a table and the URDF that was made of it.
+    """Return the roundings between a table and the URDF that was written from it.
 
-    Pinocchio's side rounds as often as the table's own, the way through roll, pitch and yaw twice so.
+    Pinocchio's computation has as many roundings as the table's; the conversion to roll, pitch and yaw has
+    twice as many.
     """
     return 4.0 * of_rows(rows)
 
 
 def of_two_texts(joints: int) -> float:
-    """Of a pose that a text gives by so many joints, between it and another text of the same robot.
+    """Return the roundings of a pose after `joints` joints, between two texts of the same robot.
 
-    Each joint's constant is rounded by who read it and by who wrote it, its axis by both. Merging fixed
-    joints multiplies their constants and writes the product, which rounds no more than that.
+    The parser and the writer round each joint's constant transform and its axis. If fixed joints are merged,
+    the writer rounds the product of their constants, which adds no more roundings.
     """
     return (CONSTANT + WRITTEN + AXES) * (joints + 1)
 
 
 def of_a_fit(rows: int) -> float:
-    """Between a table and the fit of its freedoms to a URDF, which ends a dozen times off what rows round."""
+    """Return the roundings between a table and a URDF after a fit; a fit ends within 12.5 times `of_rows`."""
     return 12.5 * of_rows(rows)

@@ -1,1 +1,1 @@
-"""Motions in time, and all that can be told of a frame along one."""
+"""Trajectories of joints, and the motion of a frame along a trajectory."""

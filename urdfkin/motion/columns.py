@@ -1,4 +1,4 @@
-"""Numbers in columns: CSV text, whose every mistake is told with its file, line and column."""
+"""Parse CSV text into columns of numbers; errors name the file, the line and the column."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ def read_columns(
     *,
     named: bool = False,
 ) -> Mapping[str, FloatArray]:
-    r"""Columns of finite numbers by name, from lines of cells between commas.
+    r"""Parse CSV text into columns of finite numbers.
 
-    Empty lines, and lines that begin with #, do not count. The first other line may name the columns, which
-    then may come in any order; without names they are the required ones.
+    Empty lines and lines that begin with # are skipped. The first other line may contain the names of the
+    columns, in any order. Without names, the columns are the required ones in their order.
 
     Args:
-        text: What stands in the file.
-        where: How the file is called in messages.
-        what: What the columns are for, likewise.
-        required: Columns that must be there.
-        optional: Columns that may be there.
-        named: Whether the first line must be one of names.
+        text: The content of the file.
+        where: Name of the file, for messages.
+        what: Name of the table, for messages.
+        required: Names of the required columns.
+        optional: Names of the optional columns.
+        named: Whether the first line must contain the names.
 
     Returns:
-        (n,) numbers for each column that is there; n may be zero.
+        An array (n,) for each column that is present; n may be zero.
 
     Raises:
-        InputError: a column too many, missing, or twice there; a line with a cell too many or too few; a
-            cell that is no finite number in decimal digits.
+        InputError: a column is unknown, missing or duplicate; a line has a wrong number of cells; or a cell
+            is not a finite number in decimal digits.
 
     >>> read_columns("b,a\n1,2\n3,4\n", "x.csv", "q", ["a", "b"])["a"].tolist()
     [2.0, 4.0]
@@ -57,15 +57,15 @@ def read_columns(
 
 
 def width_of(text: str, where: str) -> int:
-    """How many cells the first line has that counts; 0 where there is none."""
+    """Return the number of cells in the first line that is not skipped; 0 without such a line."""
     return len(next(_rows(text, where), (0, []))[1])
 
 
 def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[float]:
-    """One number for each name.
+    """Parse one number for each name.
 
     Raises:
-        InputError: another count, or a cell that is no finite number.
+        InputError: the number of cells is wrong, or a cell is not a finite number.
     """
     if len(cells) != len(names):
         raise wrong_count(names, len(cells), where)
@@ -80,18 +80,18 @@ def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[floa
 
 
 def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
-    """Lines that count, each with its number."""
+    """Yield the lines that are not skipped, each with its line number."""
     reader = csv.reader(text.splitlines(keepends=True), strict=True)
     try:
         for row in reader:
             if row and not row[0].lstrip().startswith("#"):
                 yield reader.line_num, [cell.strip() for cell in row]
     except csv.Error as error:
-        raise InputError("no CSV", where=f"{where}:{reader.line_num}", found=str(error)) from None
+        raise InputError("not valid CSV", where=f"{where}:{reader.line_num}", found=str(error)) from None
 
 
 def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Whether a line names columns: a joint may be called 1."""
+    """Return whether a line contains the names of columns; a joint may have the name "1"."""
     return sorted(cells) == sorted(names) or all(parse_float(cell) is None for cell in cells)
 
 
@@ -102,10 +102,10 @@ def _check_names(
     wrong = {
         "unknown": [name for name in names if name not in known],
         "missing": [name for name in required if name not in names],
-        "twice there": sorted({name for name in names if names.count(name) > 1}),
+        "duplicate": sorted({name for name in names if names.count(name) > 1}),
     }
     if any(wrong.values()):
-        also = f", and if wanted {listed(optional)}" if optional else ""
+        also = f", and optionally {listed(optional)}" if optional else ""
         raise InputError(
             f"the first line must name the columns of {what}",
             where=where,

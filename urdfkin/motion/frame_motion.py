@@ -1,6 +1,7 @@
-"""All that can be told of one frame's motion, with Pinocchio's opinion of every number: for plots and views.
+"""The motion of one frame along a trajectory, compared with Pinocchio, for plots and viewers.
 
-Sections 7.5 to 7.7. Unlike the methods of `Robot`, nothing is raised on a disagreement: it is shown.
+Sections 7.5 to 7.7 of the textbook. The methods of `Robot` raise an error on a disagreement; here a
+disagreement is a result.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ from urdfkin.verify.verifier import held_against
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """A quantity held against Pinocchio's, sample by sample.
+    """Comparison of a quantity with Pinocchio's, for each sample.
 
     Attributes:
-        units: (n,) the largest disagreement of each sample, eps * scale.
-        share: (n,) the same as a share of its bound; above 1 is a failure.
-        bound: (n,) what rounding can do at most, eps * scale.
+        units: (n,) the largest difference of each sample, in units of eps * scale.
+        share: (n,) this difference divided by its bound; a value above 1 is a failure.
+        bound: (n,) the largest difference that rounding can cause, in units of eps * scale.
     """
 
     units: FloatArray
@@ -39,19 +40,20 @@ class Check:
 
 @dataclass(frozen=True, eq=False)
 class FrameMotion:
-    """One frame along n samples, six-vectors [linear; angular].
+    """The motion of one frame in n samples; six-vectors are [linear; angular].
 
     Attributes:
-        frame: Its name.
-        reference: In which velocity, acceleration and Jacobian are given.
+        frame: Name of the frame.
+        reference: Reference frame of velocity, acceleration and Jacobian.
         placement: (n, 4, 4) T_world_frame.
         velocity: (n, 6) m/s, rad/s.
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
-        movable: (6, nv) which of the Jacobian's numbers can be anything but 0, whatever q is.
-        parts: The acceleration by joint and kind.
-        checks: What Pinocchio says of each quantity, by its name; empty where it cannot check the robot.
-        not_verified: Why it cannot; None if it can.
+        movable: (6, nv) entries of the Jacobian that are not 0 for every q.
+        parts: The acceleration, split by joint and term.
+        checks: Name of a quantity -> its comparison with Pinocchio; empty if Pinocchio cannot check the
+            robot.
+        not_verified: The reason why Pinocchio cannot check the robot; None if it can.
     """
 
     frame: str
@@ -67,23 +69,29 @@ class FrameMotion:
 
     @property
     def agrees(self) -> bool:
-        """Whether no sample lies outside its bound."""
+        """Whether every sample is within its bound."""
         return all((check.share <= 1.0).all() for check in self.checks.values())
 
     @property
     def singular_values(self) -> FloatArray:
-        """(n, min(6, nv)) of the Jacobian, largest first; metres and radians mixed as SI units mix them."""
+        """(n, min(6, nv)) singular values of the Jacobian, largest first; they mix metres and radians."""
         return self.singular_values_of(slice(0, 6))
 
     def singular_values_of(self, rows: slice) -> FloatArray:
-        """(n, ...) of some of the Jacobian's rows."""
+        """Return the singular values (n, ...) of the given rows of the Jacobian, largest first."""
         return np.asarray(np.linalg.svd(self.jacobian[:, rows], compute_uv=False), dtype=np.float64)
 
     def manipulability(self, rows: slice = slice(0, 6)) -> FloatArray:
-        """(n,) the product of the singular values of the Jacobian's `rows`: Yoshikawa's sqrt(det J J^T).
+        """Return Yoshikawa's manipulability sqrt(det J J^T), the product of the singular values.
 
-        With fewer rates than rows J J^T has no volume; the product over the rates is what J^T J has. Columns
-        that are 0 for every q are left out, as `Robot.singular_values` does.
+        With fewer joint velocities than rows, det J J^T is 0, and sqrt(det J^T J) is returned. Columns that
+        are 0 for every q are left out, as in `Robot.singular_values`.
+
+        Args:
+            rows: The rows of the Jacobian to use.
+
+        Returns:
+            (n,) one value for each sample.
         """
         part = self.jacobian[:, rows]
         moving = self.movable[rows].any(axis=0)
@@ -101,7 +109,7 @@ def frame_motion(
     frame: str,
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FrameMotion:
-    """Compute a frame's motion and hold it against Pinocchio's.
+    """Compute a frame's motion and compare it with Pinocchio's.
 
     Args:
         robot: The robot.
@@ -109,11 +117,11 @@ def frame_motion(
         v: (n, nv) rad/s, m/s.
         a: (n, nv) rad/s^2, m/s^2.
         frame: A link's or joint's name.
-        reference: For which point and in which axes.
+        reference: Reference frame of velocity, acceleration and Jacobian.
 
     Raises:
-        InputError: wrong lengths, numbers that are not finite.
-        UnknownNameError: no such frame.
+        InputError: wrong lengths, or numbers that are not finite.
+        UnknownNameError: the frame does not exist.
     """
     call = Call(robot.tree, robot.plan, as_str(frame, "frame"), reference, None, (q, v, a))
     inputs, reference = (call.q, *call.rates), call.reference

@@ -1,10 +1,8 @@
-"""Arrays by name from an .npz file, whose every mistake is told with the file and the array.
+"""Trajectories: a line between two configurations, or samples from a CSV or .npz file.
 
-Motions in time: a line between two configurations, or a table of samples.
-
-A line runs with s = 10 u^3 - 15 u^4 + 6 u^5, u = t / duration, which starts and ends at rest without a step
-in the acceleration. Where a table has no rates, they are central differences of its configurations, whose
-angles are unwrapped first.
+A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. It starts and ends at rest, and
+its acceleration is continuous. If a file has no joint velocities, they are computed by central differences of
+the configurations, after the angles are unwrapped.
 """
 
 from __future__ import annotations
@@ -36,21 +34,24 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: An array's shape after its first axis, which counts samples.
+#: Name of an array -> its shape without the first axis, which is the sample index.
 Shapes = Mapping[str, tuple[int, ...]]
 
 
 def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str, FloatArray]:
-    """Arrays (n, ...) of finite numbers, n the same for all; nothing in the file is ever executed.
+    """Read arrays (n, ...) of finite numbers from an .npz file; n is the same for all.
+
+    Pickled objects are rejected, so no code from the file is executed.
 
     Args:
-        path: What `numpy.savez` has written.
-        shapes: The arrays that may be there.
-        required: Those that must.
+        path: A file of `numpy.savez`.
+        shapes: The allowed arrays.
+        required: Names of the required arrays.
 
     Raises:
-        SourceError: it cannot be read, or is no such file.
-        InputError: an array that is unknown, missing, of another shape, or not of finite numbers.
+        SourceError: the file cannot be read, or is not an .npz file of numbers.
+        InputError: an array is unknown, is missing, has a wrong shape, or contains a number that is not
+            finite.
     """
     try:
         with np.load(io.BytesIO(read_bytes(path, MOST_DATA, pipes=True)), allow_pickle=False) as archive:
@@ -72,7 +73,10 @@ def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str
         MemoryError,
     ) as error:
         raise SourceError(
-            "no .npz file of numbers", where=str(path), found=str(error), remedy="write it with numpy.savez"
+            "not an .npz file of numbers",
+            where=str(path),
+            found=str(error),
+            remedy="write it with numpy.savez",
         ) from error
     arrays = {name: scalars(array, f"{path}: {name}") for name, array in given.items()}
     n = len(arrays[required[0]]) if arrays[required[0]].ndim else 0
@@ -80,7 +84,9 @@ def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str
         if array.shape != (n, *shapes[name]):
             expected = ", ".join(map(str, ("n", *shapes[name])))
             raise InputError(
-                f"{name} has the shape ({expected})", where=str(path), found=f"{array.shape}, where n is {n}"
+                f"{name} must have the shape ({expected})",
+                where=str(path),
+                found=f"{array.shape} with n = {n}",
             )
     return arrays
 
@@ -91,16 +97,16 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
     if unknown or missing:
         wrong = {"unknown": unknown, "missing": missing}
         raise InputError(
-            "other arrays than a trajectory has",
+            "the arrays are not those of a trajectory",
             where=str(path),
             found="; ".join(f"{word}: {', '.join(found)}" for word, found in wrong.items() if found),
-            remedy=f"name them {', '.join(shapes)}; there must be {', '.join(required)}",
+            remedy=f"the names are {', '.join(shapes)}; required: {', '.join(required)}",
         )
 
 
-#: Fewer samples than this have no second difference.
+#: Least number of samples: a second difference needs three.
 _FEWEST = 3
-#: Of an .npz file: the fields of `BaseMotion`.
+#: Names of the arrays for the fields of `BaseMotion`, in an .npz file.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
 
 
@@ -110,13 +116,13 @@ class Trajectory:
 
     Attributes:
         t: (n,) seconds, increasing.
-        q: (n, nq).
-        v: (n, nv).
-        a: (n, nv).
-        rates: Where v and a come from, in words.
-        exact: Whether v and a are the derivatives of q to rounding; else nobody knows how close they are.
-        notes: What a person must know about how the samples were read, a line each.
-        base: How the root link moves, a batch of n; None if it stands still at the world's origin.
+        q: (n, nq) configurations.
+        v: (n, nv) joint velocities.
+        a: (n, nv) joint accelerations.
+        rates: Origin of v and a, as text.
+        exact: Whether v and a are the derivatives of q up to rounding; if False, their error is unknown.
+        notes: Remarks for the user about the samples, for example unwrapped angles; one line each.
+        base: Motion of the root link, a batch of n; None if it is fixed at the world's origin.
     """
 
     t: FloatArray
@@ -130,17 +136,20 @@ class Trajectory:
 
 
 def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) -> Trajectory:
-    """A straight line in joint space from rest to rest; planar and floating joints move along one screw.
+    """Return a straight line in joint space from rest to rest.
+
+    Planar and floating joints move along one screw.
 
     Args:
         robot: The robot.
         start: (nq,) rad, m.
-        end: (nq,); continuous joints make all turns on the way, planar and floating ones none.
+        end: (nq,). Continuous joints make every whole turn between start and end; planar and floating joints
+            make none.
         duration: Seconds.
-        samples: How many, ends included.
+        samples: Number of samples, including both ends.
 
     Raises:
-        InputError: a duration that is not positive, fewer than three samples.
+        InputError: the duration is not positive, or there are fewer than three samples.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("ur5")
@@ -152,7 +161,8 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     samples = whole_number(samples, "samples", 0)
     if duration <= 0.0 or samples < _FEWEST:
         raise InputError(
-            f"a line needs a duration above 0 and {_FEWEST} samples", found=f"{duration} s, {samples}"
+            f"a line needs a duration above 0 and at least {_FEWEST} samples",
+            found=f"{duration} s, {samples}",
         )
     q_0, q_1 = checked(robot.tree, start, "q"), checked(robot.tree, end, "q")
     t = np.linspace(0.0, duration, samples)
@@ -164,35 +174,41 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # Along one screw the rates in the moving frame keep their directions: they are s' and s'' times the step.
+    # Along one screw, velocity and acceleration in the moving frame are s' and s'' times the constant step.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
 
 def read_trajectory(robot: Robot, path: Path, *, with_base: bool = False) -> Trajectory:
-    """Samples from a CSV file whose first line names the columns, or from the arrays of an .npz file.
+    """Read samples from a CSV file with column names in its first line, or from an .npz file.
 
-    In a CSV file `t` holds seconds, a coordinate's name holds q, `v:NAME` and `a:NAME` hold rates and their
-    rates. In an .npz file these are t (n,), q (n, nq), v and a (n, nv). Without t, samples are a second
-    apart. v and a are there both or neither: where there are none, the wraps are taken out of the angles of
-    continuous, planar and floating joints, and the rates are central differences.
+    | Content | CSV columns | .npz array |
+    |---|---|---|
+    | time, s | `t` | t (n,) |
+    | configuration | the names of the coordinates | q (n, nq) |
+    | joint velocities | `v:NAME` | v (n, nv) |
+    | joint accelerations | `a:NAME` | a (n, nv) |
+
+    Without t, the samples are one second apart. v and a must be given together. Without them, the angles of
+    continuous, planar and floating joints are unwrapped, and v and a are central differences.
 
     Args:
         robot: The robot.
-        path: The file; its ending says which of the two.
-        with_base: Whether an .npz file may also say how the root link moves, by base_placement (n, 4, 4),
-            base_velocity and base_acceleration (n, 6), all three of them (`BaseMotion`).
+        path: The file; the suffix .npz selects the second format.
+        with_base: Whether an .npz file may also contain the motion of the root link (`BaseMotion`): the
+            arrays base_placement (n, 4, 4), base_velocity (n, 6) and base_acceleration (n, 6), all three
+            together.
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: a column or array that is unknown, missing or twice there, a number that is none, time
-            that does not increase, or too few samples.
+        InputError: a column or array is unknown, missing or duplicate, a cell is not a number, time does not
+            increase, or there are too few samples.
     """
     archive = path.suffix.lower() == ".npz"
     data = _arrays(robot, path, with_base=with_base) if archive else _table(robot, path)
     q = data["q"]
     if len(q) < _FEWEST:
-        raise InputError(f"{_FEWEST} samples are the least", where=str(path), found=str(len(q)))
+        raise InputError(f"a trajectory needs at least {_FEWEST} samples", where=str(path), found=str(len(q)))
     t = data.get("t", np.arange(len(q), dtype=np.float64))
     if (np.diff(t) <= 0.0).any():
         raise InputError(
@@ -207,13 +223,13 @@ def read_trajectory(robot: Robot, path: Path, *, with_base: bool = False) -> Tra
     v = _rates(robot.tree, found.q, t)
     words = "by central differences"
     if found.joints:
-        words += f", after wraps were taken out of {', '.join(found.joints)}"
+        words += f", after unwrapping {', '.join(found.joints)}"
     rows = frozen(t), frozen(found.q), frozen(v), frozen(_gradient(v, t))
     return Trajectory(*rows, words, notes=found.notes, base=base)
 
 
 def _table(robot: Robot, path: Path) -> dict[str, FloatArray]:
-    """What a CSV file has of t, q, v and a."""
+    """Return t, q, v and a of a CSV file, as far as they are present."""
     columns = {x: [f"{x}:{name}" for name in robot.rate_names] for x in "va"}
     optional = ["t", *columns["v"], *columns["a"]]
     text = read_text(path, MOST_DATA, pipes=True)
@@ -227,7 +243,7 @@ def _table(robot: Robot, path: Path) -> dict[str, FloatArray]:
 
 
 def _arrays(robot: Robot, path: Path, *, with_base: bool) -> dict[str, FloatArray]:
-    """What an .npz file has of them, and of the base."""
+    """Return t, q, v, a and the base's motion of an .npz file, as far as they are present."""
     shapes = {"t": (), "q": (robot.nq,), "v": (robot.nv,), "a": (robot.nv,)}
     base = dict(zip(_BASE, ((4, 4), (6,), (6,)), strict=True)) if with_base else {}
     data = read_arrays(path, shapes | base, ["q"])
@@ -235,7 +251,7 @@ def _arrays(robot: Robot, path: Path, *, with_base: bool) -> dict[str, FloatArra
         missing = [name for name in together if name not in data]
         if 0 < len(missing) < len(together):
             raise InputError(
-                f"{', '.join(together)} are there together or not at all",
+                f"{', '.join(together)} must be given together",
                 where=str(path),
                 found=f"no {', '.join(missing)}",
             )
@@ -243,7 +259,7 @@ def _arrays(robot: Robot, path: Path, *, with_base: bool) -> dict[str, FloatArra
 
 
 def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
-    """(n, nv) central differences; those of planar and floating joints in the moving frame."""
+    """Return central differences (n, nv); those of planar and floating joints are in the moving frame."""
     slopes = _gradient(q, t)
     v = np.empty((len(q), tree.nv))
     for joint, at, to in zip(tree.joints, tree.q_index, tree.v_index, strict=True):

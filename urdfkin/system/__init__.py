@@ -1,1 +1,1 @@
-"""What the operating system is asked: files that users name, folders kept between runs, processes, locks."""
+"""Access to the operating system: files, the cache on disk, processes, locks, git and installed packages."""

@@ -1,14 +1,11 @@
-"""Folders for what is kept between runs: one for each state of the sources that it is made from.
+"""The cache on disk: one folder for each state of the sources, with a checksum in each file.
 
-What is kept is run or unpickled later, so that a folder counts only if nobody but its user can have written
-there. What an upgrade leaves behind is deleted when nobody has used it for a month.
+Cached files are executed or unpickled later. A folder is therefore used only if no other user can have
+written to it. Folders of older versions are deleted after a month without use.
 
-
-Files that are kept between runs, each with a digest: damaged or renamed ones are noticed, and made anew.
-
-Half a file, or one with a flipped bit, might not be read, kill the process, or compute something else. The
-digest is of the file's name too, and of its folder's, which say what the content was made from: a file in
-another one's place would be another robot's.
+`put` writes a file with a checksum, and `get` verifies it. A truncated or corrupted file could crash the
+process or compute a wrong result, so it is reported and replaced. The checksum includes the names of the file
+and of its folder, which identify the sources: a renamed file could belong to another robot.
 """
 
 from __future__ import annotations
@@ -31,29 +28,31 @@ import platformdirs
 from urdfkin.errors import SourceError
 from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
 
-#: How files in a folder are sealed: what was sealed otherwise lies in other folders.
-_SEAL = "sealed with its name"
+#: Version of the checksum. It is part of the folder's digest, so another version uses other folders.
+_CHECKSUM_VERSION = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
 _USED = ".used"
-#: Whose folders may lie above one's own: the superuser's, and those of nobody, as which a container sees the
-#: superuser outside of it.
+#: User ids that may own the parent folders: root, and 65534, the id of the host's root inside a container.
 _TRUSTED = (0, 65534)
 
 
 class CacheWarning(UserWarning):
-    """Something that was to be kept between runs is not; results do not depend on it."""
+    """The cache cannot be used, or a cached file is damaged; the results are not affected."""
 
 
-def kept_folder(kind: str, sources: Iterable[Path], *besides: str, root: Path | None = None) -> Path | None:
-    """A folder of this user's alone, made if need be; None, with a warning, if there can be none.
+def kept_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | None = None) -> Path | None:
+    """Return a cache folder that only this user can write to; create it if it does not exist.
 
     Args:
-        kind: What is kept; the folder's name begins with it.
-        sources: Files on whose contents it depends.
-        besides: Other things on which it depends.
-        root: Where; None for the user's cache.
+        kind: Kind of the cached files; the folder's name begins with it.
+        sources: Files that the cached files depend on. Their contents are part of the folder's digest.
+        texts: Other texts that the cached files depend on.
+        root: The parent folder; None for the user's cache folder.
+
+    Returns:
+        The folder; None, with a `CacheWarning`, if no such folder can be used.
     """
-    digest = hashlib.sha256("\n".join([_SEAL, *besides]).encode())
+    digest = hashlib.sha256("\n".join([_CHECKSUM_VERSION, *texts]).encode())
     for source in sources:
         digest.update(read_bytes(source))
     root = root or Path(platformdirs.user_cache_dir("urdfkin"))
@@ -61,33 +60,34 @@ def kept_folder(kind: str, sources: Iterable[Path], *besides: str, root: Path | 
         root.mkdir(mode=0o700, parents=True, exist_ok=True)
         folder = root.resolve() / f"{kind}-{digest.hexdigest()[:16]}"
         folder.mkdir(mode=0o700, exist_ok=True)
-        if (reason := _not_ours(folder)) is not None:
-            say_once(f"nothing is kept between runs: {reason}")
+        if (reason := _unsafe_reason(folder)) is not None:
+            say_once(f"the cache is not used: {reason}")
             return None
-    except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle
+    except (OSError, RuntimeError) as error:  # RuntimeError: a loop of symbolic links
         reason = getattr(error, "strerror", None) or str(error)
-        say_once(f"nothing can be kept in {root}: {reason}; set XDG_CACHE_HOME to another folder")
+        say_once(f"the cache cannot be written in {root}: {reason}; set XDG_CACHE_HOME to another folder")
         return None
-    with contextlib.suppress(OSError):  # on a full or read-only disc, what is there is there
+    with contextlib.suppress(OSError):  # on a full or read-only disk existing files can still be read
         (folder / _USED).touch()
-        _forget_unused(root, kind)
+        _delete_unused(root, kind)
     return folder
 
 
 def say_once(message: str) -> None:
-    """Warn, but never of the same thing twice in a process."""
-    if message not in _said:
-        _said.add(message)
+    """Issue a `CacheWarning`, each message at most once per process."""
+    if message not in _warned:
+        _warned.add(message)
         warnings.warn(message, CacheWarning, stacklevel=3)
 
 
-_said: set[str] = set()
+_warned: set[str] = set()
 
 
-def _not_ours(folder: Path) -> str | None:
-    """Why somebody else could have written what lies in a folder; None if nobody could.
+def _unsafe_reason(folder: Path) -> str | None:
+    """Return why another user could have written to a folder; None if no other user could.
 
-    Who can write in a folder above it can put another in its place, unless it is sticky, as /tmp is.
+    A user who can write to a parent folder can replace the folder, unless the parent has the sticky bit, as
+    /tmp has.
     """
     me = os.geteuid()
     for place in (folder, *folder.parents):
@@ -97,13 +97,13 @@ def _not_ours(folder: Path) -> str | None:
         everybody = found.st_mode & stat.S_IWOTH
         group = found.st_mode & stat.S_IWGRP and not _is_private(found.st_gid)
         if (everybody or group) and (place == folder or not found.st_mode & stat.S_ISVTX):
-            whom = "everybody" if everybody else "a group"
-            return f"{whom} may write in {place}; take that right away (chmod go-w) and delete {folder}"
+            writer = "every user" if everybody else "a group"
+            return f"{writer} can write to {place}; remove that permission (chmod go-w) and delete {folder}"
     return None
 
 
 def _is_private(group: int) -> bool:
-    """Whether a group is the one that many systems make for each user."""
+    """Return whether a group is the user's private group, which many systems create for each user."""
     try:
         name, found = pwd.getpwuid(os.geteuid()).pw_name, grp.getgrgid(group)
     except KeyError:
@@ -111,8 +111,8 @@ def _is_private(group: int) -> bool:
     return found.gr_name == name and set(found.gr_mem) <= {name}
 
 
-def _forget_unused(root: Path, kind: str) -> None:
-    """Delete folders of this kind and this user that were last used a month ago."""
+def _delete_unused(root: Path, kind: str) -> None:
+    """Delete folders of this kind and this user that have not been used for a month."""
     for mark in root.glob(f"{kind}-*/{_USED}"):
         with contextlib.suppress(OSError):
             found = mark.stat()
@@ -124,22 +124,22 @@ _DIGEST = hashlib.sha256().digest_size
 
 
 def put(place: Path, data: bytes) -> None:
-    """Write a sealed file, whole or not at all; where it cannot be written, that is said and nothing else."""
+    """Write a file with a checksum, completely or not at all; a failure is only a `CacheWarning`."""
     name = ""
     try:
         with tempfile.NamedTemporaryFile(dir=place.parent, prefix=f".{place.name}.", delete=False) as file:
             name = file.name
-            file.write(_seal(place, data) + data)
+            file.write(_checksum(place, data) + data)
         Path(name).replace(place)
     except OSError as error:
         if name:
             with contextlib.suppress(OSError):
                 Path(name).unlink()
-        say_once(f"nothing can be kept in {place.parent}: {error.strerror or error}")
+        say_once(f"the cache cannot be written in {place.parent}: {error.strerror or error}")
 
 
 def get(place: Path) -> bytes | None:
-    """What a sealed file holds; None where there is none, or where it is damaged, which is said."""
+    """Return the content of a file of `put`; None if it is missing, or, with a warning, if it is damaged."""
     try:
         content = read_if_there(place, MOST_DATA)
     except SourceError as error:
@@ -147,14 +147,14 @@ def get(place: Path) -> bytes | None:
         return None
     if content is None:
         return None
-    seal, data = content[:_DIGEST], content[_DIGEST:]
-    if _seal(place, data) != seal:
-        report_damaged(place, "its content is not what was written under this name")
+    checksum, data = content[:_DIGEST], content[_DIGEST:]
+    if _checksum(place, data) != checksum:
+        report_damaged(place, "its checksum does not match its content and its name")
         return None
     return data
 
 
-def _seal(place: Path, data: bytes) -> bytes:
+def _checksum(place: Path, data: bytes) -> bytes:
     digest = hashlib.sha256()
     for part in (os.fsencode(place.parent.name), os.fsencode(place.name), data):
         digest.update(len(part).to_bytes(8, "big") + part)
@@ -162,5 +162,5 @@ def _seal(place: Path, data: bytes) -> bytes:
 
 
 def report_damaged(place: Path, reason: str) -> None:
-    """Say that a file cannot be used; what it held is made and written anew."""
-    say_once(f"{place} is damaged and is made anew: {reason}")
+    """Warn that a file cannot be used; its content is computed and written again."""
+    say_once(f"{place} is damaged and is computed again: {reason}")

@@ -1,10 +1,9 @@
-"""Pieces of a text exchanged where they stand: every other byte stays as it is.
+"""Safe reading and writing of files, and replacing parts of a text.
 
-The one reader of files: whole, up to a limit, regular files only, or refused in one clear line.
-
-A folder of a stranger may hold a link to a device that never ends, or a named pipe that nobody writes to.
-A path that the caller named may be a pipe, since `urdfkin check <(xacro arm.xacro)` names one; it is given up
-after a while, where Python's own `open` would wait for ever.
+The functions read a whole file, up to a size limit, or raise a `SourceError`. By default they accept regular
+files only: an untrusted folder may contain a link to an endless device, or a named pipe without a writer.
+A path from the caller may be a pipe, as in `urdfkin check <(xacro arm.xacro)`. Such a pipe is read with a
+timeout; Python's `open` would wait for ever.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from urdfkin.errors import InputError, SourceError
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """The bytes from `start` up to `end` become `text`; nothing is replaced where the two are one."""
+    """Replacement of the bytes from `start` up to `end` by `text`; an insertion if `start` equals `end`."""
 
     start: int
     end: int
@@ -33,28 +32,28 @@ class Edit:
 
 
 def edited(data: bytes, edits: Iterable[Edit]) -> bytes:
-    """The text with all edits made.
+    """Return the data with all edits applied; all other bytes stay as they are.
 
     >>> edited(b"a=1 b=2", [Edit(6, 7, "3"), Edit(2, 3, "10")])
     b'a=10 b=3'
 
     Raises:
-        InputError: two of them overlap.
+        InputError: two edits overlap.
     """
     parts, cursor = list[bytes](), 0
     for edit in sorted(edits, key=lambda one: (one.start, one.end)):
         if edit.start < cursor:
-            raise InputError("two edits of one place", found=f"byte {edit.start}")
+            raise InputError("two edits overlap", found=f"byte {edit.start}")
         parts += [data[cursor : edit.start], edit.text.encode()]
         cursor = edit.end
     return b"".join([*parts, data[cursor:]])
 
 
-#: How long to wait for somebody to open the other end of a named pipe, seconds.
+#: Seconds to wait for a process to open the other end of a named pipe.
 PATIENCE = 10.0
-#: Bytes that a file may hold: a robot, a table, a setting, what is kept between runs.
+#: Largest size in bytes of a robot, a table, a settings file or a cached file.
 MOST = 100_000_000
-#: Bytes of recorded or computed data: trajectories, samples, reports.
+#: Largest size in bytes of data: trajectories, samples, reports.
 MOST_DATA = 2_000_000_000
 _AT_A_TIME = 2**20
 _KINDS = {
@@ -64,15 +63,15 @@ _KINDS = {
 
 
 def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
-    """The content of a file.
+    """Return the content of a file.
 
     Args:
         path: A regular file, or a link to one.
-        most: Bytes that it may hold.
-        pipes: Whether pipes and devices are read too: for paths that the caller named.
+        most: Largest size in bytes.
+        pipes: Whether to read pipes and devices too; for paths that the caller named.
 
     Raises:
-        SourceError: it cannot be read, is of another kind, or is larger; the message says which.
+        SourceError: the file cannot be read, is not a regular file, or is larger than `most`.
     """
     data = read_start(path, most + 1, pipes=pipes)
     if len(data) > most:
@@ -81,19 +80,19 @@ def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
 
 
 def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
-    """The first bytes of a file, at most so many; arguments and errors as `read_bytes`."""
+    """Return the first `count` bytes of a file or fewer; arguments and errors as for `read_bytes`."""
     try:
-        # Without O_NONBLOCK, opening a pipe waits for its writer.
+        # Without O_NONBLOCK, opening a pipe blocks until a writer opens it.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
         try:
             kind = os.fstat(descriptor).st_mode
             if stat.S_ISDIR(kind):
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             if not pipes:
-                _demand_regular(path, kind)
+                _check_regular(path, kind)
             first = _first_of_pipe(descriptor, path) if stat.S_ISFIFO(kind) else b""
             os.set_blocking(descriptor, True)
-            return _up_to(count, descriptor, first)
+            return _read_up_to(count, descriptor, first)
         finally:
             os.close(descriptor)
     except SourceError:
@@ -104,19 +103,19 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
 
 
 def demand_regular(path: Path) -> None:
-    """Refuse a pipe, a socket or a device; what is not there is for whoever reads it.
+    """Reject a pipe, a socket or a device. A path that does not exist is accepted here; reading it fails.
 
     Raises:
-        SourceError: it is one.
+        SourceError: the path is neither a regular file nor a folder.
     """
     try:
         kind = path.stat().st_mode
     except (OSError, ValueError):
         return
-    _demand_regular(path, kind)
+    _check_regular(path, kind)
 
 
-def _demand_regular(path: Path, kind: int) -> None:
+def _check_regular(path: Path, kind: int) -> None:
     if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
         raise SourceError(
             "not a regular file",
@@ -127,7 +126,7 @@ def _demand_regular(path: Path, kind: int) -> None:
 
 
 def read_if_there(path: Path, most: int = MOST) -> bytes | None:
-    """The content of a file, None where there is none; other errors as `read_bytes`."""
+    """Return the content of a file, None if it does not exist; other errors as for `read_bytes`."""
     try:
         return read_bytes(path, most)
     except SourceError as error:
@@ -137,18 +136,20 @@ def read_if_there(path: Path, most: int = MOST) -> bytes | None:
 
 
 def read_text(path: Path, most: int = MOST, *, pipes: bool = False) -> str:
-    """The content of a file as UTF-8 with or without a byte order mark; errors as `read_bytes`."""
+    """Return the content of a UTF-8 file, with or without a byte order mark; errors as for `read_bytes`."""
     try:
         return read_bytes(path, most, pipes=pipes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise SourceError("cannot be read", where=str(path), found=f"no UTF-8 text ({error})") from None
+        raise SourceError(
+            "cannot be read", where=str(path), found=f"text that is not UTF-8 ({error})"
+        ) from None
 
 
 def read_standard_input(most: int = MOST) -> bytes:
-    """The content of standard input.
+    """Return the content of standard input.
 
     Raises:
-        SourceError: it is closed, cannot be read, or is larger.
+        SourceError: standard input is closed, cannot be read, or is larger than `most`.
     """
     data = read_start_of_standard_input(most + 1)
     if len(data) > most:
@@ -157,13 +158,13 @@ def read_standard_input(most: int = MOST) -> bytes:
 
 
 def read_start_of_standard_input(count: int) -> bytes:
-    """The first bytes of standard input, at most so many.
+    """Return the first `count` bytes of standard input or fewer.
 
     Raises:
-        SourceError: it is closed, or cannot be read.
+        SourceError: standard input is closed, or cannot be read.
     """
     try:
-        if sys.stdin is None:  # closed by whoever started the process
+        if sys.stdin is None:  # the parent process closed it
             raise OSError(errno.EBADF, os.strerror(errno.EBADF))
         data: bytes = sys.stdin.buffer.read(count)
     except OSError as error:
@@ -172,7 +173,7 @@ def read_start_of_standard_input(count: int) -> bytes:
 
 
 def exists(path: Path) -> bool:
-    """Whether there is something; True for a name too long for a file, so that reading it says so."""
+    """Return whether a path exists; True if the name is too long, so that reading it reports the error."""
     try:
         return path.exists()
     except OSError:
@@ -180,7 +181,7 @@ def exists(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether it is a folder; False for a name too long for one, so that reading it says so."""
+    """Return whether a path is a folder; False if the name is too long, so that reading reports the error."""
     try:
         return path.is_dir()
     except OSError:
@@ -188,7 +189,7 @@ def is_folder(path: Path) -> bool:
 
 
 def at_home(name: str | os.PathLike[str]) -> Path:
-    """A path whose `~` is the home it stands for; what stands for no home is a name like others."""
+    """Expand `~` to the home folder; a name whose `~` cannot be expanded stays as it is."""
     try:
         return Path(name).expanduser()
     except RuntimeError:
@@ -196,7 +197,7 @@ def at_home(name: str | os.PathLike[str]) -> Path:
 
 
 def shortened(path: Path) -> str:
-    """A path for a message: one that no file system takes is not printed at length.
+    """Return a path for a message; a path of more than 300 characters is abbreviated.
 
     >>> len(shortened(Path("x" * 5000))) < 200
     True
@@ -214,7 +215,7 @@ def _too_large(where: str, most: int) -> SourceError:
     )
 
 
-def _up_to(count: int, descriptor: int, first: bytes) -> bytes:
+def _read_up_to(count: int, descriptor: int, first: bytes) -> bytes:
     pieces, left = [first[:count]], count - len(first)
     while left > 0 and (piece := os.read(descriptor, min(left, _AT_A_TIME))):
         pieces.append(piece)
@@ -223,7 +224,7 @@ def _up_to(count: int, descriptor: int, first: bytes) -> bytes:
 
 
 def _first_of_pipe(descriptor: int, path: Path) -> bytes:
-    """What is there already, once somebody has, or had, the other end; if nobody comes, it is refused."""
+    """Return the first available bytes of a pipe; b"" if a writer wrote none; an error without a writer."""
     events = select.poll()
     events.register(descriptor, select.POLLIN)
     end = time.monotonic() + PATIENCE
@@ -231,26 +232,28 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
         try:
             if piece := os.read(descriptor, _AT_A_TIME):
                 return piece
-        except BlockingIOError:  # a writer that has written nothing yet
+        except BlockingIOError:  # a writer is connected but has written nothing yet
             return b""
-        if any(event & select.POLLHUP for _, event in events.poll(0)):  # one that came and went
+        if any(
+            event & select.POLLHUP for _, event in events.poll(0)
+        ):  # a writer connected and closed the pipe
             return b""
         time.sleep(0.01)
     raise SourceError(
-        "a pipe that nobody writes to",
+        "a pipe without a writer",
         where=str(path),
         found=f"nothing in {PATIENCE:g} s",
-        remedy="write the text into a file, or give it on standard input as -",
+        remedy="write the text into a file, or pass it on standard input with -",
     )
 
 
 def write_file(path: Path, data: bytes) -> None:
-    """Write beside the target and rename, so that a file is there whole or not at all.
+    """Write a file completely or not at all: write a temporary file in the same folder and rename it.
 
-    A link is followed; what is no file (`/dev/null`, a pipe) is written to, never replaced.
+    A link is followed. A device or a pipe (`/dev/null`) is written to and never replaced.
 
     Raises:
-        SourceError: no permission, no such folder, no room.
+        SourceError: for example no permission, no such folder, or a full disk.
     """
     name = ""
     try:
@@ -258,7 +261,7 @@ def write_file(path: Path, data: bytes) -> None:
             path.write_bytes(data)
             return
         path = path.resolve()
-        if path.exists() and not os.access(path, os.W_OK):  # renaming would not ask
+        if path.exists() and not os.access(path, os.W_OK):  # renaming would ignore this permission
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as stream:

@@ -1,7 +1,7 @@
-"""What git is asked: the files of an older version, read as they were kept.
+"""Files of an older version of a git repository.
 
-Only commands that read objects are used. Those that look at the working tree (`diff`, `status`) would run
-programs that a stranger's repository names in its settings.
+Only git commands that read objects are used. Commands that read the working tree (`diff`, `status`) would run
+programs that the settings of an untrusted repository name.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ class Version:
     """A version of a repository.
 
     Attributes:
-        root: The folder that its files are named from.
-        files: Name -> the digest of what it held.
-        digests: All of these.
-        gone: The last parts of the names of files that are there no more.
+        root: The repository's root folder; names are relative to it.
+        files: Name -> digest of the file's content in this version.
+        digests: All these digests.
+        gone: Base names of the files that no longer exist in the working tree.
     """
 
     root: Path
@@ -33,11 +33,11 @@ class Version:
     gone: frozenset[str]
 
     def name(self, path: Path) -> str:
-        """What a file is called in it."""
+        """Return the name of a file relative to `root`."""
         return Path(os.path.relpath(path.resolve(), self.root)).as_posix()
 
     def holds(self, data: bytes) -> bool:
-        """Whether one of its files, of whatever name, held just that."""
+        """Return whether a file of this version, of any name, has exactly this content."""
         blob = b"blob %d\0" % len(data) + data
         return any(
             hashlib.new(kind, blob, usedforsecurity=False).hexdigest() in self.digests
@@ -45,17 +45,17 @@ class Version:
         )
 
     def changed(self, endings: tuple[str, ...]) -> bool:
-        """Whether a file of one of these endings is not what it was, or is gone."""
+        """Return whether a file with one of these suffixes was changed or deleted since this version."""
         names = (name for name in self.files if name.endswith(endings))
         return not all(
             (self.root / name).is_file() and self.holds(read_bytes(self.root / name)) for name in names
         )
 
     def read(self, path: Path) -> bytes | None:
-        """What a file held; None where it was not there.
+        """Return the content of a file in this version; None if the file did not exist.
 
         Raises:
-            SourceError: git cannot tell, or it was larger than a file may be.
+            SourceError: git failed, or the file was larger than `MOST` bytes.
         """
         if (digest := self.files.get(self.name(path))) is None:
             return None
@@ -70,29 +70,29 @@ class Version:
 
 
 def version_before(reference: str, folder: Path) -> Version:
-    """The version from which a repository's present one parted from another.
+    """Return the merge base of the current commit and a reference.
 
     Args:
-        reference: The other: a branch, a tag, a commit.
+        reference: A branch, a tag or a commit.
         folder: A folder of the repository.
 
     Raises:
-        SourceError: git is not there, the folder lies in no repository, or there is no such version.
+        SourceError: git is not installed, the folder is in no repository, or there is no merge base.
     """
     root = Path(os.fsdecode(_git("rev-parse", "--show-toplevel", cwd=folder).rstrip(b"\n")))
     try:
         commit = _text(
             "rev-parse", "--verify", "--quiet", "--end-of-options", f"{reference}^{{commit}}", cwd=root
         )
-        parted = _text("merge-base", commit, "HEAD", cwd=root)
+        merge_base = _text("merge-base", commit, "HEAD", cwd=root)
     except SourceError as error:
         raise SourceError(
-            "git knows no version from which this one parted",
+            "git finds no common version of this commit and HEAD",
             where=reference,
             found=error.found,
-            remedy="fetch it first, with the commits between: in GitHub's actions/checkout, fetch-depth: 0",
+            remedy="fetch it first, with its history; in GitHub's actions/checkout set fetch-depth: 0",
         ) from None
-    rows = _git("ls-tree", "-r", "-z", "--full-tree", parted, cwd=root).split(b"\0")
+    rows = _git("ls-tree", "-r", "-z", "--full-tree", merge_base, cwd=root).split(b"\0")
     parts = (row.partition(b"\t") for row in rows if row)
     files = {os.fsdecode(name): head.split()[2].decode() for head, _, name in parts}
     gone = frozenset(Path(name).name for name in files if not (root / name).exists())
@@ -104,7 +104,7 @@ def _text(*words: str, cwd: Path) -> str:
 
 
 def _git(*words: str, cwd: Path) -> bytes:
-    # Nothing is fetched, asked for or paged.
+    # git must not fetch, prompt or start a pager.
     environ = os.environ | {
         "GIT_NO_LAZY_FETCH": "1",
         "GIT_TERMINAL_PROMPT": "0",
@@ -112,13 +112,13 @@ def _git(*words: str, cwd: Path) -> bytes:
         "LC_ALL": "C",
     }
     try:
-        done = subprocess.run(
+        result = subprocess.run(
             ["git", "-c", "core.fsmonitor=false", *words],
             cwd=cwd, env=environ, stdin=subprocess.DEVNULL, capture_output=True, check=False,
         )  # fmt: skip
     except FileNotFoundError:
         raise SourceError("git is not installed", remedy="install it, or leave out --changed-since") from None
-    if done.returncode:
-        found = done.stderr.decode("utf-8", "replace").strip().removeprefix("fatal: ")
-        raise SourceError("git cannot tell", where=str(cwd), found=found or None)
-    return done.stdout
+    if result.returncode:
+        found = result.stderr.decode("utf-8", "replace").strip().removeprefix("fatal: ")
+        raise SourceError("git failed", where=str(cwd), found=found or None)
+    return result.stdout

@@ -1,10 +1,8 @@
-"""Functions that are named, not imported: whoever only asks for help needs no numpy.
+"""Lazy imports, versions of installed packages, and hooks.
 
-Which version of a package is installed, told without importing it.
-
-What a lower room has done by a higher one: it asks by a word, and knows nobody above it.
-
-Who answers is said where the package is put together, in `urdfkin/__init__.py`.
+`lazy_import` imports a function's module at the first call, so `--help` does not load NumPy. The version
+functions read the metadata of a package without importing it. A hook lets a lower package call a function of
+a higher one by name, without importing it; `urdfkin/__init__.py` registers the hooks.
 """
 
 from __future__ import annotations
@@ -19,7 +17,7 @@ from urdfkin.system.processes import importing
 
 
 def lazy_import(home: str) -> Callable[..., Any]:
-    """The function `module:name`, imported and looked up when it is called."""
+    """Return a function that imports `module:name` when it is called, and calls it."""
     module, _, name = home.partition(":")
 
     def call(*arguments: Any, **options: Any) -> Any:
@@ -32,7 +30,7 @@ def lazy_import(home: str) -> Callable[..., Any]:
 
 @cache
 def installed_version(package: str) -> str | None:
-    """As pip installed it; None: not at all. Kept, because finding it takes milliseconds each time."""
+    """Return the installed version of a package, or None. It is cached: a lookup takes milliseconds."""
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
@@ -40,18 +38,18 @@ def installed_version(package: str) -> str | None:
 
 
 def own_version() -> str:
-    """Urdfkin's own; in words where it runs from a checkout that is not installed."""
+    """Return the version of urdfkin; "of a checkout" if urdfkin is not installed."""
     return installed_version("urdfkin") or "of a checkout"
 
 
-_ANSWERS: dict[str, Callable[..., Any]] = {}
+_HOOKS: dict[str, Callable[..., Any]] = {}
 
 
 def register_hook(word: str, function: Callable[..., Any]) -> None:
-    """Have a function answer to a word."""
-    _ANSWERS[word] = function
+    """Register a function under a name."""
+    _HOOKS[word] = function
 
 
 def hook(word: str) -> Callable[..., Any]:
-    """The function that answers to a word."""
-    return _ANSWERS[word]
+    """Return the function that is registered under a name."""
+    return _HOOKS[word]

@@ -1,19 +1,15 @@
-"""Python processes and imports of our own that take nothing from the current folder.
+"""Child processes, locks that survive a fork, and threads with a large stack.
 
-urdfkin is run in the folders of other people's robots. `python -c` and `python -m` look for modules there
-first, and libraries for their settings: a file `json.py` beside a robot would be run.
+Child processes of urdfkin do not import from the current folder. urdfkin runs in folders with untrusted
+robots, and `python -c` and `python -m` search the current folder first: a file `json.py` beside a robot would
+be run. Libraries search it for settings files too.
 
+A fork copies all locks but only the forking thread. A lock that another thread holds at that moment would
+stay locked in the child for ever. `lock_over_forks` prevents this.
 
-Locks that a forked child finds open.
-
-A fork copies the locks of every thread and only the thread that forks: what another one held in that moment
-would stay closed in the child for ever.
-
-
-Call something on a thread whose stack is large enough for it.
-
-Pinocchio and its parser walk a robot recursively; on a usual stack of 8 MiB a chain of some 3,000 links
-ends the process, on a smaller one a few hundred links do.
+`with_stack` runs a function on a thread with a large stack. Pinocchio and its parser traverse a robot
+recursively: a chain of about 3,000 links overflows a stack of 8 MiB, a few hundred links overflow a smaller
+one.
 """
 
 from __future__ import annotations
@@ -28,55 +24,56 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
 
-#: Variables that a Python may need from the environment to start at all.
+#: Environment variables that a Python interpreter may need to start.
 _NEEDED = ("LD_LIBRARY_PATH",)
-#: Threads of linear algebra take address space, which a confined process has little of.
-_GIVEN = {"OPENBLAS_NUM_THREADS": "1"}
+#: One thread for linear algebra: more threads need address space, which is limited in a confined process.
+_ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
 
 
 def own_python(code: str, *, options: Sequence[str] = ()) -> list[str]:
-    """The command of another interpreter: what this one can import, that one can, but from no current folder.
+    """Return the command of a new interpreter with the same import path, without the current folder.
 
     Args:
-        code: What it runs.
-        options: Of the interpreter.
+        code: Python code to run.
+        options: Options of the interpreter.
     """
     return [sys.executable, "-I", *options, "-c", f"import sys; sys.path[:] = {_path()!r}; {code}"]
 
 
 def _path() -> list[str]:
-    # An empty or relative entry stands for the current folder or one below it; urdfkin itself may have
-    # been found through it.
+    # An empty or relative entry means the current folder or one below it. urdfkin may have been imported
+    # through such an entry, so its own folder is added.
     home = str(Path(__file__).resolve().parents[2])
     return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_scratch(entry)), home]
 
 
 def _is_scratch(entry: str) -> bool:
-    """Whether Dask has put it on the path: it lies in the common temporary folder, where others write."""
+    """Return whether Dask added an entry: other users can write to this shared temporary folder."""
     return any(part.startswith("dask-scratch-space") for part in Path(entry).parts)
 
 
 def ask_python(command: list[str], request: bytes, patience: float, most: int) -> tuple[bytes, int | None]:
-    """Give a process a request on its standard input, and an empty environment; read its output.
+    """Run a process with a minimal environment, write a request to its standard input and read its output.
 
     Args:
-        command: As from `own_python`.
-        request: What it reads.
-        patience: Seconds after which it is killed.
-        most: Bytes of output; one more is read, and then it is killed.
+        command: The command, for example of `own_python`.
+        request: Bytes for its standard input.
+        patience: Timeout in seconds; then the process is killed.
+        most: Largest output in bytes. The process is killed if it writes more; then `most` + 1 bytes are
+            returned.
 
     Returns:
-        Its output, and its exit status; None for the status if it took too long.
+        The output and the exit status. The status is None after a timeout.
     """
-    environ = _GIVEN | {name: os.environ[name] for name in _NEEDED if name in os.environ}
+    environ = _ENVIRONMENT | {name: os.environ[name] for name in _NEEDED if name in os.environ}
     pipe = subprocess.PIPE
-    late = threading.Event()
+    timed_out = threading.Event()
     with subprocess.Popen(
         command, env=environ, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL
     ) as process:
 
         def give_up() -> None:
-            late.set()
+            timed_out.set()
             process.kill()
 
         timer = threading.Timer(patience, give_up)
@@ -93,17 +90,17 @@ def ask_python(command: list[str], request: bytes, patience: float, most: int) -
         finally:
             timer.cancel()
             process.kill()
-    return output, None if late.is_set() else status
+    return output, None if timed_out.is_set() else status
 
 
 @contextmanager
 def not_reading(settings: str) -> Iterator[None]:
-    """While open, a library that looks for a file of settings in the current folder finds none.
+    """Hide a settings file in the current folder from libraries.
 
-    Where there is one, the process is in the root folder meanwhile; otherwise nothing happens.
+    If the file exists, the process changes to the root folder inside the context. Otherwise nothing happens.
 
     Args:
-        settings: The file's name.
+        settings: Name of the settings file.
     """
     if not os.path.lexists(settings):
         yield
@@ -118,28 +115,28 @@ def not_reading(settings: str) -> Iterator[None]:
 
 
 def lock_over_forks() -> threading.RLock:
-    """A lock for a whole module: a fork waits for it, and parent and child go on with it open.
+    """Return a lock that a fork waits for, and that is unlocked in parent and child after the fork.
 
-    It is registered for as long as the process lives, so that no object may have one of its own.
+    Use it for modules only, not for objects: the lock stays registered until the process ends.
     """
     lock = threading.RLock()
     os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release)
     return lock
 
 
-#: Held while a module is imported that is loaded only when it is needed: a child that was forked meanwhile by
-#: another thread would wait for ever for the rest of that import.
+#: Held during lazy imports. Without it, a child that another thread forks during an import would wait for
+#: ever for the end of that import.
 importing = lock_over_forks()
 
 
 _T = TypeVar("_T")
 
 _USUAL_STACK = 8 * 2**20
-_one_at_a_time = lock_over_forks()
+_stack_size_lock = lock_over_forks()
 
 
 def with_stack(size: int, function: Callable[[], _T]) -> _T:
-    """What `function()` returns or raises, called on a stack of at least `size` bytes.
+    """Call `function()` on a stack of at least `size` bytes; return its result or raise its exception.
 
     >>> with_stack(64 * 2**20, lambda: 6 * 7)
     42
@@ -152,7 +149,7 @@ def with_stack(size: int, function: Callable[[], _T]) -> _T:
         except BaseException as error:
             future.set_exception(error)
 
-    with _one_at_a_time:  # the size is a setting of the whole process
+    with _stack_size_lock:  # the stack size is a global setting of the process
         before = threading.stack_size(max(size, _USUAL_STACK))
         try:
             thread = threading.Thread(target=run)

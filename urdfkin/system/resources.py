@@ -1,4 +1,4 @@
-"""Where the files lie that ship with urdfkin, and those of example-robot-data."""
+"""Locations of the files of urdfkin and of example-robot-data."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from urdfkin.errors import SourceError
 
 @cache
 def robots_dir() -> Path:
-    """The folder `robots`: inside the package once installed, beside it in a checkout."""
+    """Return the folder `robots`: inside the installed package, or beside it in a checkout."""
     here = Path(__file__).resolve().parents[1]
     for folder in (here / "robots", here.parent / "robots"):
         if (folder / "catalogue.toml").is_file():
@@ -23,28 +23,30 @@ def robots_dir() -> Path:
 
 
 def questions_page() -> Path:
-    """docs/questions.md: inside the package once installed, among the docs in a checkout."""
+    """Return docs/questions.md: inside the installed package, or in `docs` of a checkout."""
     here = Path(__file__).resolve().parents[1]
     for file in (here / "questions.md", here.parent / "docs" / "questions.md"):
         if file.is_file():
             return file
-    raise SourceError("urdfkin's questions are missing", where=str(here), remedy="install urdfkin again")
+    raise SourceError(
+        "urdfkin's page questions.md is missing", where=str(here), remedy="install urdfkin again"
+    )
 
 
 @cache
 def example_robots_dir() -> Path:
-    """`share/example-robot-data/robots`, found without importing anything of it.
+    """Return the folder `share/example-robot-data/robots`, without importing that package.
 
     Raises:
         SourceError: example-robot-data is not installed.
     """
-    tried = list(_example_candidates())
-    for folder in tried:
+    candidates = list(_example_candidates())
+    for folder in candidates:
         if folder.is_dir():
             return folder
     raise SourceError(
         "example-robot-data is not installed",
-        found="no folder " + " or ".join(str(folder) for folder in tried),
+        found="no folder " + " or ".join(str(folder) for folder in candidates),
         remedy="pip install example-robot-data",
     )
 

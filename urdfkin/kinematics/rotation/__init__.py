@@ -1,6 +1,6 @@
 """Rotations of rigid bodies and the rates of their representations.
 
-Section 7.2 of the text, equations 7.11 to 7.57. Every function takes any leading batch shape.
+Section 7.2 of the textbook, equations 7.11 to 7.57. Every function accepts any leading batch shape.
 """
 
 from urdfkin.kinematics.rotation.axis_angle import (

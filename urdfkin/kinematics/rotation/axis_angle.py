@@ -1,6 +1,6 @@
-"""Rotation by an angle about an axis, and the axis and angle of a rotation.
+"""Rotations about an axis by an angle, and their inverse: the axis and the angle of a rotation.
 
-Section 7.2.1, equations 7.18 to 7.34. A *rotation vector* is the unit axis times the angle.
+Section 7.2.1 of the textbook, equations 7.18 to 7.34. A *rotation vector* is the unit axis times the angle.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from urdfkin.kinematics.rotation.quaternion import quaternion_of
 
 
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
-    """R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi), Rodrigues' formula (7.28).
+    """Return R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi), Rodrigues' formula (7.28).
 
     Args:
         axis: (..., 3) unit axis k.
@@ -24,7 +24,7 @@ def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
         (..., 3, 3) rotation.
 
     Raises:
-        InputError: a shape, a value that is not finite, or an axis that is not of unit length.
+        InputError: a wrong shape, a value that is not finite, or an axis that is not a unit vector.
 
     Example:
         >>> rotation_about([0.0, 0.0, 1.0], np.pi / 2).round(15) + 0.0
@@ -41,7 +41,7 @@ def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
 
 
 def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
-    """dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; term by term in 7.29).
+    """Return dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; term by term in 7.29).
 
     Args:
         axis: (..., 3) unit axis k.
@@ -51,13 +51,13 @@ def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
         (..., 3, 3), 1/rad.
 
     Raises:
-        InputError: as `rotation_about`.
+        InputError: as for `rotation_about`.
     """
     return skew(axis) @ rotation_about(axis, angle)
 
 
 def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
-    """The angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34).
+    """Return the angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34).
 
     Args:
         axis: (..., 3) unit axis k.
@@ -67,14 +67,14 @@ def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
         (..., 3) rad/s, in the frame of `axis`.
 
     Raises:
-        InputError: a shape, or an axis that is not of unit length.
+        InputError: a wrong shape, or an axis that is not a unit vector.
     """
     w: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(axis, "axis")
     return w
 
 
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
-    """phi-dot k x p: the velocity of the tip of p, which turns about k (7.21).
+    """Return phi-dot k x p, the velocity of the tip of a vector p that turns about k (7.21).
 
     Args:
         axis: (..., 3) unit axis k.
@@ -85,13 +85,13 @@ def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatAr
         (..., 3) velocity in m/s, in the frame of the arguments.
 
     Raises:
-        InputError: a shape, or an axis that is not of unit length.
+        InputError: a wrong shape, or an axis that is not a unit vector.
     """
     return np.cross(angular_velocity_about(axis, rate), vectors(p, "p"))
 
 
 def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Split p = k (k . p) + r: the part of p along the axis and the radial part r (7.18).
+    """Split p = k (k . p) + r into the part along the axis and the radial part r (7.18).
 
     Args:
         axis: (..., 3) unit axis k.
@@ -101,7 +101,7 @@ def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
         The part along the axis (..., 3), and r (..., 3), perpendicular to it.
 
     Raises:
-        InputError: a shape, or an axis that is not of unit length.
+        InputError: a wrong shape, or an axis that is not a unit vector.
     """
     axis, p = unit_vectors(axis, "axis"), vectors(p, "p")
     along = axis * (axis * p).sum(axis=-1, keepdims=True)
@@ -109,7 +109,7 @@ def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
-    """R_k(phi) of the rotation vector phi k, with no division at phi = 0.
+    """Return R_k(phi) of the rotation vector phi k, without a division by phi.
 
     Args:
         rotation_vector: (..., 3), radians.
@@ -118,7 +118,7 @@ def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
         (..., 3, 3) rotation.
 
     Raises:
-        InputError: a shape or a value that is not finite.
+        InputError: a wrong shape, or a value that is not finite.
     """
     vector = vectors(rotation_vector, "rotation_vector")
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
@@ -130,9 +130,9 @@ def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
 
 
 def log_rotation(R: ArrayLike) -> FloatArray:
-    """The rotation vector phi k of a rotation, phi in [0, pi]; accurate at both ends.
+    """Return the rotation vector phi k of a rotation, with phi in [0, pi]; accurate at both ends.
 
-    At phi = pi both k and -k are right; which of them comes back is then no information.
+    At phi = pi both k and -k are correct; the function returns either of them.
 
     Args:
         R: (..., 3, 3) rotation.
@@ -141,21 +141,21 @@ def log_rotation(R: ArrayLike) -> FloatArray:
         (..., 3), radians.
 
     Raises:
-        InputError: a shape, or `R` is no rotation.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    small = sine < 1e-150  # here the angle is twice the sine, and the quotient has no digits
+    small = sine < 1e-150  # the angle is twice the sine here, and the quotient would lose its digits
     log: FloatArray = np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
     return log
 
 
 def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """The unit axis k and the angle phi in [0, pi] of a rotation, the inverse of `rotation_about`.
+    """Return the unit axis k and the angle phi in [0, pi] of a rotation, the inverse of `rotation_about`.
 
-    A rotation by nothing has no axis; z is given for it.
+    The identity has no unique axis; the z axis is returned for it.
 
     Args:
         R: (..., 3, 3) rotation.
@@ -164,11 +164,11 @@ def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
         Axis (..., 3) and angle (...) in radians.
 
     Raises:
-        InputError: a shape, or `R` is no rotation.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3]
     sine = np.sqrt((vector * vector).sum(axis=-1))
-    still = (sine == 0.0)[..., np.newaxis]
-    axis = np.where(still, [0.0, 0.0, 1.0], vector / np.where(still, 1.0, sine[..., np.newaxis]))
+    identity = (sine == 0.0)[..., np.newaxis]
+    axis = np.where(identity, [0.0, 0.0, 1.0], vector / np.where(identity, 1.0, sine[..., np.newaxis]))
     return axis, 2.0 * np.arctan2(sine, scalar)

@@ -1,13 +1,8 @@
-"""Orientation by three angles, in all twelve sequences of axes, turning or fixed.
+"""Euler angles in all 24 sequences: rotations, rates and representational singularities.
 
-Section 7.2.4. Names are SciPy's: capitals turn with the body ("ZYZ" is the text's R = Rz Ry Rz), small
-letters stay fixed ("xyz" is the URDF's rpy: roll, pitch, yaw). Rates stand in `euler_rates`.
-
-
-Rates of Euler angles and the angular velocity, each from the other, and where that fails.
-
-Section 7.2.4, equations 7.51 to 7.56, for all 24 sequences of `euler`. Angular velocities are expressed in
-the fixed frame 0, as in the text.
+Section 7.2.4 of the textbook, equations 7.51 to 7.56. The names of the sequences are SciPy's. Capital letters
+are axes that turn with the body: "ZYZ" is the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is
+the URDF's rpy (roll, pitch, yaw). Angular velocities are expressed in the fixed frame 0.
 """
 
 from __future__ import annotations
@@ -23,15 +18,15 @@ from urdfkin.errors.validators import as_str
 from urdfkin.kinematics.inputs import FloatArray, rotations, vectors
 
 _AXES = "xyz"
-#: Letters a sequence may have: no axis follows itself.
+#: Triples of axes in which no axis follows itself.
 _TRIPLES = [a + b + c for a in _AXES for b in _AXES for c in _AXES if a != b != c]
-#: Every name, twelve turning and twelve fixed.
+#: Names of all sequences: twelve with turning axes and twelve with fixed axes.
 SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """Which axes a sequence turns about.
+    """The axes of an Euler sequence.
 
     Attributes:
         name: SciPy's name.
@@ -39,8 +34,8 @@ class Sequence:
         second: Index of the second.
         third: Index of the third, equal to the first in a proper Euler sequence.
         other: The index that is neither the first nor the second.
-        sign: +1 when (first, second, other) is a right-handed row, else -1.
-        fixed: Whether the axes stay fixed; the angles then stand in the reverse order.
+        sign: +1 if (first, second, other) is right-handed, else -1.
+        fixed: Whether the axes are fixed; the angles are then in reverse order.
     """
 
     name: str
@@ -53,22 +48,22 @@ class Sequence:
 
     @property
     def proper(self) -> bool:
-        """Whether the first and third axes are the same, as in ZYZ."""
+        """Whether the first and the third axis are equal, as in ZYZ."""
         return self.first == self.third
 
     def turning(self, values: FloatArray) -> FloatArray:
-        """Angles or rates in the order of the turning axes; the same call puts them back."""
+        """Return angles or rates in the order of the turning axes; a second call restores the order."""
         return values[..., ::-1] if self.fixed else values
 
 
 def sequence(name: str) -> Sequence:
-    """The sequence of this name.
+    """Return the sequence of a name.
 
     Args:
-        name: Three letters as SciPy writes them: "ZYZ" turning with the body, "xyz" fixed.
+        name: Three letters as in SciPy: "ZYZ" for axes that turn with the body, "xyz" for fixed axes.
 
     Raises:
-        UnknownNameError: not one of the 24 names.
+        UnknownNameError: the name is not one of the 24.
     """
     if as_str(name, "an Euler sequence") not in SEQUENCES:
         raise UnknownNameError("Euler sequence", name, SEQUENCES)
@@ -86,7 +81,7 @@ def _sequence(name: str) -> Sequence:
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
-    """Rx, Ry or Rz (axis 0, 1, 2) by `angle` (...) in radians, with exact zeros and ones: (..., 3, 3)."""
+    """Return Rx, Ry or Rz (axis 0, 1, 2) of `angle` (...) in radians, (..., 3, 3) with exact 0 and 1."""
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -98,18 +93,18 @@ def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
 
 
 def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
-    """The rotation of three angles: R = Rz(phi) Ry(theta) Rz(psi) for "ZYZ".
+    """Return the rotation of three angles, for example R = Rz(phi) Ry(theta) Rz(psi) for "ZYZ".
 
     Args:
-        name: Sequence, SciPy's name.
+        name: SciPy's name of the sequence.
         angles: (..., 3) radians, in the order of the name.
 
     Returns:
         (..., 3, 3) rotation.
 
     Raises:
-        UnknownNameError: no such sequence.
-        InputError: a shape or a value that is not finite.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
     """
     axes = sequence(name)
     turns = axes.turning(vectors(angles, "angles"))
@@ -122,25 +117,25 @@ def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def euler_of(name: str, R: ArrayLike) -> FloatArray:
-    """Angles of a rotation: `rotation_from_euler` of them gives the rotation back to rounding, everywhere.
+    """Return the angles of a rotation, the inverse of `rotation_from_euler` up to rounding.
 
-    The middle angle lies in [0, pi] for a proper sequence, in [-pi/2, pi/2] for the others. At the
-    representational singularity the two outer angles are not determined; the third is then measured
-    against whatever the first came out to be, so that the product is right all the same.
+    The middle angle is in [0, pi] for a proper sequence and in [-pi/2, pi/2] for the others. At the
+    representational singularity only a combination of the two outer angles is determined. The third angle is
+    then computed from the first, so the product of the rotations is correct there too.
 
     Args:
-        name: Sequence, SciPy's name.
+        name: SciPy's name of the sequence.
         R: (..., 3, 3) rotation.
 
     Returns:
         (..., 3) radians, in the order of the name.
 
     Raises:
-        UnknownNameError: no such sequence.
-        InputError: a shape, or `R` is no rotation.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     axes = sequence(name)
-    R = rotations(R, "R") + 0.0  # no -0, whose arctan2 is pi
+    R = rotations(R, "R") + 0.0  # turns -0 into 0; arctan2(0, -0) is pi
     i, j, m, sign = axes.first, axes.second, axes.other, axes.sign
     if axes.proper:
         first = np.arctan2(R[..., j, i], -sign * R[..., m, i] + 0.0)
@@ -148,62 +143,62 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # The first turn undone leaves R_second R_third, whose second row is the third turn alone.
+    # R_first^T R = R_second R_third; its row of the second axis depends on the third angle only.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # R_third turns the plane of the second axis and one more: the other axis, or the first.
+    # R_third turns the plane of the second axis and a further one: the other axis, or the first.
     rest, sense = (m, sign) if axes.proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.turning(np.stack((first, second, third), axis=-1)).copy()
 
 
 def rotation_from_rpy(rpy: ArrayLike) -> FloatArray:
-    """R = Rz(yaw) Ry(pitch) Rx(roll), the URDF's `rpy`.
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll), the rotation of the URDF's `rpy`.
 
     Args:
         rpy: (..., 3) roll, pitch, yaw in radians.
 
     Returns:
-        (..., 3, 3) rotation; zero angles give exactly the identity.
+        (..., 3, 3) rotation; exactly the identity for zero angles.
 
     Raises:
-        InputError: a shape or a value that is not finite.
+        InputError: a wrong shape, or a value that is not finite.
     """
     return rotation_from_euler("xyz", rpy)
 
 
 def rpy_of(R: ArrayLike) -> FloatArray:
-    """Roll, pitch, yaw of a rotation, to rounding also where the pitch is +-pi/2 (see `euler_of`).
+    """Return roll, pitch and yaw of a rotation, accurate also at a pitch of +-pi/2 (see `euler_of`).
 
     Args:
         R: (..., 3, 3) rotation.
 
     Returns:
-        (..., 3) radians; yaw is 0 where R[0, 0] = R[1, 0] = 0 exactly.
+        (..., 3) radians; the yaw is 0 if R[0, 0] = R[1, 0] = 0 exactly.
 
     Raises:
-        InputError: a shape, or `R` is no rotation.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     return euler_of("xyz", R)
 
 
-#: Nearer to the singularity than this (radians), rates have lost too many digits.
+#: Least distance from the singularity, radians. Nearer to it the rates have lost too many digits.
 NEAREST = 1e-9
 
 
 def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
-    """Omega, with w = Omega (phi-dot, theta-dot, psi-dot); its columns are the three axes (7.51 to 7.55).
+    """Return Omega with w = Omega (phi-dot, theta-dot, psi-dot); its columns are the axes (7.51 to 7.55).
 
     Args:
-        name: Sequence, SciPy's name; the text's is "ZYZ".
+        name: SciPy's name of the sequence; the textbook's is "ZYZ".
         angles: (..., 3) radians, in the order of the name.
 
     Returns:
-        (..., 3, 3), without unit, expressed in frame 0.
+        (..., 3, 3), dimensionless, expressed in frame 0.
 
     Raises:
-        UnknownNameError: no such sequence.
-        InputError: a shape or a value that is not finite.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
 
     Example:
         >>> euler_rate_matrix("ZYZ", [0.0, np.pi / 2, 0.3]).round(15) + 0.0
@@ -221,69 +216,70 @@ def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: ArrayLike) -> FloatArray:
-    """The angular velocity w = Omega (phi-dot, theta-dot, psi-dot) (7.54).
+    """Return the angular velocity w = Omega (phi-dot, theta-dot, psi-dot) (7.54).
 
     Args:
-        name: Sequence, SciPy's name.
+        name: SciPy's name of the sequence.
         angles: (..., 3) radians, in the order of the name.
-        rates: (..., 3) their rates, rad/s.
+        rates: (..., 3) rates of the angles, rad/s.
 
     Returns:
         (..., 3) angular velocity, rad/s, expressed in frame 0.
 
     Raises:
-        UnknownNameError: no such sequence.
-        InputError: a shape or a value that is not finite.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
     """
     product = euler_rate_matrix(name, angles) @ vectors(rates, "rates")[..., np.newaxis]
     return product[..., 0]
 
 
 def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Rates of the angles of a body that turns with w: Omega^-1 w, solved in closed form (7.56).
+    """Return the angle rates Omega^-1 w of a body with angular velocity w, in closed form (7.56).
 
     Args:
-        name: Sequence, SciPy's name.
+        name: SciPy's name of the sequence.
         angles: (..., 3) radians, in the order of the name.
         w: (..., 3) angular velocity, rad/s, expressed in frame 0.
-        nearest: How near the singularity may be, radians.
+        nearest: Least allowed distance from the singularity, radians.
 
     Returns:
         (..., 3) rates, rad/s, in the order of the name.
 
     Raises:
-        RepresentationSingularityError: a sample is nearer to the singularity than `nearest`, or at it.
-        UnknownNameError: no such sequence.
-        InputError: a shape or a value that is not finite.
+        RepresentationSingularityError: the distance of a sample from the singularity is `nearest` or less.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
     """
     return (euler_rate_inverse(name, angles, nearest) @ vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Omega^-1, from the geometry of the axes rather than by elimination (7.56).
+    """Return Omega^-1, computed from the geometry of the axes instead of elimination (7.56).
 
-    In the frame after the first turn two of the axes are coordinate axes and the third lies in a
-    coordinate plane, so that each rate can be read off in turn.
+    In the frame after the first turn, two of the axes are coordinate axes and the third is in a coordinate
+    plane. Each rate then follows from one component of w.
 
     Args:
-        name: Sequence, SciPy's name.
+        name: SciPy's name of the sequence.
         angles: (..., 3) radians, in the order of the name.
-        nearest: How near the singularity may be, radians.
+        nearest: Least allowed distance from the singularity, radians.
 
     Returns:
         (..., 3, 3).
 
     Raises:
-        RepresentationSingularityError: a sample is nearer to the singularity than `nearest`, or at it.
-        UnknownNameError: no such sequence.
-        InputError: a shape or a value that is not finite.
+        RepresentationSingularityError: the distance of a sample from the singularity is `nearest` or less.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
     """
     angles = vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)
     axes = sequence(name)
     turns = axes.turning(angles)
     cosine, sine = np.cos(turns[..., 1]), np.sin(turns[..., 1])
-    # The third axis in that frame: `along` the first axis, and `across` it along the remaining one.
+    # Components of the third axis in that frame: `along` the first axis, and `across` along the remaining
+    # one.
     if axes.proper:
         along, across = cosine, -axes.sign * sine
     else:
@@ -298,21 +294,21 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
 
 
 def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
-    """How far the middle angle is from the representational singularity.
+    """Return the distance of the middle angle from the representational singularity (gimbal lock).
 
-    A proper Euler sequence such as ZYZ is singular where the middle angle is a multiple of pi (the text
-    names only 0), the others where it is an odd multiple of pi/2: gimbal lock.
+    A proper Euler sequence such as ZYZ is singular if the middle angle is a multiple of pi (the textbook
+    names only 0). The other sequences are singular if it is an odd multiple of pi/2.
 
     Args:
-        name: Sequence, SciPy's name.
+        name: SciPy's name of the sequence.
         angles: (..., 3) radians, in the order of the name.
 
     Returns:
         (...) radians in [0, pi/2].
 
     Raises:
-        UnknownNameError: no such sequence.
-        InputError: a shape or a value that is not finite.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
     """
     middle = vectors(angles, "angles")[..., 1]
     sine, cosine = np.abs(np.sin(middle)), np.abs(np.cos(middle))
@@ -321,22 +317,22 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
-    """The condition number of Omega: by how much Omega^-1 can enlarge a relative error of w.
+    """Return the condition number of Omega: the largest factor by which a relative error of w grows.
 
-    The middle axis is perpendicular to the other two, which are d apart: the singular values are
-    1 and sqrt(1 +- cos d), and their ratio is cot(d / 2).
+    The middle axis is perpendicular to the two others. If d is the angle between these, the singular values
+    are 1 and sqrt(1 +- cos d), and the condition number is cot(d / 2).
 
     Args:
-        name: Sequence, SciPy's name.
+        name: SciPy's name of the sequence.
         angles: (..., 3) radians, in the order of the name.
 
     Returns:
-        (...), 1 where the axes are perpendicular.
+        (...); 1 if the axes are perpendicular.
 
     Raises:
-        RepresentationSingularityError: a sample is at the singularity; the number does not exist.
-        UnknownNameError: no such sequence.
-        InputError: a shape or a value that is not finite.
+        RepresentationSingularityError: a sample is at the singularity, where the number does not exist.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
     """
     angles = vectors(angles, "angles")
     _refuse_singular(name, angles, 0.0)

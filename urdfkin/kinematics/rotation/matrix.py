@@ -1,24 +1,21 @@
-"""The cross product as a matrix, and the vector back out of the matrix.
+"""Rotation matrices: skew-symmetric matrices, nearest rotations, rates and sums of angular velocities.
 
-Section 7.2, equation 7.16 and the text's appendix A; 7.31, 7.46.
+| Functions | Section and equations of the textbook |
+|---|---|
+| `skew`, `unskew`, `rotate_skew` | 7.2: 7.16, 7.31, 7.46; appendix A |
+| `rotation_rate`, `angular_velocity_of`, `turning_vector_rate` | 7.2.2: 7.35 to 7.42 |
+| `add_angular_velocities` | 7.2.3: 7.43 to 7.50 |
+| `axis_aligning` | 7.4 |
 
+`w_0_1` is the angular velocity of frame 1 relative to frame 0.
 
-The rotation that a matrix means which is one only to nine digits: the nearest.
+A user's matrix often has only a few printed digits, so its columns are orthogonal to these digits only.
+Methods that make a rotation of it (by a quaternion, by angles, column by column) differ by as much.
+`nearest_rotation` and `polar_factor` return the rotation that is nearest in the Frobenius norm. It depends on
+the matrix alone: it is the orthogonal factor U of the polar decomposition M = U H.
 
-A user's matrix has as many digits as were printed. Its columns are then orthogonal to those digits only, and
-ways to make a rotation of it (through a quaternion, through angles, column by column) differ by as much. One
-of them is defined by the matrix alone: the rotation nearest to it in the Frobenius norm, the orthogonal
-factor U of its polar decomposition M = U H.
-
-
-A rotation whose z column is a given axis: a joint's frame in the text's sense.
-
-Section 7.4: joint i turns about z_{i-1}; a URDF joint turns about any axis of its frame.
-
-
-The rate of a rotation matrix and the angular velocity, each from the other; sums of angular velocities.
-
-Sections 7.2.2 and 7.2.3, equations 7.35 to 7.50. `w_0_1` turns frame 1 relative to frame 0.
+The textbook's joint i turns about the axis z_{i-1} of a frame. A URDF joint turns about any axis of its
+frame. `axis_aligning` returns the rotation between the two frames.
 """
 
 from __future__ import annotations
@@ -31,7 +28,7 @@ from urdfkin.kinematics.inputs import FloatArray, matrices, rotations, unit_vect
 
 
 def skew(w: ArrayLike) -> FloatArray:
-    """S(w), the skew-symmetric matrix with S(w) p = w x p (7.16).
+    """Return S(w), the skew-symmetric matrix with S(w) p = w x p (7.16).
 
     Args:
         w: (..., 3), any unit, any frame.
@@ -56,13 +53,13 @@ def skew(w: ArrayLike) -> FloatArray:
 
 
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """The vector w of a skew-symmetric matrix S = S(w), the inverse of `skew`.
+    """Return the vector w of a skew-symmetric matrix S = S(w), the inverse of `skew`.
 
-    Rounding leaves a symmetric part in a computed S; the mean of each pair of entries removes it.
+    A computed S has a small symmetric part from rounding. The mean of each pair of entries removes it.
 
     Args:
         S: (..., 3, 3).
-        tolerance: How large the symmetric part may be, as a part of the largest entry of S.
+        tolerance: Largest allowed symmetric part, relative to the largest entry of S.
 
     Returns:
         (..., 3), in the unit and frame of `S`.
@@ -86,41 +83,41 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
 
 
 def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
-    """The similarity R S(w) R^T = S(R w): a skew matrix expressed in another frame (7.46).
+    """Return R S(w) R^T = S(R w), a skew-symmetric matrix expressed in another frame (7.46).
 
     Args:
         R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
-        S_1: (..., 3, 3) skew-symmetric, S of a vector in frame 1.
+        S_1: (..., 3, 3) skew-symmetric matrix of a vector in frame 1.
 
     Returns:
-        (..., 3, 3) S of the same vector in frame 0.
+        (..., 3, 3) skew-symmetric matrix of the same vector in frame 0.
 
     Raises:
-        InputError: a shape, or `R_0_1` is no rotation.
+        InputError: a wrong shape, or `R_0_1` is not a rotation.
     """
     R_0_1 = rotations(R_0_1, "R_0_1")
     return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: A matrix whose entries are no farther than this from a rotation's is one to rounding, and stays as it is.
+#: A matrix with entries within this distance of a rotation is a rotation up to rounding and is not changed.
 ROUNDED = 1e-15
 
 
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
-    """The nearest rotation, to rounding.
+    """Return the nearest rotation, up to rounding.
 
-    One step of Newton's (Bjorck and Bowie's) method, M - M (M^T M - I)/2. With M = U (I + E) it leaves
-    U (I - 3/2 E^2); here |E| is 3e-9 at most, which leaves 1.4e-17, an eighth of a rounding.
+    The method is one Newton step (Bjorck and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is
+    U (I - 3/2 E^2). Here |E| is 3e-9 at most, so the error is 1.4e-17, an eighth of a rounding.
 
     Args:
         M: (..., 3, 3), a rotation to nine decimals.
-        name: How to call it in the message.
+        name: Name of the argument, for messages.
 
     Returns:
         (..., 3, 3).
 
     Raises:
-        InputError: a shape, or no rotation.
+        InputError: a wrong shape, or not a rotation.
     """
     M = rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
@@ -129,7 +126,7 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
-    """The same for matrices that are farther from a rotation: as printed with a few digits, or measured.
+    """Return the nearest rotation of a matrix that is far from one, for example printed with few digits.
 
     Args:
         M: (3, 3), of positive determinant.
@@ -143,17 +140,17 @@ def polar_factor(M: FloatArray) -> FloatArray:
 
 
 def axis_aligning(axis: ArrayLike) -> FloatArray:
-    """A rotation whose third column is `axis`; for the coordinate axes its entries are exactly 0 and +-1.
+    """Return a rotation with `axis` as its third column.
 
-    It is the shortest turn from z to the axis when the axis does not point down, and half a turn about x
-    before that when it does, so that no axis is near a singular case (Duff and others, "Building an
-    Orthonormal Basis, Revisited", 2017).
+    If the axis does not point down, it is the shortest turn from z to the axis. If it does, half a turn about
+    x precedes that turn. No axis is therefore near a singular case (Duff and others, "Building an Orthonormal
+    Basis, Revisited", 2017). For a coordinate axis the entries are exactly 0 and +-1.
 
     Args:
         axis: (..., 3) unit axis.
 
     Returns:
-        (..., 3, 3) rotation; z gives the identity.
+        (..., 3, 3) rotation; the identity for the axis z.
 
     Raises:
         InputError: a shape, or an axis that is not of unit length.
@@ -171,12 +168,12 @@ def axis_aligning(axis: ArrayLike) -> FloatArray:
     first = (1.0 + sign * x * x * scale, sign * x * y * scale, -sign * x)
     second = (x * y * scale, sign + y * y * scale, -y)
     columns = [np.stack(column, axis=-1) for column in (first, second)]
-    # Adding zero turns -0 into 0: a matrix one can read.
+    # Adding zero turns -0 into 0, which is easier to read.
     return np.stack([*columns, axis], axis=-1) + 0.0
 
 
 def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
-    """R-dot = S(w) R (7.38, 7.42).
+    """Return R-dot = S(w) R (7.38, 7.42).
 
     Args:
         R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
@@ -186,24 +183,24 @@ def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
         (..., 3, 3) time derivative of `R_0_1`, 1/s.
 
     Raises:
-        InputError: a shape, or `R_0_1` is no rotation.
+        InputError: a wrong shape, or `R_0_1` is not a rotation.
     """
     return skew(vectors(w_0_1, "w_0_1")) @ rotations(R_0_1, "R_0_1")
 
 
 def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """The w of S(w) = R-dot R^T (7.38 read backwards; 7.35 to 7.37 say that a w exists).
+    """Return w with S(w) = R-dot R^T, from 7.38; by 7.35 to 7.37 such a w exists.
 
     Args:
         R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
-        R_rate: (..., 3, 3) its time derivative, 1/s.
-        tolerance: How far R-dot R^T may be from skew-symmetric, relative to its largest entry.
+        R_rate: (..., 3, 3) time derivative of `R_0_1`, 1/s.
+        tolerance: Largest allowed symmetric part of R-dot R^T, relative to its largest entry.
 
     Returns:
         (..., 3) angular velocity of frame 1, rad/s, expressed in frame 0.
 
     Raises:
-        InputError: a shape, `R_0_1` is no rotation, or `R_rate` is no rate of one.
+        InputError: a wrong shape, `R_0_1` is not a rotation, or `R_rate` is not the rate of a rotation.
 
     Example:
         >>> R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -215,23 +212,23 @@ def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 
 
 
 def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
-    """W x p: the rate of a vector that is fixed in a turning frame (7.39 to 7.41).
+    """Return w x p, the rate of a vector that is fixed in a turning frame (7.39 to 7.41).
 
     Args:
         w_0_1: (..., 3) angular velocity of the frame, rad/s, expressed in frame 0.
-        p_0: (..., 3) the vector, metres, expressed in frame 0.
+        p_0: (..., 3) vector, metres, expressed in frame 0.
 
     Returns:
-        (..., 3) its rate in frame 0, m/s.
+        (..., 3) rate of the vector in frame 0, m/s.
 
     Raises:
-        InputError: a shape or a value that is not finite.
+        InputError: a wrong shape, or a value that is not finite.
     """
     return np.cross(vectors(w_0_1, "w_0_1"), vectors(p_0, "p_0"))
 
 
 def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
-    """w_0n, the sum of a row of relative angular velocities, each turned into frame 0 (7.43 to 7.50).
+    """Return w_0n, the sum of relative angular velocities, each expressed in frame 0 (7.43 to 7.50).
 
     Args:
         Rs: (..., n, 3, 3); row i is the orientation of frame i + 1 in frame i.
@@ -242,12 +239,12 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
         (..., 3) angular velocity of frame n relative to frame 0, rad/s, expressed in frame 0.
 
     Raises:
-        InputError: a shape, different numbers of frames, or a matrix that is no rotation.
+        InputError: a wrong shape, different numbers of frames, or a matrix that is not a rotation.
     """
     Rs, ws = rotations(Rs, "Rs"), vectors(ws, "ws")
     if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:
         raise InputError(
-            "Rs (..., n, 3, 3) and ws (..., n, 3) must speak of the same frames",
+            "Rs (..., n, 3, 3) and ws (..., n, 3) must have the same n",
             found=f"{Rs.shape} and {ws.shape}",
         )
     batch = np.broadcast_shapes(Rs.shape[:-3], ws.shape[:-2])

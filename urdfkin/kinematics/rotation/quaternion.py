@@ -1,18 +1,13 @@
-"""Unit quaternions (qx, qy, qz, qw), scalar last as in a configuration; the text's q0 is qw.
+"""Unit quaternions, their rates, and the integration of an angular velocity.
 
-Section 7.2.5. A quaternion and its negative are the same rotation. Rates stand in `quaternion_rates`.
+Section 7.2.5 of the textbook, equation 7.57. A quaternion is (qx, qy, qz, qw), with the scalar last as in a
+configuration; qw is the textbook's q0. A quaternion and its negative are the same rotation.
 
+The angular velocity is expressed in the fixed frame 0, as in the textbook (`frame="fixed"`), or in the
+frame of the turning body (`frame="body"`). Quaternion rates have no singularity.
 
-Rates of a unit quaternion and the angular velocity, each from the other.
-
-Section 7.2.5, equation 7.57. Here the angular velocity may be expressed in the fixed frame 0, as the text
-does, or in the turning body's frame: `frame="fixed"` or `frame="body"`. There is no singularity.
-
-
-Orientation from an angular velocity over time, by quaternion rates with the norm kept.
-
-Section 7.2.5: "one converts from w to q-dot, then integrates". The integral of w itself is no orientation
-(example 7.3).
+`integrate_orientation` integrates quaternion rates and normalises after each step. The integral of the
+angular velocity itself is not an orientation (example 7.3).
 """
 
 from __future__ import annotations
@@ -28,22 +23,22 @@ from urdfkin.errors import InputError
 from urdfkin.kinematics.inputs import FloatArray, rotations, scalars, vectors
 from urdfkin.kinematics.rotation.matrix import skew
 
-#: A quaternion this far from unit length is refused: it was not meant as a rotation.
+#: Largest accepted deviation of a quaternion's norm from 1.
 NORM_TOLERANCE = 1e-6
 
 
 def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
-    """`value` as (..., 4) quaternions of unit length, normalised to rounding.
+    """Return `value` as (..., 4) quaternions, normalised to unit length up to rounding.
 
     Args:
         value: (..., 4), scalar last.
-        name: How to call it in the message.
+        name: Name of the argument, for messages.
 
     Returns:
         (..., 4) of unit length.
 
     Raises:
-        InputError: a shape, or a norm off one by more than 1e-6.
+        InputError: a wrong shape, or a norm that differs from 1 by more than 1e-6.
     """
     quat = vectors(value, name, 4)
     norms = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
@@ -55,7 +50,7 @@ def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
 
 
 def rotation_of(quat: ArrayLike) -> FloatArray:
-    """R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q), the rotation of a unit quaternion.
+    """Return R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q), the rotation of a unit quaternion.
 
     Args:
         quat: (..., 4), scalar last.
@@ -64,7 +59,7 @@ def rotation_of(quat: ArrayLike) -> FloatArray:
         (..., 3, 3) rotation.
 
     Raises:
-        InputError: a shape, or not of unit length.
+        InputError: a wrong shape, or a quaternion that is not of unit length.
     """
     x, y, z, w = np.moveaxis(unit_quaternions(quat), -1, 0)
     rows = (
@@ -76,7 +71,9 @@ def rotation_of(quat: ArrayLike) -> FloatArray:
 
 
 def quaternion_of(R: ArrayLike) -> FloatArray:
-    """The unit quaternion of a rotation, with qw >= 0 (Shepperd's choice of the largest component).
+    """Return the unit quaternion of a rotation, with qw >= 0.
+
+    Shepperd's method divides by the largest component, which avoids cancellation.
 
     Args:
         R: (..., 3, 3) rotation.
@@ -85,10 +82,10 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
         (..., 4), scalar last.
 
     Raises:
-        InputError: a shape, or `R` is no rotation.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     R = rotations(R, "R")
-    # K = 4 q q^T is linear in R; its row with the largest diagonal gives q without cancellation.
+    # K = 4 q q^T is linear in R. Its row with the largest diagonal entry gives q without cancellation.
     K = np.empty((*R.shape[:-2], 4, 4))
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
     K[..., 3, 3] = 1.0 + trace
@@ -104,7 +101,7 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
 
 
 def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
-    """The product of two quaternions, so that R(left right) = R(left) R(right).
+    """Return the product of two quaternions, with R(left right) = R(left) R(right).
 
     Args:
         left: (..., 4), scalar last; any length.
@@ -114,7 +111,7 @@ def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
         (..., 4), scalar last.
 
     Raises:
-        InputError: a shape.
+        InputError: a wrong shape.
     """
     left, right = vectors(left, "left", 4), vectors(right, "right", 4)
     p, p0, q, q0 = left[..., :3], left[..., 3:], right[..., :3], right[..., 3:]
@@ -123,7 +120,7 @@ def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
 
 
 def conjugate(quat: ArrayLike) -> FloatArray:
-    """(-q, q0): the inverse rotation of a unit quaternion.
+    """Return the conjugate (-q, q0), the inverse rotation of a unit quaternion.
 
     Args:
         quat: (..., 4), scalar last.
@@ -132,7 +129,7 @@ def conjugate(quat: ArrayLike) -> FloatArray:
         (..., 4), scalar last.
 
     Raises:
-        InputError: a shape.
+        InputError: a wrong shape.
     """
     conjugated: FloatArray = vectors(quat, "quat", 4) * np.array([-1.0, -1.0, -1.0, 1.0])
     return conjugated
@@ -142,20 +139,21 @@ ExpressedIn = Literal["fixed", "body"]
 
 
 def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """E, with (q-dot, q0-dot) = E w, that is 1/2 [q0 I - S(q); -q^T] for w in the fixed frame (7.57).
+    """Return the matrix E with (q-dot, q0-dot) = E w (7.57).
 
-    In the body's frame the sign of S(q) changes. The columns are perpendicular and 1/2 long, and
-    perpendicular to the quaternion, so that its length stays.
+    For w in the fixed frame, E = 1/2 [q0 I - S(q); -q^T]. For w in the body's frame, the sign of S(q)
+    changes. The columns of E have length 1/2. They are perpendicular to each other and to the quaternion, so
+    the quaternion's length is constant.
 
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
-        frame: Where `w` is expressed.
+        frame: Frame of `w`: "fixed" or "body".
 
     Returns:
-        (..., 4, 3), without unit.
+        (..., 4, 3), dimensionless.
 
     Raises:
-        InputError: a shape, not of unit length, or an unknown `frame`.
+        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
     """
     if frame not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
@@ -168,18 +166,18 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
 
 
 def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """The rate of the quaternion of a body that turns with w (7.57).
+    """Return the rate of the quaternion of a body with angular velocity w (7.57).
 
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
         w: (..., 3) angular velocity of the body, rad/s.
-        frame: Where `w` is expressed: the fixed frame 0 or the body's own.
+        frame: Frame of `w`: "fixed" is frame 0, "body" the body's own.
 
     Returns:
         (..., 4) rates, 1/s, scalar last.
 
     Raises:
-        InputError: a shape, not of unit length, or an unknown `frame`.
+        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
 
     Example:
         >>> quaternion_rates([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0]) + 0.0
@@ -191,20 +189,21 @@ def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed"
 def angular_velocity_from_quaternion_rates(
     quat: ArrayLike, rates: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """The angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
+    """Return the angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
 
-    A part of the rates along the quaternion would change its length, is no motion, and does not count.
+    A part of the rates along the quaternion would change its length only. It is not a rotation and is
+    ignored.
 
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
-        rates: (..., 4) its rates, 1/s, scalar last.
-        frame: Where the result is expressed: the fixed frame 0 or the body's own.
+        rates: (..., 4) rates of `quat`, 1/s, scalar last.
+        frame: Frame of the result: "fixed" is frame 0, "body" the body's own.
 
     Returns:
         (..., 3) angular velocity of the body, rad/s.
 
     Raises:
-        InputError: a shape, not of unit length, or an unknown `frame`.
+        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
     """
     E = quaternion_rate_matrix(quat, frame)
     w: FloatArray = 4.0 * (E.swapaxes(-1, -2) @ vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
@@ -214,27 +213,30 @@ def angular_velocity_from_quaternion_rates(
 def integrate_orientation(
     w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """Quaternions at `times` of a body that turns with w(t): Runge-Kutta's fourth order on 7.57.
+    """Integrate an angular velocity w(t) to quaternions, by the fourth-order Runge-Kutta method on 7.57.
 
-    The exact flow keeps the quaternion's length; each step's rounding and truncation do not, so the
-    result of each step is put back to length one. Halving the steps divides the error by 16.
+    The exact solution has constant length. Rounding and truncation change the length, so each step is
+    normalised. Halving the step divides the error by 16.
 
     Args:
-        w: Angular velocity at a time in s: (..., 3) rad/s. Within a step it must be smooth: put a time
-            where it jumps. At the ends of a step it is asked for just inside.
+        w: Function of the time in s that returns the angular velocity, (..., 3) rad/s. It must be smooth
+            within a step, so add a time to `times` at each jump. At the two ends of a step, w is evaluated
+            just inside the step.
         quat: (..., 4) orientation at `times[0]`, unit quaternion, scalar last.
-        times: (n,) increasing, in s; one step from each to the next.
-        frame: Where w is expressed: the fixed frame 0 or the body's own.
+        times: (n,) increasing times in s; there is one step between each two of them.
+        frame: Frame of w: "fixed" is frame 0, "body" the body's own.
 
     Returns:
         (n, ..., 4) unit quaternions, scalar last.
 
     Raises:
-        InputError: a shape, or times that do not increase.
+        InputError: a wrong shape, or times that do not increase.
     """
     times = scalars(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
-        raise InputError("times must be a row of increasing numbers", found=str(times.shape))
+        raise InputError(
+            "times must be a one-dimensional array of increasing numbers", found=str(times.shape)
+        )
     quats = [unit_quaternions(quat)]
     for start, end in pairwise(times.tolist()):
         quats.append(_step(w, quats[-1], start, end, frame))
@@ -244,7 +246,7 @@ def integrate_orientation(
 def _step(
     w: Callable[[float], ArrayLike], quat: FloatArray, start: float, end: float, frame: ExpressedIn
 ) -> FloatArray:
-    """One Runge-Kutta step, back at unit length."""
+    """Return the quaternion after one Runge-Kutta step, normalised."""
     step = end - start
     first, middle, last = (
         vectors(w(t), "w") for t in (np.nextafter(start, end), (start + end) / 2.0, np.nextafter(end, start))
@@ -259,7 +261,7 @@ def _step(
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
-    """7.57 is linear in the quaternion: between the ends of a step its length is not one, and need not be."""
+    """Return the rates of a quaternion of any length; 7.57 is linear in the quaternion."""
     length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates
