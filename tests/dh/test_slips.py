@@ -185,7 +185,7 @@ def test_a_table_without_convention_and_units_is_told_both(tmp_path: Path) -> No
 def test_a_table_that_fits_in_no_convention_is_refused_with_how_far_it_is_off(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "standard")
     with pytest.raises(
-        InputError, match=r"and neither fits: found off by .* mm as standard and .* as modified"
+        InputError, match=r"and neither fits: found tip errors .* mm as standard and .* as modified"
     ):
         run("ur3", *UR5[1:], "--compare", str(file))
     with pytest.raises(InputError, match="the path have different joints"):
