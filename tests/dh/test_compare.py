@@ -199,5 +199,5 @@ def test_a_length_whose_square_overflows_is_refused(size: float, cell: str, wher
 
 def test_a_path_whose_square_overflows_is_refused() -> None:
     table = dh_table(elbow(), "tip")
-    with pytest.raises(RangeError, match="squares of lengths"):
+    with pytest.raises(RangeError, match="square of this length"):
         compare(chain(arm(*[shift(0.1, 0, 1e155)] * 6, kinds="RRRRRR"), "tip"), table)

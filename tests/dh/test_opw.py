@@ -60,7 +60,7 @@ def test_the_parameters_of_any_arm_come_back(seed: int) -> None:
 def test_a_calibrated_arm_is_refused_with_its_distance_or_taken_for_one() -> None:
     lengths = dict(zip(NAMES, (0.1, -0.1, 0.0, 0.4, 0.5, 0.5, 0.1), strict=True))
     path = load(table(lengths, [0.0] * 6, [1] * 6, tilt=2e-3), verify=False).chain("tip", "base")
-    with pytest.raises(InputError, match=r"no ortho-parallel one.*off by [0-9.]+ mm and 0.00[0-9]+ rad"):
+    with pytest.raises(InputError, match=r"not ortho-parallel.*error of [0-9.]+ mm and 0.00[0-9]+ rad"):
         opw_of(path)
     found = opw_of(path, 0.02)
     assert found.lengths["c2"] == pytest.approx(0.5, abs=1e-3)
@@ -69,7 +69,7 @@ def test_a_calibrated_arm_is_refused_with_its_distance_or_taken_for_one() -> Non
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5", "panda"])
 def test_an_arm_of_another_kind_is_refused(name: str) -> None:
-    with pytest.raises(InputError, match=r"OPW arm has six|no ortho-parallel one"):
+    with pytest.raises(InputError, match=r"OPW arm must have six|not ortho-parallel"):
         opw_of(load(name, verify=False).chain())
 
 

@@ -116,7 +116,7 @@ def test_the_command_says_what_would_fit_and_still_exits_1(tmp_path: Path) -> No
     assert result.exit_code == 1
     assert "rad when read as standard, millimetres\n" in result.stdout
     file.write_text('convention = "standard"\n' + text)
-    with pytest.raises(InputError, match=r"more than a turn.*this fits to .* read as millimetres, degrees"):
+    with pytest.raises(InputError, match=r"more than one turn.*this fits to .* read as millimetres, degrees"):
         run(*arguments)
 
 
@@ -177,7 +177,7 @@ def test_a_table_that_names_no_convention_is_compared_in_the_one_that_fits(
 def test_a_table_without_convention_and_units_is_told_both(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "modified")
     file.write_text(file.read_text().replace('"-pi/2"', "-90").replace('"pi/2"', "90"))
-    with pytest.raises(InputError, match=r"more than a turn.*this fits to .* when read as degrees"):
+    with pytest.raises(InputError, match=r"more than one turn.*this fits to .* when read as degrees"):
         run(*UR5, "--compare", str(file))
 
 
@@ -185,7 +185,7 @@ def test_a_table_without_convention_and_units_is_told_both(tmp_path: Path) -> No
 def test_a_table_that_fits_in_no_convention_is_refused_with_how_far_it_is_off(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "standard")
     with pytest.raises(
-        InputError, match=r"and neither fits: found off by .* mm as standard and .* as modified"
+        InputError, match=r"and neither fits: found tip errors .* mm as standard and .* as modified"
     ):
         run("ur3", *UR5[1:], "--compare", str(file))
     with pytest.raises(InputError, match="the path have different joints"):
