@@ -1,4 +1,4 @@
-"""`urdfkin calibrate`: a robot's numbers from measured poses, or from another model, in its own text."""
+"""`urdfkin calibrate`: a robot's numbers from measured poses or from the factory, in its own text."""
 
 from __future__ import annotations
 
@@ -29,7 +29,6 @@ _FILE = click.Path(path_type=Path)
 @click.command(epilog="Example: urdfkin calibrate ur5 --tip tool0 --fit base,tool,origins")
 @robot_argument
 @click.option("--poses", type=_FILE, help="What was measured: CSV or .npz, see docs/calibration.md.")
-@click.option("--like", metavar="MODEL", help="Move as this robot or table does, and keep the own frames.")
 @click.option("--ur", type=_FILE, help="The YAML of a Universal Robots arm's factory calibration.")
 @click.option(
     "--order",
@@ -77,7 +76,7 @@ def command(
     """Which parameters of a path poses can tell, fitted to measured ones, and the URDF with them in it.
 
     Of the written URDF every byte but the numbers that moved is as it was; Pinocchio checks it at the
-    measured configurations. ROBOT may be a table's file: then its cells are fitted. Without --poses, --like
+    measured configurations. ROBOT may be a table's file: then its cells are fitted. Without --poses
     and --ur it says what general poses would tell.
 
     A calibration that is not plausible is refused with the likeliest reason: joint angles in degrees, rows of
@@ -89,7 +88,7 @@ def command(
     from urdfkin.report.diff import print_changes  # noqa: PLC0415  keeps --help fast
 
     check_writable(output)
-    given = [name for name in ("poses", "like", "ur") if context.params[name] is not None]
+    given = [name for name in ("poses", "ur") if context.params[name] is not None]
     if len(given) > 1:
         raise InputError("one model at a time", found=", ".join(f"--{name}" for name in given))
     _refuse_idle(context, given)
@@ -140,27 +139,20 @@ def _refuse_idle(context: click.Context, given: list[str]) -> None:
     if given:
         reject_unused_options(context, ("positions",), f"with --{given[0]}")
     else:
-        reject_unused_options(context, ("output",), "without --poses, --like and --ur")
-    if given in (["ur"], ["like"]):
-        reject_unused_options(context, ("fit",), f"with --{given[0]}")
+        reject_unused_options(context, ("output",), "without --poses and --ur")
     if given == ["ur"]:
-        reject_unused_options(context, ("tip", "base"), "with --ur")
+        reject_unused_options(context, ("fit", "tip", "base"), "with --ur")
 
 
 def _calibrated(context: click.Context, robot: Robot) -> Calibration:
-    """What the running command asks of measured poses, of another model, or of poses in general."""
+    """What the running command asks of measured poses, or of poses in general."""
     from urdfkin.calibration.calibrate import calibrate  # noqa: PLC0415
-    from urdfkin.calibration.like import calibrate_like  # noqa: PLC0415
     from urdfkin.calibration.poses import read_poses  # noqa: PLC0415
     from urdfkin.dh.parse_table import is_table_file, read_table_or_screws  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
 
     asked = context.params
     tip, base = asked["tip"], asked["base"]
-    if asked["like"] is not None:
-        return calibrate_like(
-            robot, load_robot(asked["like"], mimic=None, root_joint=None), tip=tip, base=base
-        )
     table = read_table_or_screws(asked["robot"]) if is_table_file(asked["robot"]) else None
     source = table if isinstance(table, DHTable) else robot
     path = robot.chain(tip, base)
@@ -196,8 +188,12 @@ def _noise(text: str | None) -> tuple[float, float] | None:
 
 def _of_the_factory(robot: Robot, path: Path, order: str) -> Rewritten:
     """A Universal Robots arm with its calibration; and what the order of its angles comes to."""
-    from urdfkin.calibration.like import distance, universal_robots  # noqa: PLC0415
-    from urdfkin.calibration.universal_robots import ORDERS, read_calibration  # noqa: PLC0415
+    from urdfkin.calibration.universal_robots import (  # noqa: PLC0415
+        ORDERS,
+        distance,
+        read_calibration,
+        universal_robots,
+    )
     from urdfkin.comparison.result import angle, length  # noqa: PLC0415
 
     metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))
