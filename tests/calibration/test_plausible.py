@@ -90,7 +90,7 @@ def test_rows_of_q_that_are_shifted_are_named(name: str, by: int, complete: bool
     rows = "one row" if abs(by) == 1 else "2 rows"
     way = "later" if by > 0 else "earlier"
     assert said.startswith(
-        f"q is shifted by {rows} against the poses; the q of each pose stands {rows} {way}"
+        f"q is shifted by {rows} against the poses; the q of each pose is {rows} {way}"
     )
 
 

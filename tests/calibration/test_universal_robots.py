@@ -178,14 +178,14 @@ def test_an_arm_with_other_joints_is_refused(file: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("a: [", "no YAML"),
-        ("joints: 1", "no calibration of a Universal Robots arm"),
+        ("a: [", "not a YAML file"),
+        ("joints: 1", "not a calibration of a Universal Robots arm"),
         ("kinematics: {shoulder: 1}", "no shoulder"),
         ("kinematics: {shoulder: {x: ten}}", "shoulder x"),
         ("kinematics: {shoulder: {x: .nan}}", "shoulder x"),
         ("kinematics: {shoulder: {y: 0}}", "shoulder x: not a finite number: found NoneType"),
         (BOMB, "shoulder x: not a finite number: found list"),
-        ("kinematics: " + "[" * 5000, "no YAML"),
+        ("kinematics: " + "[" * 5000, "not a YAML file"),
     ],
 )
 def test_another_file_is_told(text: str, words: str, tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ def test_another_file_is_told(text: str, words: str, tmp_path: Path) -> None:
 
 
 def test_another_robot_and_another_order_are_told(file: Path) -> None:
-    with pytest.raises(InputError, match="the robot is no Universal Robots arm"):
+    with pytest.raises(InputError, match="the robot is not a Universal Robots arm"):
         universal_robots("panda", file)
     with pytest.raises(UnknownNameError, match="driver"):
         universal_robots("ur5", file, "drivers")

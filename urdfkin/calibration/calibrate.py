@@ -312,7 +312,9 @@ def fitted_model(
     found = replace(found, general=identify(model, general, complete=complete, at=ended.fitted.at))
     if judged:
         found = replace(found, plausibility=judge(model, ended, radians=radians))
-    return replace(found, certificate=_verify_written(found, measured, np.atleast_2d(np.asarray(q, dtype=np.float64))))
+    return replace(
+        found, certificate=_verify_written(found, measured, np.atleast_2d(np.asarray(q, dtype=np.float64)))
+    )
 
 
 def _somewhere(model: Model) -> FloatArray:
@@ -430,9 +432,7 @@ def _stated(noise: tuple[float, float]) -> Noise:
         raise InputError("noise must be two numbers, metres and radians", found=safe_repr(noise))
     metres, radians = (real_number(one, "noise") for one in noise)
     if min(metres, radians) <= 0.0:
-        raise InputError(
-            "noise must be positive", found=str(noise), remedy="omit it: it is then estimated"
-        )
+        raise InputError("noise must be positive", found=str(noise), remedy="omit it: it is then estimated")
     return Noise(metres, radians)
 
 
@@ -493,10 +493,10 @@ def _doubts(found: Calibration) -> Iterator[str]:
         return
     lost = found.general.rank - found.identification.rank
     if lost > 0:
-        untold = [k for k in found.general.kept if k not in found.identification.kept]
+        others = [k for k in found.general.kept if k not in found.identification.kept]
         yield (
-            f"{found.identification.rank} parameters are identifiable from these poses; more varied poses would "
-            f"identify {lost} more: {_listed(name[k] for k in untold)}"
+            f"{found.identification.rank} parameters are identifiable from these poses; more varied poses "
+            f"would identify {lost} more: {_listed(name[k] for k in others)}"
         )
     if found.weak:
         worst = sorted(found.weak.items(), key=lambda one: -one[1])

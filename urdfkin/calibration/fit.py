@@ -140,7 +140,7 @@ def _most_independent(J: FloatArray, kept: Sequence[int], group: Sequence[int], 
 def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int], k: int) -> str:
     column = J[:, k]
     if np.linalg.norm(column) <= np.linalg.norm(error[:, k]):
-        return "has no effect on the measured numbers"
+        return "no effect on the measured numbers"
     shares = np.linalg.lstsq(J[:, list(kept)], column, rcond=None)[0] * np.linalg.norm(
         J[:, list(kept)], axis=0
     )
@@ -148,7 +148,7 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
     order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > _SHARE]
     names = [str(model.way.parameters[kept[i]]) for i in order[:_NAMED]]
     more = f" and {len(order) - _NAMED} more" if len(order) > _NAMED else ""
-    return f"has the same effect as {', '.join(names)}{more}{' together' if len(order) > 1 else ''}"
+    return f"same effect as {', '.join(names)}{more}{' together' if len(order) > 1 else ''}"
 
 
 _ROUNDS = 100

@@ -77,9 +77,9 @@ class Ended:
     Attributes:
         q: (s, c) coordinates of the path.
         measured: The poses there.
-        identification: Which parameters are identifiable.
+        identification: The identifiable and the fixed parameters.
         before: The fit of base and tool alone.
-        fitted: The fit.
+        fitted: The fit of all identifiable parameters.
     """
 
     q: FloatArray

@@ -74,13 +74,15 @@ def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]
     try:
         data = yaml.safe_load(read_text(path, pipes=True))
     except (yaml.YAMLError, RecursionError) as error:
-        raise InputError("not a YAML file", where=str(path), found=" ".join(str(error).split())[:100]) from None
+        raise InputError(
+            "not a YAML file", where=str(path), found=" ".join(str(error).split())[:100]
+        ) from None
     kinematics = data.get("kinematics") if isinstance(data, Mapping) else None
     if not isinstance(kinematics, Mapping):
         raise InputError(
             "not a calibration of a Universal Robots arm",
             where=str(path),
-            remedy="give the file that the driver's ur_calibration writes; it begins kinematics: shoulder: x: ...",
+            remedy="give the driver's file; it begins kinematics: shoulder: x: ...",
         )
     return {joint: _origin(kinematics, link, ORDERS[order], str(path)) for link, joint in LINKS.items()}
 

@@ -118,7 +118,9 @@ def recheck(document: Mapping[str, Any], a: Robot, b: Robot) -> list[str]:
     try:
         return list(_against(document, Comparator((a, b), {}, bounds=True)))
     except UnknownNameError as error:
-        raise InputError("the certificate names a joint or link that a model lacks", found=str(error)) from error
+        raise InputError(
+            "the certificate names a joint or link that a model lacks", found=str(error)
+        ) from error
 
 
 def _against(document: Mapping[str, Any], judge: Comparator) -> Iterator[str]:

@@ -248,7 +248,8 @@ def _of_limits(step: Step, a: Joint, b: Joint, tolerance: Tolerance) -> Iterator
     ours = limits(a)
     if any(not _close(x, y, tolerance.angle) for x, y in zip(ours, back, strict=True)):
         words = f"{place}: limits {_range(ours)} in A, {_range((back[0], back[1]))} in B"
-        yield Difference(place, "limits", words + (" (in A's coordinate)" if step.sense < 0 or step.offset else ""))
+        converted = " (in A's coordinate)" if step.sense < 0 or step.offset else ""
+        yield Difference(place, "limits", words + converted)
     for what in ("velocity", "effort"):
         x, y = (getattr(joint.limit, what, math.inf) for joint in (a, b))
         if not _close(x, y, tolerance.angle):
