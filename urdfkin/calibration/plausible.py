@@ -112,9 +112,9 @@ def judge(model: Model, ended: Ended, *, radians: bool) -> Plausibility:
     if better is None:
         return Plausibility(tuple(objections))
     if not objections:
-        turned = f"the fit turns the zero of joint {_listed(zeros)}; " if zeros else ""
+        turned = f"a zero turned by half a turn, joint {_listed(zeros)}; " if zeros else ""
         objections = [
-            f"{turned}the rms error is {_rms(fitted)}, and {_rms(better.ended.fitted)} with a correction"
+            f"{turned}an rms error of {_rms(fitted)}, and of {_rms(better.ended.fitted)} with a correction"
         ]
     return Plausibility(
         tuple(objections), f"{better.correction.reason} (the rms error is then {_rms(better.ended.fitted)})"
@@ -156,11 +156,11 @@ def _misfits(model: Model, ended: Ended) -> Iterator[str]:
     unexplained = metres > _CLOSE_BY * reach and metres > _UNEXPLAINED * spread
     if metres > _MISSED * reach or no_better or unexplained:
         yield (
-            f"the rms error is {length(metres)}, {metres / reach:.0%} of the reach of {length(reach)}; "
-            f"before the fit it was {length(metres_before)}"
+            f"an rms error of {length(metres)}, {metres / reach:.0%} of the reach of {length(reach)} "
+            f"(before the fit {length(metres_before)})"
         )
     if turn is not None and turn > _MISTURNED:
-        yield f"the rms error of the orientations is {angle(turn)}"
+        yield f"an rms error of the orientations of {angle(turn)}"
 
 
 def _strained(model: Model, ended: Ended) -> Iterator[str]:
@@ -172,9 +172,9 @@ def _strained(model: Model, ended: Ended) -> Iterator[str]:
         if parameter.what == "gain" and surely > _GAINED:
             gained[parameter.where] = f"{parameter.where!r} by {1.0 + moved:.3g}"
     if tilted:
-        yield f"the fit tilts the axis of joint {_listed(tilted.values())}"
+        yield f"a tilted axis, joint {_listed(tilted.values())}"
     if gained:
-        yield f"the fit scales the values of joint {_listed(gained.values())}"
+        yield f"scaled values, joint {_listed(gained.values())}"
 
 
 def _turned_zeros(model: Model, ended: Ended) -> list[str]:
