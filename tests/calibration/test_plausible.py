@@ -137,7 +137,7 @@ def test_sliding_joints_in_millimetres_are_named() -> None:
     name = "through the trunk"
     slides = [joint == "two" for joint in arm(name).robot.coordinate_names]
     assert reason(name, np.where(slides, 1e3 * arm(name).q, arm(name).q)).startswith(
-        "sliding joints are in mill"
+        "prismatic joints are in mill"
     )
 
 

@@ -245,7 +245,7 @@ FORGED: dict[str, Any] = {
     "do not correspond to each other": lambda d: d["frames"][-1]["q_b"].__setitem__(0, 0.123),
     "leave the limits": lambda d: [d["frames"][-1][q].__setitem__(1, 50.0) for q in ("q_a", "q_b")],
     "the verdict is differs": lambda d: d.update(verdict="same"),
-    "not named as a difference": lambda d: d.update(differences=[]),
+    "not listed as a difference": lambda d: d.update(differences=[]),
     "no difference": lambda d: d["differences"].append({**d["differences"][0], "words": "joint x"}),
     "has no interval": lambda d: d["frames"].pop(),
     "a frame has two intervals": lambda d: d["frames"].append(d["frames"][-1]),
@@ -260,7 +260,7 @@ FORGED: dict[str, Any] = {
     "model A: its name is": lambda d: d["a"].update(name="another"),
     "otherwise of the size": lambda d: d["differences"][0].update(radians=1e-6),
     "the size of": lambda d: d["differences"][0].update(metres=0.5),
-    "one is named twice": lambda d: d["differences"].append(d["differences"][0]),
+    "one is listed twice": lambda d: d["differences"].append(d["differences"][0]),
     "not a confirmation": lambda d: d.update(checked="Pinocchio finds nothing"),
     "checked: Pinocchio finds at most": lambda d: d.update(
         checked="Pinocchio 4.1.0 finds at most 1e-19 m at 8 configurations, within the bounds"
@@ -350,12 +350,12 @@ def test_the_commands_exit_says_whether(tmp_path: Path) -> None:
     forms = [f for name in ("certificate", "markdown", "html") for f in (f"--{name}", str(tmp_path / name))]
     done = run("same", str(base), tilted, *forms)
     assert done.code == 1
-    assert "; first here: joint joint_4: its axis is tilted by 10 mrad" in done.text
+    assert "; first difference: joint joint_4: its axis is tilted by 10 mrad" in done.text
     assert (tmp_path / "html").read_text().count('<svg viewBox="-150') == 3
     assert "| tool |" in (tmp_path / "markdown").read_text()
     again = run("same", str(base), tilted, "--recheck", str(tmp_path / "certificate"))
     assert again.code == 1
-    assert again.text.startswith("the certificate holds: differs; first here: joint joint_4")
+    assert again.text.startswith("the certificate holds: differs; first difference: joint joint_4")
     refused = run("same", str(base), flipped, "--recheck", str(tmp_path / "certificate"))
     assert refused.code == 2
     assert "another text" in refused.err
@@ -380,8 +380,8 @@ def test_arguments_of_a_xacro_file_go_to_the_one_that_is_one(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "name two models: urdfkin same A B"),
-        (["panda"], "name two models"),
+        ([], "two models are needed: urdfkin same A B"),
+        (["panda"], "two models are needed"),
         (["panda", "pandaa"], "did you mean"),
         (["panda", "panda", "--map", "x"], "a pair of joints is JOINT_OF_A=JOINT_OF_B"),
         (["panda", "panda", "--map", "x=y"], "unknown joint 'x'"),

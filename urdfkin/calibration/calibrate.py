@@ -300,15 +300,15 @@ def fitted_model(
     drop_odd, complete = as_bool(drop_odd, "drop_odd"), as_bool(complete, "complete")
     if (q is None) != (poses is None):
         raise InputError("q and poses must be given together", found="only one of the two")
-    given = None if q is None or poses is None else _measured(robot, model, q, poses)
+    given = None if q is None or poses is None else _check_measured(robot, model, q, poses)
     if given is not None:
         complete = given[1].complete
     general = _values(model, robot, robot.sample(_GENERAL))
     if given is None:
-        could = identify(model, general, complete=complete, at=_somewhere(model))
+        could = identify(model, general, complete=complete, at=_general_target(model))
         return Calibration(robot, model, could, could)
     path_q, measured = given
-    ended, found = _calibrated(robot, model, path_q, measured, noise, drop_odd, every=every)
+    ended, found = _fit(robot, model, path_q, measured, noise, drop_odd, every=every)
     found = replace(found, general=identify(model, general, complete=complete, at=ended.fitted.at))
     if judged:
         found = replace(found, plausibility=judge(model, ended, radians=radians))
@@ -317,7 +317,7 @@ def fitted_model(
     )
 
 
-def _somewhere(model: Model) -> FloatArray:
+def _general_target(model: Model) -> FloatArray:
     """Return the model's parameters (p,), with a fitted target in general position."""
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
@@ -330,7 +330,9 @@ def _values(model: Model, robot: Robot, q: FloatArray) -> FloatArray:
     return model.coupling.values(model.coupling.select(robot.tree, q))
 
 
-def _measured(robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike) -> tuple[FloatArray, Measured]:
+def _check_measured(
+    robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike
+) -> tuple[FloatArray, Measured]:
     """Return the coordinates (s, c) of the path, and the measurements there."""
     T = checked_poses(poses)
     if isinstance(model.source, DHTable):
@@ -349,7 +351,7 @@ def _measured(robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike) -> tup
     return path_q, measured
 
 
-def _calibrated(
+def _fit(
     robot: Robot,
     model: Model,
     q: FloatArray,
@@ -359,12 +361,12 @@ def _calibrated(
     *,
     every: bool,
 ) -> tuple[Ended, Calibration]:
-    stated, start = None if noise is None else _stated(noise), starting(model, measured)
+    stated, start = None if noise is None else _parse_noise(noise), starting(model, measured)
     identification = identify(model, measured.values, complete=measured.complete, at=start)
     ends = [k for k in identification.kept if model.way.parameters[k].end]
     before = best_fit(model, measured, ends, stated, start)
     found = best_fit(model, measured, identification.kept, stated, before.at)
-    identification, found = _more(model, measured, identification, stated, found)
+    identification, found = _add_identifiable(model, measured, identification, stated, found)
     odd, clean = odd_poses(model, measured, identification.kept, stated, found)
     if drop_odd and odd:
         chosen = np.ones(len(measured), dtype=bool)
@@ -409,7 +411,7 @@ def _significant(model: Model, ended: Ended, stated: Noise | None) -> tuple[tupl
     return chosen, best_fit(model, ended.measured, chosen, stated, at)
 
 
-def _more(
+def _add_identifiable(
     model: Model, measured: Measured, identification: Identification, stated: Noise | None, found: Fit
 ) -> tuple[Identification, Fit]:
     """Add parameters that become identifiable at the fit, if they explain more than chance would.
@@ -427,7 +429,7 @@ def _more(
     return (again, trial) if explained > quantile(1.0 - WRONGLY, more) else (identification, found)
 
 
-def _stated(noise: tuple[float, float]) -> Noise:
+def _parse_noise(noise: tuple[float, float]) -> Noise:
     if not isinstance(noise, tuple | list) or len(noise) != 2:
         raise InputError("noise must be two numbers, metres and radians", found=safe_repr(noise))
     metres, radians = (real_number(one, "noise") for one in noise)
@@ -496,13 +498,13 @@ def _doubts(found: Calibration) -> Iterator[str]:
         others = [k for k in found.general.kept if k not in found.identification.kept]
         yield (
             f"{found.identification.rank} parameters are identifiable from these poses; more varied poses "
-            f"would identify {lost} more: {_listed(name[k] for k in others)}"
+            f"would identify {lost} more: {_list(name[k] for k in others)}"
         )
     if found.weak:
         worst = sorted(found.weak.items(), key=lambda one: -one[1])
         yield (
             "poorly observable: "
-            + _listed(f"{name[k]} ({ratio:.0f} times as uncertain)" for k, ratio in worst)
+            + _list(f"{name[k]} ({ratio:.0f} times as uncertain)" for k, ratio in worst)
             + "; in brackets: compared with as many random configurations"
         )
     if not fitted.is_judged:
@@ -519,7 +521,7 @@ def _doubts(found: Calibration) -> Iterator[str]:
         )
     if found.odd and found.without_odd is not None:
         one = len(found.odd) == 1
-        poses = f"pose{'' if one else 's'} {_listed(map(str, found.odd))} "
+        poses = f"pose{'' if one else 's'} {_list(map(str, found.odd))} "
         if len(fitted.errors) == len(found.without_odd.errors):
             yield poses + f"{'is' if one else 'are'} excluded as {'an outlier' if one else 'outliers'}"
         else:
@@ -530,9 +532,9 @@ def _doubts(found: Calibration) -> Iterator[str]:
             )
     gains = [k for k in found.identification.kept if found.parameters[k].what == "gain"]
     if gains:
-        yield f"a URDF cannot store gains: {_listed(name[k] for k in gains)} are not written"
+        yield f"a URDF cannot store gains: {_list(name[k] for k in gains)} are not written"
 
 
-def _listed(names: Iterable[str]) -> str:
+def _list(names: Iterable[str]) -> str:
     every = list(names)
     return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")

@@ -292,24 +292,24 @@ def best_fit(
     """
     weights = noise or Noise(1.0, 1.0 / model.way.size)
     for _ in range(1 if noise else _ESTIMATES):
-        at = _descended(model, measured, kept, weights, at)
-        found = _ended(model, measured, kept, weights, at)
+        at = _minimize(model, measured, kept, weights, at)
+        found = _evaluate(model, measured, kept, weights, at)
         if noise or not found.is_judged:
             break
-        estimated = _estimated(found, model, measured)
+        estimated = _estimate_noise(found, model, measured)
         stays = abs(estimated.metres - weights.metres) <= _STAYS * weights.metres and (
             not measured.complete or abs(estimated.radians - weights.radians) <= _STAYS * weights.radians
         )
         weights = estimated
         if stays:
             break
-    found = _ended(model, measured, kept, weights, at)
+    found = _evaluate(model, measured, kept, weights, at)
     if noise is None and not found.is_judged:
         found = replace(found, covariance=np.full_like(found.covariance, np.inf))
     return found
 
 
-def _estimated(found: Fit, model: Model, measured: Measured) -> Noise:
+def _estimate_noise(found: Fit, model: Model, measured: Measured) -> Noise:
     """Estimate the noise from the residuals; at least rounding, since residuals are divided by it."""
     rounding = model.way.rounding(measured.values)
 
@@ -335,7 +335,7 @@ def _whitened(
     return r, J.reshape(r.size, len(kept))
 
 
-def _descended(
+def _minimize(
     model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
 ) -> FloatArray:
     scale, damping = noise.of(measured.complete), _DAMPING
@@ -366,7 +366,7 @@ def _descended(
     return at
 
 
-def _ended(model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray) -> Fit:
+def _evaluate(model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray) -> Fit:
     r, J = _whitened(model, measured, kept, noise, at)
     k = noise.of(measured.complete).size
     units = np.linalg.norm(J, axis=0)
@@ -453,7 +453,9 @@ def starting(model: Model, measured: Measured) -> FloatArray:
     T = model.way.poses(measured.values)
     free = "base" in places, "tool" in places
     B, X = (
-        _complete(T, measured.p, measured.R, *free) if measured.R is not None else _seen(T, measured.p, *free)
+        _from_poses(T, measured.p, measured.R, *free)
+        if measured.R is not None
+        else _from_positions(T, measured.p, *free)
     )
     for which, end in (("base", B), ("tool", X)):
         six = [*end[:3, 3], *euler_of("XYZ", end[:3, :3])]
@@ -463,7 +465,7 @@ def starting(model: Model, measured: Measured) -> FloatArray:
     return at
 
 
-def _complete(
+def _from_poses(
     T: FloatArray, p: FloatArray, R: FloatArray, base: bool, tool: bool
 ) -> tuple[FloatArray, FloatArray]:
     B, X = np.eye(4), np.eye(4)
@@ -473,11 +475,11 @@ def _complete(
         B[:3, :3] = _rotation(np.einsum("sij,skj->ik", R, T[:, :3, :3]))
     else:
         X[:3, :3] = _rotation(np.einsum("sji,sjk->ik", T[:, :3, :3], R))
-    B[:3, 3], X[:3, 3] = _shifts(T, p, B[:3, :3], base, tool)
+    B[:3, 3], X[:3, 3] = _translations(T, p, B[:3, :3], base, tool)
     return B, X
 
 
-def _seen(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
+def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
     """Compute base and target from positions alone."""
     B, X = np.eye(4), np.eye(4)
     for _ in range(_TURNS if base and tool else 1):
@@ -485,7 +487,7 @@ def _seen(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatAr
             points = T[:, :3, :3] @ X[:3, 3] + T[:, :3, 3]
             B[:3, :3] = _rotation((p - p.mean(axis=0)).T @ (points - points.mean(axis=0)))
         before = X[:3, 3].copy()
-        B[:3, 3], X[:3, 3] = _shifts(T, p, B[:3, :3], base, tool)
+        B[:3, 3], X[:3, 3] = _translations(T, p, B[:3, :3], base, tool)
         if np.linalg.norm(X[:3, 3] - before) <= _FIXED_END * np.linalg.norm(X[:3, 3]):
             break
     return B, X
@@ -510,7 +512,7 @@ def _rotation(M: FloatArray) -> FloatArray:
     return np.asarray(U @ Vt)
 
 
-def _shifts(
+def _translations(
     T: FloatArray, p: FloatArray, R_B: FloatArray, base: bool, tool: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Solve p_Mi = R_B R_i x + R_B p_i + b for the vectors b and x."""

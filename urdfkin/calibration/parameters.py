@@ -109,11 +109,11 @@ class ParametricChain:
 
     def poses(self, values: FloatArray, at: FloatArray | None = None) -> FloatArray:
         """Return poses (s, 4, 4) of the tip in the base for joint values (s, n) and parameters `at` (p,)."""
-        return self._walked(values, self.start if at is None else at)[0]
+        return self._forward(values, self.start if at is None else at)[0]
 
     def columns(self, values: FloatArray, at: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """Return poses (s, 4, 4) and the Jacobian (s, 6, p), [linear; angular], by the parameters."""
-        T, origins, axes, factors = self._walked(values, self.start if at is None else at)
+        T, origins, axes, factors = self._forward(values, self.start if at is None else at)
         columns = np.zeros((len(values), 6, len(self.parameters)))
         for k, turns in self._turning.items():
             linear, angular = axes[k], np.zeros_like(axes[k])
@@ -130,7 +130,7 @@ class ParametricChain:
             if isinstance(step, Motion) and step.parameter is not None
         }
 
-    def _walked(
+    def _forward(
         self, values: FloatArray, at: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return tip poses, and origins and axes (p, s, 3) and factors (p, s, 1) of the parameters."""
@@ -145,7 +145,7 @@ class ParametricChain:
             if (k := step.parameter) is not None:
                 origins[k], axes[k], factors[k] = T[:, :3, 3], T[:, :3, step.axis], amount[:, np.newaxis]
                 amount = amount * (at[k] if step.joint is None else 1.0 + at[k])
-            T = _moved(T, step, amount)
+            T = _apply(T, step, amount)
         return T, origins, axes, factors
 
     def rounding(self, values: FloatArray) -> float:
@@ -162,7 +162,7 @@ class ParametricChain:
         ]
 
 
-def _moved(T: FloatArray, step: Motion, amount: FloatArray) -> FloatArray:
+def _apply(T: FloatArray, step: Motion, amount: FloatArray) -> FloatArray:
     if step.turns:
         turned = T.copy()
         turned[:, :3, :3] = T[:, :3, :3] @ coordinate_rotation(step.axis, amount)
@@ -327,7 +327,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     ending = {len(steps) - 1} if last < len(steps) - 1 else set()
     for i, (joint, backwards) in enumerate(steps):
         A = turned(joint)
-        wanted = _wanted(fit, joint, ending=i in ending)
+        wanted = _parameters_to_fit(fit, joint, ending=i in ending)
         if backwards:
             maker.steps.append(A)
             if joint.kind.has_axis:
@@ -346,7 +346,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     return maker.model(tree, path, (base, tip), kept)
 
 
-def _wanted(fit: Collection[str], joint: Joint, *, ending: bool) -> Collection[str]:
+def _parameters_to_fit(fit: Collection[str], joint: Joint, *, ending: bool) -> Collection[str]:
     if "origins" in fit and (joint.kind.has_axis or ending):
         return _ALL
     own = "rz" if joint.kind.turns else "z"

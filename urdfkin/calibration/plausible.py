@@ -98,7 +98,7 @@ def judge(model: Model, ended: Ended, *, radians: bool) -> Plausibility:
         radians: Whether large joint angles are known to be radians.
     """
     few = _too_few(ended)
-    misfits = [*_misfits(model, ended), *_strained(model, ended)]
+    misfits = [*_misfits(model, ended), *_extreme_parameters(model, ended)]
     ranges = [*_out_of_range(model, ended.q, radians=radians, misfit=bool(misfits or few))]
     objections = [*ranges, *misfits, *few]
     reach, fitted = _reach(model, ended), ended.fitted
@@ -112,7 +112,7 @@ def judge(model: Model, ended: Ended, *, radians: bool) -> Plausibility:
     if better is None:
         return Plausibility(tuple(objections))
     if not objections:
-        turned = f"a zero turned by half a turn, joint {_listed(zeros)}; " if zeros else ""
+        turned = f"a zero turned by half a turn, joint {_list(zeros)}; " if zeros else ""
         objections = [
             f"{turned}an rms error of {_rms(fitted)}, and of {_rms(better.ended.fitted)} with a correction"
         ]
@@ -163,30 +163,30 @@ def _misfits(model: Model, ended: Ended) -> Iterator[str]:
         yield f"an rms error of the orientations of {angle(turn)}"
 
 
-def _strained(model: Model, ended: Ended) -> Iterator[str]:
+def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
     """Yield objections to parameters far from those of any real robot."""
     tilted, gained = dict[str, str](), dict[str, str]()
-    for parameter, moved, surely in _moved(model, ended):
+    for parameter, moved, surely in _changes(model, ended):
         if parameter.what in ("rx", "ry", "alpha", "beta") and surely > _TILTED:
             tilted.setdefault(parameter.where, f"{parameter.where!r} by {angle(abs(moved))}")
         if parameter.what == "gain" and surely > _GAINED:
             gained[parameter.where] = f"{parameter.where!r} by {1.0 + moved:.3g}"
     if tilted:
-        yield f"a tilted axis, joint {_listed(tilted.values())}"
+        yield f"a tilted axis, joint {_list(tilted.values())}"
     if gained:
-        yield f"scaled values, joint {_listed(gained.values())}"
+        yield f"scaled values, joint {_list(gained.values())}"
 
 
 def _turned_zeros(model: Model, ended: Ended) -> list[str]:
     """Return joints whose zero moved by half a turn: the effect of a reversed sign of the next joint."""
     return [
         f"{parameter.where!r} by {angle(abs(moved))}"
-        for parameter, moved, surely in _moved(model, ended)
+        for parameter, moved, surely in _changes(model, ended)
         if parameter.what in ("rz", "theta") and surely > _TILTED and abs(abs(moved) - math.pi) < _TILTED
     ]
 
 
-def _moved(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
+def _changes(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
     """Yield each fitted parameter of a moving joint, its change, and the change minus its uncertainty.
 
     For positions alone, joints are skipped whose axis passes near the tip of the original model.
@@ -221,9 +221,9 @@ def _out_of_range(model: Model, q: FloatArray, *, radians: bool, misfit: bool) -
         elif far:
             outside[name] = f"{name!r} ({largest[name]:.4g}, limits {lower:.4g} to {upper:.4g})"
     if turned and not radians:
-        yield f"values beyond a turn look like degrees: joint {_listed(turned.values())}"
+        yield f"values beyond a turn look like degrees: joint {_list(turned.values())}"
     if outside and misfit:
-        yield f"values far outside the limits: joint {_listed(outside.values())}"
+        yield f"values far outside the limits: joint {_list(outside.values())}"
 
 
 def _coordinates(model: Model) -> Iterator[tuple[str, bool, float, float]]:
@@ -263,7 +263,7 @@ def _corrections(model: Model, q: FloatArray) -> Iterator[_Correction]:
         if turning.any():
             yield _Correction("all joint values are multiplied by 180/pi; undo it", np.radians(q))
         yield _Correction(
-            "sliding joints are in millimetres; convert them to metres", np.where(turning, q, 1e-3 * q)
+            "prismatic joints are in millimetres; convert them to metres", np.where(turning, q, 1e-3 * q)
         )
     for by in _SHIFTS:
         if len(q) > abs(by) + 1:
@@ -281,7 +281,7 @@ def _corrections(model: Model, q: FloatArray) -> Iterator[_Correction]:
 def _sign(names: Sequence[str]) -> str:
     if len(names) == 1:
         return f"the sign of joint {names[0]!r} is wrong; negate its values or its axis"
-    return f"the signs of joints {_listed(map(repr, names))} are wrong; negate their values or their axes"
+    return f"the signs of joints {_list(map(repr, names))} are wrong; negate their values or their axes"
 
 
 def _likeliest(model: Model, ended: Ended, limit: float, reach: float) -> _Trial | None:
@@ -350,7 +350,7 @@ class _Trial:
             return False
         if not ended.fitted.is_judged or _left(ended, self.reach) > limit:
             return False
-        strange = [*_misfits(self.model, ended), *_strained(self.model, ended)]
+        strange = [*_misfits(self.model, ended), *_extreme_parameters(self.model, ended)]
         return not strange and not _turned_zeros(self.model, ended)
 
 
@@ -369,6 +369,6 @@ def _rms(fit: Fit) -> str:
     return length(metres) if turn is None else f"{length(metres)}, {angle(turn)}"
 
 
-def _listed(names: Iterable[str]) -> str:
+def _list(names: Iterable[str]) -> str:
     every = list(names)
     return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")

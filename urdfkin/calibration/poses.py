@@ -80,7 +80,7 @@ def _table(
     if kind is _MATRIX:
         rows = np.stack([data[name] for name in _MATRIX], axis=-1).reshape(s, 3, 4)
         T = np.concatenate([rows, np.broadcast_to([[0.0, 0.0, 0.0, 1.0]], (s, 1, 4))], axis=1)
-        return q, _posed(T, where)
+        return q, _with_exact_rotations(T, where)
     p = np.stack([data[name] for name in _POSITION], axis=-1)
     return q, p if not part else _with_quaternions(
         p, np.stack([data[n] for n in _QUATERNION], axis=-1), where
@@ -95,7 +95,7 @@ def _archive(path: Path, nq: int) -> tuple[FloatArray, FloatArray]:
             "measured poses must be q with T, q with p, or q with p and quat", where=str(path), found=found
         )
     if "T" in data:
-        return data["q"], _posed(data["T"], str(path))
+        return data["q"], _with_exact_rotations(data["T"], str(path))
     return data["q"], data["p"] if "quat" not in data else _with_quaternions(
         data["p"], data["quat"], str(path)
     )
@@ -115,7 +115,7 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
     return T
 
 
-def _posed(T: FloatArray, where: str) -> FloatArray:
+def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
     """Return the poses with exact rotations; their digits may be rounded."""
     R = T[:, :3, :3]
     off = np.abs(R.swapaxes(-1, -2) @ R - np.eye(3)).max(axis=(-2, -1), initial=0.0)
@@ -138,5 +138,5 @@ def checked_poses(poses: ArrayLike) -> FloatArray:
     if array.ndim == 2 and array.shape[1] == 3:
         return array
     if array.ndim == 3 and array.shape[1:] == (4, 4):
-        return _posed(array, "poses")
+        return _with_exact_rotations(array, "poses")
     raise InputError("poses must be (n, 4, 4), or positions (n, 3)", found=f"shape {array.shape}")

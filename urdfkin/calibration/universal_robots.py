@@ -90,7 +90,7 @@ def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]
 def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str) -> FloatArray:
     entry = kinematics.get(link)
     if not isinstance(entry, Mapping):
-        raise InputError("a link is missing", where=where, found=f"no {link}")
+        raise InputError("the file lacks a link", where=where, found=f"no {link}")
     six = []
     for name in _SIX:
         # YAML 1.1 reads 1e-05, which the driver writes for 0.00001, as a word. A list is never printed: with

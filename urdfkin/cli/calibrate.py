@@ -101,7 +101,7 @@ def command(
     _reject_unused(context, given)
     loaded = load_robot(robot)
     with compiling():
-        found = None if ur is not None else _calibrated(context, loaded)
+        found = None if ur is not None else _run(context, loaded)
         written = (
             _factory_calibration(loaded, ur, order) if ur is not None else found.written if found else None
         )
@@ -153,7 +153,7 @@ def _reject_unused(context: click.Context, given: list[str]) -> None:
         reject_unused_options(context, ("fit", "tip", "base"), "with --ur")
 
 
-def _calibrated(context: click.Context, robot: Robot) -> Calibration:
+def _run(context: click.Context, robot: Robot) -> Calibration:
     """Run the calibration that the command's options request."""
     from urdfkin.calibration.calibrate import calibrate  # noqa: PLC0415
     from urdfkin.calibration.poses import read_poses  # noqa: PLC0415

@@ -70,7 +70,7 @@ def command(
         reject_unused_options(
             context, [p.name or "" for p in context.command.params if p.name != "file"], "with --check"
         )
-        context.exit(_checked(file))
+        context.exit(_check(file))
     from urdfkin.export import write  # noqa: PLC0415
     from urdfkin.export.code import code_of  # noqa: PLC0415  keeps --help fast
 
@@ -89,7 +89,7 @@ def command(
     context.exit(exit_code(code.proof.certificate))
 
 
-def _checked(file: Path) -> int:
+def _check(file: Path) -> int:
     from urdfkin.export.check import check  # noqa: PLC0415
 
     found = check(file)

@@ -91,7 +91,7 @@ def command(
         click.echo(schema_text(), nl=False)
         return
     if a is None or b is None:
-        raise click.UsageError("name two models: urdfkin same A B")
+        raise click.UsageError("two models are needed: urdfkin same A B")
     check_writable(*paths.values())
     robots = load_two(a, b)
     with compiling():
@@ -102,7 +102,7 @@ def command(
             errors = errors_of(document, *robots)
             for line in errors:
                 say(line, err=True)
-            first = [f"; first here: {one['words']}" for one in document["differences"][:1]]
+            first = [f"; first difference: {one['words']}" for one in document["differences"][:1]]
             holds = f"the certificate holds: {document['verdict']}{''.join(first)}"
             say("the certificate does not hold" if errors else holds)
             context.exit(1 if errors or document["verdict"] == "differs" else 0)

@@ -58,7 +58,7 @@ def curvature(
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     found = np.zeros((len(names), len(names)))
-    for i, j, most in _bends(steps, pairs, variables, frame):
+    for i, j, most in _second_derivatives(steps, pairs, variables, frame):
         if not most:
             continue
         if not all(pairs[k].a.slope and pairs[k].a.slope == pairs[k].b.slope for k in (i, j)):
@@ -71,28 +71,30 @@ def curvature(
     return names, found
 
 
-def _bends(
+def _second_derivatives(
     steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
     """Yield i, j <= i and the largest second derivative by the values of joints i and j."""
-    free = [_without_place(step) for step in steps]
+    free = [_as_free_vectors(step) for step in steps]
     d, y = at_the_frame(frame, COARSE)
     for i in reversed(range(len(steps))):
-        first = _derived(steps[i], pairs[i], variables, d, y)
+        first = _derivatives(steps[i], pairs[i], variables, d, y)
         if steps[i].kind == "turns":
-            yield i, i, _in_front(_crossed(free[i], *first), free[: i + 1], pairs, variables)
+            yield i, i, _pass_to_front(_cross_products(free[i], *first), free[: i + 1], pairs, variables)
         vectors = before_it(free[i], *first)
         for j in reversed(range(i)):
             if steps[j].kind == "turns":
-                second = _derived(free[j], pairs[j], variables, *vectors)
-                yield i, j, _in_front(second, free[: j + 1], pairs, variables)
+                second = _derivatives(free[j], pairs[j], variables, *vectors)
+                yield i, j, _pass_to_front(second, free[: j + 1], pairs, variables)
                 vectors = passed(free[j], pairs[j], variables, *vectors)
             else:
                 vectors = before_it(free[j], *vectors)
         d, y = passed(steps[i], pairs[i], variables, d, y)
 
 
-def _in_front(vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables) -> float:
+def _pass_to_front(
+    vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables
+) -> float:
     """Return the largest d in front of all steps, from vectors behind the last step's L."""
     vectors = before_it(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
@@ -101,16 +103,16 @@ def _in_front(vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], v
     return vectors[0].largest()
 
 
-def _derived(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
+def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
     """Return the derivatives of d and y by a joint's value, behind its L."""
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
     d, y = difference(step, pair, variables, y, d), y.turned(step.other, *variables.range(pair.b))
-    return _crossed(step, d, y)
+    return _cross_products(step, d, y)
 
 
-def _crossed(step: Step, d: Support, y: Support) -> _Vectors:
+def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
     """Return the cross products of u with d and of u' with y."""
     G, axis, other = d.grid.points, step.axis, step.other
     most = 0.0
@@ -123,7 +125,7 @@ def _crossed(step: Step, d: Support, y: Support) -> _Vectors:
     return bent, Support(d.grid, y.at(there) - there @ other.point)
 
 
-def _without_place(step: Step) -> Step:
+def _as_free_vectors(step: Step) -> Step:
     """Return the step's effect on free vectors."""
     axis = Screw(step.axis.direction, _ORIGIN)
     other = axis if step.other is step.axis else Screw(step.other.direction, _ORIGIN)

@@ -26,7 +26,7 @@ from urdfkin.robot import Robot
 #: Largest number of boxes at a time when a claimed bound is proven.
 MOST_AGAIN = 2**22
 #: Relative tolerance of a document's numbers between machines; absolute tolerance (m or rad) for zero.
-_ALIKE, _ZERO = 1e-9, 1e-15
+_RELATIVE, _ZERO = 1e-9, 1e-15
 #: Tolerance of a bound that is proven again, in eps of the bound: sums round differently on other machines.
 _LAST_BITS = 64.0
 #: The line of Pinocchio's confirmation, and the relative tolerance of its two digits.
@@ -116,57 +116,57 @@ def recheck(document: Mapping[str, Any], a: Robot, b: Robot) -> list[str]:
                 remedy="compare the models again: urdfkin same A B",
             )
     try:
-        return list(_against(document, Comparator((a, b), {}, bounds=True)))
+        return list(_errors(document, Comparator((a, b), {}, bounds=True)))
     except UnknownNameError as error:
         raise InputError(
             "the certificate names a joint or link that a model lacks", found=str(error)
         ) from error
 
 
-def _against(document: Mapping[str, Any], judge: Comparator) -> Iterator[str]:
+def _errors(document: Mapping[str, Any], comparator: Comparator) -> Iterator[str]:
     gauge = _gauge(document)
-    if (why := _not_a_gauge(document, gauge, judge)) is not None:
+    if (why := _not_a_gauge(document, gauge, comparator)) is not None:
         yield why
         return
-    found = align(*judge.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, gauge)
-    variables = variables_of(found, judge.tolerance)
-    said = judge.said(found, variables)
-    wrong = list(_said_against(document, judge, said))
+    found = align(*comparator.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, gauge)
+    variables = variables_of(found, comparator.tolerance)
+    said = comparator.said(found, variables)
+    wrong = list(_statement_errors(document, comparator, said))
     yield from wrong
     claims = {(frame["a"], frame["b"]): frame for frame in document["frames"]}
     if len(claims) < len(document["frames"]):
         yield "a frame has two intervals"
-    search = judge.search(found, variables)
+    search = comparator.search(found, variables)
     for frame, names in zip(found.frames, said.links, strict=True):
         if (claim := claims.pop(names, None)) is None:
             yield f"frame {names[0]} has no interval"
         else:
-            yield from _interval_against(search, frame, claim, said.rounding, sharply=not wrong)
-    yield from (f"frame {names[0]} is not one of both models" for names in claims)
+            yield from _interval_errors(search, frame, claim, said.rounding, sharply=not wrong)
+    yield from (f"frame {names[0]} is not a common frame of the models" for names in claims)
     if document["as_written"] is not None:
-        yield from _as_written_against(document["as_written"], judge, found, sharply=not wrong)
-    yield from _confirmation_against(document["checked"], judge, found, variables)
+        yield from _as_written_errors(document["as_written"], comparator, found, sharply=not wrong)
+    yield from _confirmation_errors(document["checked"], comparator, found, variables)
 
 
-def _said_against(document: Mapping[str, Any], judge: Comparator, said: Sameness) -> Iterator[str]:
+def _statement_errors(document: Mapping[str, Any], comparator: Comparator, said: Sameness) -> Iterator[str]:
     """Yield the wrong statements about names, verdict, differences and everything else without a proof."""
-    for which, robot in zip("ab", judge.robots, strict=True):
+    for which, robot in zip("ab", comparator.robots, strict=True):
         if document[which]["name"] != robot.name:
             yield f"model {which.upper()}: its name is {robot.name}, not {document[which]['name']}"
     again = certificate(said)
     wrong = {one["words"]: one for one in again["differences"]}
     claimed = {one["words"]: one for one in document["differences"]}
-    yield from (f"not named as a difference: {words}" for words in wrong if words not in claimed)
+    yield from (f"not listed as a difference: {words}" for words in wrong if words not in claimed)
     yield from (f"no difference: {words}" for words in claimed if words not in wrong)
     if len(claimed) < len(document["differences"]):
-        yield "differences: one is named twice"
+        yield "differences: one is listed twice"
     for words, one in claimed.items():
         if words in wrong and not _same_difference(one, wrong[words], said.rounding):
             yield f"differences: the size is wrong in: {words}"
     if document["verdict"] != said.verdict.value:
         yield f"the verdict is {said.verdict.value}, not {document['verdict']}"
     yield from (
-        f"{part}: not what the models give" for part in DERIVED if not _alike(document[part], again[part])
+        f"{part}: not what the models give" for part in DERIVED if not _equal(document[part], again[part])
     )
 
 
@@ -176,12 +176,12 @@ def _same_difference(
     """Return whether place, parameter and sizes of a difference agree, sizes within rounding."""
     sizes = zip(("metres", "radians"), rounding, strict=True)
     return all(claimed[part] == said[part] for part in ("place", "what")) and all(
-        math.isclose(claimed[part], said[part], rel_tol=_ALIKE, abs_tol=most) for part, most in sizes
+        math.isclose(claimed[part], said[part], rel_tol=_RELATIVE, abs_tol=most) for part, most in sizes
     )
 
 
-def _confirmation_against(
-    claimed: str, judge: Comparator, found: Alignment, variables: Variables
+def _confirmation_errors(
+    claimed: str, comparator: Comparator, found: Alignment, variables: Variables
 ) -> Iterator[str]:
     """Yield the wrong statements about Pinocchio's confirmation; a skipped check claims nothing."""
     if claimed.startswith(("not asked of Pinocchio: ", "not verified by Pinocchio: ")):
@@ -190,7 +190,10 @@ def _confirmation_against(
     if said is None or int(said["count"]) != CONFIRMED:
         yield "checked: not a confirmation in the form that urdfkin writes"
         return
-    off, rounding = float(judge.asked(found, variables).max(initial=0.0)), judge.rounding(found, variables)[0]
+    off, rounding = (
+        float(comparator.pinocchio_distances(found, variables).max(initial=0.0)),
+        comparator.rounding(found, variables)[0],
+    )
     if not math.isclose(float(said["metres"]), off, rel_tol=_TWO_DIGITS, abs_tol=rounding):
         yield f"checked: Pinocchio finds at most {off:.2g} m, not {said['metres']} m"
 
@@ -211,9 +214,9 @@ def _gauge(document: Mapping[str, Any]) -> Gauge:
     )
 
 
-def _not_a_gauge(document: Mapping[str, Any], gauge: Gauge, judge: Comparator) -> str | None:
+def _not_a_gauge(document: Mapping[str, Any], gauge: Gauge, comparator: Comparator) -> str | None:
     """Return why the stated gauge is not allowed; None if it is allowed."""
-    a, b = judge.mechanisms
+    a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
         b.tree.joint_index(joint["b"])
@@ -223,40 +226,42 @@ def _not_a_gauge(document: Mapping[str, Any], gauge: Gauge, judge: Comparator) -
         if not made.holds_for(a.tree.joints[a.tree.joint_index(name)].kind):
             return f"joint {name}: its conversion is not possible for a joint of this kind"
     for names in gauge.orders:
-        if not b.may_be_taken(names, judge.tolerance):
+        if not b.may_be_taken(names, comparator.tolerance):
             return f"orders: the axes do not allow {', '.join(names)}"
         b = b.in_order(names)
     return None
 
 
-def _alike(claimed: Any, said: Any) -> bool:
+def _equal(claimed: Any, said: Any) -> bool:
     """Return whether two parts of a document are equal, numbers except for their last digits."""
     if isinstance(said, dict):
-        return claimed.keys() == said.keys() and all(_alike(claimed[key], said[key]) for key in said)
+        return claimed.keys() == said.keys() and all(_equal(claimed[key], said[key]) for key in said)
     if isinstance(said, list):
-        return len(claimed) == len(said) and all(map(_alike, claimed, said))
+        return len(claimed) == len(said) and all(map(_equal, claimed, said))
     if isinstance(said, float) and isinstance(claimed, float | int):
-        return math.isclose(claimed, said, rel_tol=_ALIKE, abs_tol=_ZERO)
+        return math.isclose(claimed, said, rel_tol=_RELATIVE, abs_tol=_ZERO)
     return bool(claimed == said)
 
 
-def _as_written_against(
-    claim: Mapping[str, Any], judge: Comparator, found: Alignment, *, sharply: bool
+def _as_written_errors(
+    claim: Mapping[str, Any], comparator: Comparator, found: Alignment, *, sharply: bool
 ) -> Iterator[str]:
     """Yield the wrong statements about the largest distance of a frame as written."""
-    written = judge.as_written(found)
-    variables = variables_of(written, judge.tolerance)
-    names = [(judge.trees[0].links[frame.a], judge.trees[1].links[frame.b]) for frame in written.frames]
+    written = comparator.as_written(found)
+    variables = variables_of(written, comparator.tolerance)
+    names = [
+        (comparator.trees[0].links[frame.a], comparator.trees[1].links[frame.b]) for frame in written.frames
+    ]
     if (claim["a"], claim["b"]) not in names:
-        yield f"as written: frame {claim['a']} is not one of both models"
+        yield f"as written: frame {claim['a']} is not a common frame of the models"
         return
     frame = written.frames[names.index((claim["a"], claim["b"]))]
-    search, rounding = judge.search(written, variables), judge.rounding(written, variables)
-    against = _interval_against(search, frame, claim, rounding, sharply=sharply)
-    yield from (f"as written: {line}" for line in against)
+    search, rounding = comparator.search(written, variables), comparator.rounding(written, variables)
+    problems = _interval_errors(search, frame, claim, rounding, sharply=sharply)
+    yield from (f"as written: {line}" for line in problems)
 
 
-def _interval_against(
+def _interval_errors(
     search: Search,
     frame: FramePair,
     claim: Mapping[str, Any],
@@ -273,10 +278,10 @@ def _interval_against(
         rounding: (m, rad) that counts as zero.
         sharply: Whether to prove an upper bound by branch and bound; useless if another part is wrong.
     """
-    against = list[str]()
+    problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
-        against += _not_attained(search, frame, claim, rounding)
-    yield from against
+        problems += _not_attained(search, frame, claim, rounding)
+    yield from problems
     metres = (math.inf if claim["upper"] is None else claim["upper"]) - rounding[0]
     radians = (math.inf if claim["radians"] is None else claim["radians"]) - rounding[1]
     for grid in (COARSE, FINE):
@@ -287,7 +292,7 @@ def _interval_against(
         return
     place = f"frame {claim['a']}"
     if _within(proven[1], radians, rounding[1]):
-        if against or not sharply:
+        if problems or not sharply:
             return
         # A claimed bound below an attained distance cannot be proven.
         attained = max(claim["lower"], float(search.seen([frame])[0].max()))

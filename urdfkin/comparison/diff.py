@@ -158,7 +158,7 @@ def _changes(old: str, new: str) -> Iterator[Change]:
 
 def _facts(element: Element, tag: str) -> dict[str, Value]:
     """Return the attributes of an element and its children: the path in words, and the value."""
-    found = dict(_said(element, ""))
+    found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
         defaults: dict[str, Value] = dict(_DEFAULTS)
@@ -168,7 +168,7 @@ def _facts(element: Element, tag: str) -> dict[str, Value]:
     return found
 
 
-def _said(element: Element, way: str) -> Iterator[tuple[str, Value]]:
+def _attributes(element: Element, way: str) -> Iterator[tuple[str, Value]]:
     for name, text in element.attrib.items():
         if (parts := _PARTS.get(name)) and len(words := text.split()) == len(parts):
             yield from (
@@ -181,7 +181,7 @@ def _said(element: Element, way: str) -> Iterator[tuple[str, Value]]:
     for k, child in enumerate(element):
         if isinstance(child.tag, str):
             count = f" {tags[: k + 1].count(child.tag)}" if tags.count(child.tag) > 1 else ""
-            yield from _said(child, f"{way} {child.tag}{count}".strip())
+            yield from _attributes(child, f"{way} {child.tag}{count}".strip())
 
 
 def _value(text: str) -> Value:
@@ -204,7 +204,7 @@ def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
     if ends[0] != ends[1] or (joint.mimic and joint.mimic.leader not in {j.name for j in trees[0].joints}):
         return None
     try:
-        changed = load(to_urdf(_exchanged(trees[0], at, joint)), verify=False)
+        changed = load(to_urdf(_with_joint(trees[0], at, joint)), verify=False)
         plain = load(to_urdf(trees[0]), verify=False)
     except InputError:  # a model that cannot be written as a URDF again: no effect is computed
         return None
@@ -212,7 +212,7 @@ def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
     return None if worst is None else Effect(element, worst)
 
 
-def _exchanged(tree: KinematicTree, at: int, joint: Joint) -> KinematicTree:
+def _with_joint(tree: KinematicTree, at: int, joint: Joint) -> KinematicTree:
     joints = list(tree.joints)
     joints[at] = replace(joint, parent=joints[at].parent)
     return KinematicTree(tree.name, tree.links, tuple(joints))

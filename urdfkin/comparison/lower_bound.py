@@ -160,7 +160,7 @@ class Search:
         for first in range(0, len(frames), TOGETHER):
             some = frames[first : first + TOGETHER]
             off, z = self.seen(some)
-            found += self._climbed(some, z[np.argsort(-off, axis=0)[:STARTS].T])
+            found += self._climb(some, z[np.argsort(-off, axis=0)[:STARTS].T])
         return found
 
     def most_turned(self, frame: FramePair) -> FloatArray:
@@ -170,17 +170,17 @@ class Search:
         turned = [apart(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
         return np.asarray(z[int(np.argmax(turned))])
 
-    def _climbed(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
+    def _climb(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
         """Maximize each frame's distance by coordinate search.
 
         Args:
             frames: The frames; each is searched separately, all in one batch.
             z: (frames, starts, variables) start values.
         """
-        ways = [self._on_the_way(frame) for frame in frames]
+        ways = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
         k, s = np.ogrid[: len(frames), : z.shape[1]]
-        best = self._own(z[:, :, np.newaxis], frames)[..., 0]
+        best = self._own_distances(z[:, :, np.newaxis], frames)[..., 0]
         steps = np.linspace(-0.5, 0.5, ALONG)
         for window in WINDOWS:
             for turn in range(max(map(len, ways))):
@@ -197,7 +197,7 @@ class Search:
                 tried[
                     k[..., np.newaxis], s[..., np.newaxis], np.arange(ALONG), i[:, np.newaxis, np.newaxis]
                 ] = values
-                off = self._own(tried, frames)
+                off = self._own_distances(tried, frames)
                 at = off.argmax(axis=2)
                 better = off[k, s, at] > best
                 z = np.where(better[..., np.newaxis], tried[k, s, at], z)
@@ -205,14 +205,14 @@ class Search:
         at = best.argmax(axis=1)
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
-    def _own(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
+    def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
         """Return distances (frames, starts, values) of each frame at its own values, variables last."""
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # also for robots without variables
         off = self.metres(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
         return np.asarray(off[n, :, :, n])
 
-    def _on_the_way(self, frame: FramePair) -> list[int]:
+    def _variables_of(self, frame: FramePair) -> list[int]:
         """Return the indices of the variables that move a frame in at least one model."""
         steps = set(self.found.indices(frame.previous))
         names = {

@@ -85,7 +85,7 @@ def same(
         False
     """
     robots = _robot(a), _robot(b)
-    given = _demand_map(map)
+    given = _parse_given_map(map)
     whole_number(boxes, "boxes", 0)
     if within is not None:
         within = real_number(within, "within")
@@ -95,7 +95,7 @@ def same(
     return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
 
 
-def _demand_map(given: Mapping[str, str] | None) -> dict[str, str]:
+def _parse_given_map(given: Mapping[str, str] | None) -> dict[str, str]:
     """Return the map as a dict; raise InputError if it is not a mapping of names to names."""
     if given is None:
         return {}
@@ -153,7 +153,7 @@ class Comparator:
     def judged(self) -> Sameness:
         """Return the verdict with intervals and Pinocchio's confirmation."""
         found = align(*self.mechanisms, self.given)
-        self._demand_the_map(found)
+        self._check_map(found)
         variables = variables_of(found, self.tolerance)
         said = self.said(found, variables)
         frames = self._intervals(found, variables)
@@ -165,9 +165,9 @@ class Comparator:
             moving = variables_of(written, self.tolerance)
             as_written = self._farthest(written, moving)
             most = self._most(written, moving, as_written)
-            if len(written.frames) < len(self._counted(found)):
+            if len(written.frames) < len(self._compared_links(found)):
                 most = (math.inf, math.inf)
-        checked = self._confirmed(found, variables, frames)
+        checked = self._confirm(found, variables, frames)
         return replace(said, frames=frames, as_written=as_written, written=most, checked=checked)
 
     def said(self, found: Alignment, variables: Variables) -> Sameness:
@@ -219,17 +219,17 @@ class Comparator:
         a, b = self.mechanisms
         gauge = replace(AS_WRITTEN, X=base_as_written(a, b), orders=found.b.orders)
         written = align(a, b, found.names, gauge)
-        written.frames = written.frames_of(self._counted(found))
+        written.frames = written.frames_of(self._compared_links(found))
         return written
 
-    def _counted(self, found: Alignment) -> list[tuple[int, int]]:
+    def _compared_links(self, found: Alignment) -> list[tuple[int, int]]:
         """Return the common links that are compared as written."""
         tables = any(robot.origin.table for robot in self.robots)
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in found.frames)
         return [(a, b) for a, b in pairs if not tables or links[0][a] == links[1][b]]
 
-    def _demand_the_map(self, found: Alignment) -> None:
+    def _check_map(self, found: Alignment) -> None:
         """Raise InputError for a pair of the given map that is not possible."""
         made = found.names
         for ours, theirs in self.given.items():
@@ -348,14 +348,14 @@ class Comparator:
         lower = max(0.0, metres - rounding[0])
         return Interval(*names, lower, *upper, turned, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
 
-    def _confirmed(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> str:
+    def _confirm(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> str:
         """Check the bounds with Pinocchio, which reads both texts itself, at some configurations."""
         if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
-            return "not asked of Pinocchio: loaded with verify=False"
+            return "not pinocchio_distances of Pinocchio: loaded with verify=False"
         for robot in self.robots:
             if (reason := robot.verifier.cannot()) is not None:
                 return f"not verified by Pinocchio: {reason}"
-        off = self.asked(found, variables)
+        off = self.pinocchio_distances(found, variables)
         for interval, metres in zip(frames, off, strict=False):
             if metres > interval.upper * (1.0 + EPS):
                 raise UrdfkinError(
@@ -367,7 +367,7 @@ class Comparator:
         seen = f"{off.max(initial=0.0):.2g} m"
         return f"Pinocchio {version()} finds at most {seen} at {CONFIRMED} configurations, within the bounds"
 
-    def asked(self, found: Alignment, variables: Variables) -> FloatArray:
+    def pinocchio_distances(self, found: Alignment, variables: Variables) -> FloatArray:
         """Return each frame's largest distance (m) that Pinocchio finds at `CONFIRMED` configurations."""
         search = self.search(found, variables)
         q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)

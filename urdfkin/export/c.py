@@ -80,14 +80,14 @@ def what(function: Function) -> str:
     return f"{' x '.join(map(str, function.shape))}, eq. {', '.join(function.quantity.equations)}"
 
 
-def _given(function: Function, real: str) -> str:
+def _parameters(function: Function, real: str) -> str:
     return ", ".join([*(f"const {real} *{letter}" for letter in function.inputs), f"{real} *out"])
 
 
 def _declarations(code: Code) -> Iterator[str]:
     yield "/* `out` is written row by row. A batch has n configurations, one after the other. */"
     for function in code.functions:
-        given = _given(function, f"{code.name.upper()}_REAL")
+        given = _parameters(function, f"{code.name.upper()}_REAL")
         yield f"/* {what(function)} */"
         yield f"void {code.name}_{function.name}({given});"
         yield f"void {code.name}_{function.name}_batch(size_t n, {given});"
@@ -104,8 +104,8 @@ def _function(code: Code, function: Function) -> str:
         name=function.name,
         title=code.name,
         operations=function.operations,
-        given=f"({_given(function, 'real')})",
-        given_rest=f"{_given(function, 'real')})",
+        given=f"({_parameters(function, 'real')})",
+        given_rest=f"{_parameters(function, 'real')})",
         count=count,
         room=layout.room,
         inputs=", ".join(f"{x.op}[{x.of[0]}]" for x in layout.inputs) or "R(0.0)",
@@ -174,13 +174,13 @@ def _lines(writer: Writer, layout: Layout) -> Iterator[str]:
 
 def _sines(writer: Writer, layout: Layout) -> Iterator[str]:
     count = len(layout.angles)
-    yield from (f"{angle};" for angle in _made(writer, layout, "in[{}]"))
+    yield from (f"{angle};" for angle in _computed_angles(writer, layout, "in[{}]"))
     for k in range(layout.first, layout.first + count):
         yield f"in[{k + count}] = sin(in[{k}]);"
         yield f"in[{k + 2 * count}] = cos(in[{k}]);"
 
 
-def _made(writer: Writer, layout: Layout, at: str) -> Iterator[str]:
+def _computed_angles(writer: Writer, layout: Layout, at: str) -> Iterator[str]:
     """Yield C code for the angles that are not inputs."""
     for node in layout.made:
         value = writer.whole(node, lambda x: at.format(layout.place(x)))
@@ -203,7 +203,7 @@ def _reads(layout: Layout, widths: dict[str, int]) -> Iterator[str]:
 
 def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
     if count := len(layout.angles):
-        for made in _made(writer, layout, "in[{} * LANES + k]"):
+        for made in _computed_angles(writer, layout, "in[{} * LANES + k]"):
             yield f"for (int k = 0; k < LANES; ++k) {made};"
         places = (f"in + {layout.first + k * count} * LANES" for k in range(3))
         yield f"sines_cosines({', '.join(places)}, {count});"

@@ -27,7 +27,7 @@ _STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
 #: Number of characters that are searched as the head of a file.
 _HEAD = 2000
 #: Time limit, seconds; a robot of a thousand joints compiles in one minute.
-_PATIENCE = 600.0
+_TIME_LIMIT = 600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ def check(file: Path) -> Checked:
     if _MARK not in head:
         raise InputError("not a file of urdfkin export", where=str(file))
     with tempfile.TemporaryDirectory() as folder:
-        runs = {".c": _compiled, ".hpp": _compiled, ".py": _imported, ".m": _octave}
+        runs = {".c": _run_compiled, ".hpp": _run_compiled, ".py": _run_imported, ".m": _run_octave}
         if (run := runs.get(file.suffix)) is None:
             raise InputError(
                 "a file of this kind cannot be run",
@@ -88,14 +88,14 @@ def _doubts(text: str) -> Iterator[str]:
         yield "the file was changed after it was written; export it again"
 
 
-def _compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
+def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
     """Compile and run in both precisions, with the system's compiler and all warnings as errors."""
     found = _MAIN.search(text)
     if found is None:
         raise InputError("the file has no test vectors", where=str(file))
     plain = file.suffix == ".c"
     compiler = _program("cc" if plain else "c++", file)
-    copy = _copied(text, folder / f"checked{file.suffix}")
+    copy = _copy(text, folder / f"checked{file.suffix}")
     language = ["-std=c99", "-x", "c"] if plain else ["-std=c++11", "-x", "c++"]
     for real in ("double", "float"):
         macros = [f"-D{found[1]}_MAIN", f"-D{found[1]}_REAL={real}"]
@@ -107,22 +107,22 @@ def _compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
         yield [f"{line} ({real})" for line in _run([str(built)], file)]
 
 
-def _imported(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
-    copy = _copied(text, folder / "checked.py")
+def _run_imported(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
+    copy = _copy(text, folder / "checked.py")
     code = f"import runpy; runpy.run_path({str(copy)!r}, run_name='__main__')"
     yield _run(own_python(code), file, cwd=folder)
 
 
-def _octave(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
+def _run_octave(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
     found = _FUNCTION.search(text)
     if found is None:
         raise InputError("the file has no test vectors", where=str(file))
-    _copied(text, folder / f"{found[1]}.m")
+    _copy(text, folder / f"{found[1]}.m")
     octave = [_program("octave-cli", file), "--no-init-file", "--no-site-file"]
     yield _run([*octave, "--eval", f"{found[1]}().check();"], file, cwd=folder)
 
 
-def _copied(text: str, place: Path) -> Path:
+def _copy(text: str, place: Path) -> Path:
     """Write the text to a separate folder under a fixed name, so that no other file is run."""
     place.write_text(text, encoding="utf-8")
     return place
@@ -138,7 +138,13 @@ def _run(command: Sequence[str], file: Path, cwd: Path | None = None) -> list[st
     """Run a command and return the verdicts that it prints."""
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", timeout=_PATIENCE, check=False, cwd=cwd
+            command,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_TIME_LIMIT,
+            check=False,
+            cwd=cwd,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise InputError("the file does not run", where=str(file), found=str(error)) from None

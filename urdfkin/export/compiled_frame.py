@@ -45,7 +45,7 @@ from urdfkin.verify.verifier import Verifier
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
 #: By default GCC uses half registers on many processors where whole registers are as fast.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
-_PATIENCE = 600.0
+_TIME_LIMIT = 600.0
 _names = count()
 
 
@@ -69,10 +69,10 @@ def library(code: Code) -> ctypes.CDLL:
     folder = kept_folder("library", [], text, *flags, _version(compiler), _processor())
     data = get(folder / "machine.code") if folder else None
     if data is None:
-        data = _compiled(text, [compiler, *flags])
+        data = _compile(text, [compiler, *flags])
         if folder:
             put(folder / "machine.code", data)
-    return _loaded(data)
+    return _load(data)
 
 
 def _entrance(code: Code) -> str:
@@ -111,7 +111,7 @@ def _entrance(code: Code) -> str:
     )
 
 
-def _compiled(text: str, command: list[str]) -> bytes:
+def _compile(text: str, command: list[str]) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         source, made = Path(folder, "robot.c"), Path(folder, "robot.so")
         source.write_text(text, encoding="utf-8")
@@ -120,7 +120,7 @@ def _compiled(text: str, command: list[str]) -> bytes:
             capture_output=True,
             text=True,
             errors="replace",
-            timeout=_PATIENCE,
+            timeout=_TIME_LIMIT,
             check=False,
         )
         if done.returncode != 0:
@@ -130,7 +130,7 @@ def _compiled(text: str, command: list[str]) -> bytes:
         return made.read_bytes()
 
 
-def _loaded(data: bytes) -> ctypes.CDLL:
+def _load(data: bytes) -> ctypes.CDLL:
     descriptor = os.memfd_create("urdfkin", os.MFD_CLOEXEC)
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
@@ -218,7 +218,7 @@ class CompiledFrame:
         """Return T_world_frame (..., 4, 4), eq. 7.77; arguments and errors as for `Robot.placement`."""
         if threads is None and (one := self._placement(q, out)) is not None:
             return one
-        return self._computed("placement", (q,), out, threads)
+        return self._compute_batch("placement", (q,), out, threads)
 
     def velocity(
         self, q: Given, v: Given, out: FloatArray | None = None, *, threads: int | None = None
@@ -226,13 +226,13 @@ class CompiledFrame:
         """Return the velocity (..., 6), [linear; angular], m/s and rad/s: eq. 7.127, 7.128."""
         if threads is None and (one := self._velocity(q, v, out)) is not None:
             return one
-        return self._computed("velocity", (q, v), out, threads)
+        return self._compute_batch("velocity", (q, v), out, threads)
 
     def jacobian(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
         """Return the Jacobian (..., 6, nv): eq. 7.85."""
         if threads is None and (one := self._jacobian(q, out)) is not None:
             return one
-        return self._computed("jacobian", (q,), out, threads)
+        return self._compute_batch("jacobian", (q,), out, threads)
 
     def jacobian_rate(
         self, q: Given, v: Given, out: FloatArray | None = None, *, threads: int | None = None
@@ -240,13 +240,13 @@ class CompiledFrame:
         """Return the time derivative of the Jacobian (..., 6, nv): eq. 7.126."""
         if threads is None and (one := self._jacobian_rate(q, v, out)) is not None:
             return one
-        return self._computed("jacobian rate", (q, v), out, threads)
+        return self._compute_batch("jacobian rate", (q, v), out, threads)
 
     def hessian(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
         """Return the Hessian (..., 6, nv, nv): the terms of eq. 7.126 before their sum."""
         if threads is None and (one := self._hessian(q, out)) is not None:
             return one
-        return self._computed("hessian", (q,), out, threads)
+        return self._compute_batch("hessian", (q,), out, threads)
 
     def acceleration(
         self,
@@ -260,7 +260,7 @@ class CompiledFrame:
         """Return the classical acceleration (..., 6), [linear; angular], m/s^2, rad/s^2: eq. 7.129, 7.130."""
         if threads is None and (one := self._acceleration(q, v, a, out)) is not None:
             return one
-        return self._computed("acceleration", (q, v, a), out, threads)
+        return self._compute_batch("acceleration", (q, v, a), out, threads)
 
     # -- inside --------------------------------------------------------------------------------------------
 
@@ -286,10 +286,10 @@ class CompiledFrame:
         """Return the function `task`, compiled and checked once; None without a compiler."""
         with _compiling:
             if row.name not in self._batches:
-                self._batches[row.name] = self._made(row)
+                self._batches[row.name] = self._make(row)
             return self._batches[row.name]
 
-    def _made(self, row: Quantity) -> Any:
+    def _make(self, row: Quantity) -> Any:
         verifier = self._robot.verifier
         code = bare(verifier.tree, self._plan, self.frame, [row], self.reference, "robot")
         if not 0 < len(code.functions[0].results) <= _MOST_RESULTS:
@@ -307,7 +307,7 @@ class CompiledFrame:
     def _call(self, inputs: Sequence[Given]) -> Call:
         return Call(self._tree, self._robot.plan, self.frame, self.reference, None, inputs)
 
-    def _computed(
+    def _compute_batch(
         self, name: str, inputs: Sequence[Given], out: FloatArray | None, threads: int | None
     ) -> FloatArray:
         """Compute a batch, in parts for several threads."""

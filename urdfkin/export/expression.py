@@ -86,7 +86,7 @@ class Graph:
     def __init__(self) -> None:
         self._made: dict[tuple[Any, ...], Node] = {}
         self.place, self.equation = 0, ""
-        self.chapter: Any = bound(made=self._noting)
+        self.chapter: Any = bound(made=self._record_numbers)
 
     def input(self, letter: str, place: int) -> Node:
         """Return the node of coordinate `place` of q, v or a."""
@@ -113,11 +113,11 @@ class Graph:
         """Return x + y."""
         if _is(x, 0.0) or _is(y, 0.0):
             return y if _is(x, 0.0) else x
-        if (positive := _negated(y)) is not None:
+        if (positive := _without_minus(y)) is not None:
             return self.difference(x, positive)
-        if (positive := _negated(x)) is not None:
+        if (positive := _without_minus(x)) is not None:
             return self.difference(y, positive)
-        return self.made("+", *_ordered(x, y))
+        return self.made("+", *_in_order(x, y))
 
     def difference(self, x: Number, y: Number) -> Number:
         """Return x - y."""
@@ -125,9 +125,9 @@ class Graph:
             return 0.0 if x is y else x
         if _is(x, 0.0):
             return -y
-        if (positive := _negated(y)) is not None:
+        if (positive := _without_minus(y)) is not None:
             return self.sum(x, positive)
-        if (positive := _negated(x)) is not None:
+        if (positive := _without_minus(x)) is not None:
             return -self.sum(positive, y)
         if (other := self._made.get(("-", y, x))) is not None:
             return -other
@@ -140,11 +140,11 @@ class Graph:
         for one, other in ((x, y), (y, x)):
             if _is(one, 1.0):
                 return other
-            if (positive := _negated(one)) is not None:
+            if (positive := _without_minus(one)) is not None:
                 return -(positive * other)
-        return self.made("*", *_ordered(x, y))
+        return self.made("*", *_in_order(x, y))
 
-    def _noting(self, equation: Callable[..., Any]) -> Callable[..., Any]:
+    def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
         """Return an equation that writes its numbers on new nodes, unless another equation called it."""
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
@@ -152,7 +152,7 @@ class Graph:
         numbers = found[0].rstrip(", ")
 
         @wraps(equation)
-        def noting(*arguments: Any) -> Any:
+        def recording(*arguments: Any) -> Any:
             if self.equation:
                 return equation(*arguments)
             self.equation = numbers
@@ -161,21 +161,21 @@ class Graph:
             finally:
                 self.equation = ""
 
-        return noting
+        return recording
 
 
 def _is(x: Number, value: float) -> bool:
     return not isinstance(x, Node) and x == value
 
 
-def _negated(x: Number) -> Number:
+def _without_minus(x: Number) -> Number:
     """Return y if x is -y, where y is an expression or a positive constant; else None."""
     if isinstance(x, Node):
         return x.of[0] if x.op == "neg" else None
     return -x if x < 0.0 else None
 
 
-def _ordered(x: Number, y: Number) -> tuple[Number, Number]:
+def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
     """Return two operands in a fixed order: a constant first, then the older node."""
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second

@@ -83,10 +83,10 @@ class Function:
         uses = Counter[Node]()
         for value in self.results:
             if isinstance(value, Node):
-                uses[_bare(value)] += 1
+                uses[_without_minus(value)] += 1
         for node in self.nodes:
             if node.op != "neg":
-                uses.update(map(_bare, node.operands))
+                uses.update(map(_without_minus, node.operands))
         found, length = list[Node](), dict[Node, int]()
         for node in self.nodes:
             length[node] = 1 + sum(length[x] for x in node.operands)
@@ -133,7 +133,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def _bare(node: Node) -> Node:
+def _without_minus(node: Node) -> Node:
     """Return the node without its minus: -x is written where it is used."""
     return node.of[0] if node.op == "neg" else node
 

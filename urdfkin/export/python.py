@@ -84,7 +84,7 @@ _ONE_BY_ONE = "return [{} for one in zip(*inputs)]"
 
 DIALECTS = {
     "numpy": Dialect(
-        about="Arrays q (..., {nq}), v and a (..., {nv}), which broadcast; results have the same.",
+        about="Arrays q (..., {nq}), v and a (..., {nv}), which broadcast; so do results.",
         imports="import numpy as np\nfrom numpy import {}",
         entering=_shapes,
         index="{}[..., {}]",
@@ -100,7 +100,7 @@ DIALECTS = {
     ),
     "jax": Dialect(
         about="One configuration, arrays q ({nq},), v and a ({nv},), of any precision; for jit, vmap, grad.\n"
-        "XLA's fusion compiles for minutes where a chain is long; this leaves it out:\n"
+        "XLA's fusion pass takes minutes to compile long chains; this disables it:\n"
         'jax.jit(jax.vmap(function), compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
         entering=lambda inputs: [f"{x} = jnp.asarray({x})" for x in inputs],

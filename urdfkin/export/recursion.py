@@ -68,11 +68,11 @@ class TreeRecursion(Recursion):
         state = State()
         for i in range(len(plan.steps)):
             kind.entering(i)
-            state = self._moved(i, self._rigid(state, plan.geometry[i].tolist()))
+            state = self._move(i, self._carry(state, plan.geometry[i].tolist()))
             self.states.append(state)
             kind.reached(i, state)
         kind.entering(len(self.states))
-        self.end = self._rigid(state, plan.offsets[0].tolist())
+        self.end = self._carry(state, plan.offsets[0].tolist())
         kind.reached(len(self.states), self.end)
         kind.entering(len(self.states) + 1)
 
@@ -81,16 +81,16 @@ class TreeRecursion(Recursion):
         self.turns.append(S)
         return super().turned(s, S)
 
-    def _rigid(self, s: State, row: Sequence[float]) -> State:
+    def _carry(self, s: State, row: Sequence[float]) -> State:
         R, d = row[: Geometry.OFFSET], row[Geometry.OFFSET : Geometry.MULTIPLIER]
-        x, y, z = _structure(R[0:3]), _structure(R[3:6]), _structure(R[6:9])
-        return self.turned(self.carried(s, _structure(d)), (x, y, z))
+        x, y, z = _without_rounding(R[0:3]), _without_rounding(R[3:6]), _without_rounding(R[6:9])
+        return self.turned(self.carried(s, _without_rounding(d)), (x, y, z))
 
     def _about_z(self, angle: Number) -> Matrix:
         found: Matrix = self.eq.about_z(*self.kind.sine_cosine(angle), 0.0, 1.0)
         return found
 
-    def _moved(self, i: int, s: State) -> State:
+    def _move(self, i: int, s: State) -> State:
         (kind, at, rate_at), (q, v, a) = self.plan.steps[i].tolist(), self.inputs
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         if kind == Motion.PLANAR:
@@ -121,7 +121,7 @@ class TreeRecursion(Recursion):
         return found
 
 
-def _structure(x: Sequence[float]) -> Vector:
+def _without_rounding(x: Sequence[float]) -> Vector:
     """Return a constant vector; entries below the rounding of its largest entry become 0.
 
     For example, the cosine of the double nearest to pi/2 is 6e-17 and would only add useless products. The
@@ -145,13 +145,13 @@ def placement(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference)
 def velocity(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the velocity [linear; angular]: 7.127, 7.128."""
     path = _recursion(plan, kind, inputs, reference)
-    return _six(path, reference, *path.velocity(path.end, reference))
+    return _six_vector(path, reference, *path.velocity(path.end, reference))
 
 
 def acceleration(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the classical acceleration [linear; angular]: 7.129, 7.130."""
     path = _recursion(plan, kind, inputs, reference)
-    return _six(path, reference, *path.acceleration(path.end, reference))
+    return _six_vector(path, reference, *path.acceleration(path.end, reference))
 
 
 def jacobian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
@@ -181,7 +181,7 @@ def _recursion(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference
     return TreeRecursion(plan, kind, inputs, own=reference is not Reference.WORLD)
 
 
-def _six(path: TreeRecursion, reference: Reference, linear: Vector, angular: Vector) -> list[Number]:
+def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angular: Vector) -> list[Number]:
     if reference is Reference.LOCAL_WORLD_ALIGNED:
         for S in reversed(path.turns):
             linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)

@@ -59,8 +59,8 @@ def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
     if found.verdict is Verdict.DIFFERS:
         by = _by(found.frames, found.rounding)
         if found.frames and not by:
-            by = ", though no frame of both is off by more than rounding"
-        return f"DIFFERS{by}; first here: {found.differences[0].words}{besides}"
+            by = ", although no common frame is off by more than rounding"
+        return f"DIFFERS{by}; first difference: {found.differences[0].words}{besides}"
     metres, radians = found.rounding
     off = f"no frame is off by more than rounding, {length(metres)} and {angle(radians)}"
     if found.verdict is Verdict.SAME:
@@ -81,7 +81,7 @@ def _within(found: Sameness, most: float) -> str:
     if far:
         worst = max(far, key=lambda one: (one.lower, one.radians_seen))
         return f"NOT {limit}{worst.frame} is {_off(worst, found.rounding)} off"
-    return f"NOT {limit}no frame is proven to be off by less than {_both(*found.written)}"
+    return f"NOT {limit}the proven bound is {_both(*found.written)}"
 
 
 def _both(metres: float, radians: float) -> str:
@@ -178,7 +178,7 @@ def print_sameness(
     if frames:
         out.print("largest distance over all configurations within limits:")
         out.print(plain_table(list(HEADS), rows(frames[:some]), words=(0,)))
-        _left(out, len(frames), some)
+        _print_rest(out, len(frames), some)
         if off := attained(frames[0]):
             out.print(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}", soft_wrap=True)
     _print_lines(out, NARROWED, found.narrowed, some)
@@ -201,10 +201,10 @@ def _print_lines(out: Console, head: str, lines: Sequence[str], some: int | None
         out.print(f"{head}:")
     for line in lines[:some]:
         out.print(f"  {line}", soft_wrap=True)
-    _left(out, len(lines), some)
+    _print_rest(out, len(lines), some)
 
 
-def _left(out: Console, n: int, some: int | None) -> None:
+def _print_rest(out: Console, n: int, some: int | None) -> None:
     if some is not None and n > some:
         out.print(f"  ... and {n - some} more: --all shows them")
 
@@ -329,14 +329,14 @@ def pictures(
         i, j = a.tree.link_index(found.base_links[0]), b.tree.link_index(found.base_links[1])
         T_b = T_a[i] @ inverse(ours.homes[i]) @ found.base @ theirs.homes[j] @ inverse(T_b[j]) @ T_b
     bones = _bones(a, T_a), _bones(b, T_b)
-    drawn = [_drawn(title, turn, tip, bones) for title, turn, tip in VIEWS]
+    drawn = [_draw(title, turn, tip, bones) for title, turn, tip in VIEWS]
     if worst is not None:
         at = T_a[a.tree.link_index(worst.frame)], T_b[b.tree.link_index(worst.frame_b)]
         room = float(np.linalg.norm(at[0][:3, 3] - at[1][:3, 3]))
         if room > 0.0:
             axes = tuple(_axes(T, AXIS * room) for T in at)
             gap = np.stack((at[0][:3, 3], at[1][:3, 3]))[np.newaxis]
-            drawn.append(_drawn(f"{worst.frame}, close by", *VIEWS[0][1:], (axes[0], axes[1]), gap))
+            drawn.append(_draw(f"{worst.frame}, close by", *VIEWS[0][1:], (axes[0], axes[1]), gap))
     return drawn
 
 
@@ -352,7 +352,7 @@ def _axes(T: FloatArray, size: float) -> FloatArray:
     return np.stack((origin, origin + size * T[:3, :3].T), axis=1)
 
 
-def _drawn(
+def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
     """Return one view: lines projected along a direction and scaled to the picture."""
