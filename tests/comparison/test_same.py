@@ -240,7 +240,7 @@ def test_a_certificate_of_what_was_turned_round_holds() -> None:
 
 
 FORGED: dict[str, Any] = {
-    "is not proven": lambda d: d["frames"][-1].update(upper=0.99 * d["frames"][-1]["lower"]),
+    "its upper bound is wrong": lambda d: d["frames"][-1].update(upper=0.99 * d["frames"][-1]["lower"]),
     "finds": lambda d: d["frames"][-1].update(lower=1.01 * d["frames"][-1]["lower"]),
     "do not correspond to each other": lambda d: d["frames"][-1]["q_b"].__setitem__(0, 0.123),
     "leave the limits": lambda d: [d["frames"][-1][q].__setitem__(1, 50.0) for q in ("q_a", "q_b")],
@@ -258,14 +258,14 @@ FORGED: dict[str, Any] = {
     "base_links: not what the models give": lambda d: d.update(base_links=["tool"] * 2),
     "base: not a rigid motion": lambda d: d["base"][2].__setitem__(2, -1.0),
     "model A: its name is": lambda d: d["a"].update(name="another"),
-    "otherwise of the size": lambda d: d["differences"][0].update(radians=1e-6),
-    "the size of": lambda d: d["differences"][0].update(metres=0.5),
+    "differences: the size is wrong": lambda d: d["differences"][0].update(radians=1e-6),
+    "the size is wrong in": lambda d: d["differences"][0].update(metres=0.5),
     "one is listed twice": lambda d: d["differences"].append(d["differences"][0]),
     "not a confirmation": lambda d: d.update(checked="Pinocchio finds nothing"),
     "checked: Pinocchio finds at most": lambda d: d.update(
         checked="Pinocchio 4.1.0 finds at most 1e-19 m at 8 configurations, within the bounds"
     ),
-    "orders: axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),
+    "orders: the axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),
 }
 
 

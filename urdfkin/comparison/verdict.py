@@ -351,7 +351,7 @@ class Comparator:
     def _confirm(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> str:
         """Check the bounds with Pinocchio, which reads both texts itself, at some configurations."""
         if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
-            return "not pinocchio_distances of Pinocchio: loaded with verify=False"
+            return "not asked of Pinocchio: loaded with verify=False"
         for robot in self.robots:
             if (reason := robot.verifier.cannot()) is not None:
                 return f"not verified by Pinocchio: {reason}"
